@@ -44,6 +44,11 @@ def golden_cases() -> list[dict[str, Any]]:
     return found
 
 
+def golden_files() -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = json.loads(FILE.read_text(encoding="utf-8"))["files"]
+    return found
+
+
 def assert_pieces(found: list[Any] | None, case: dict[str, Any]) -> None:
     """Hold the pieces that were found, None for a refusal, to those of a golden case."""
     wanted = case["pieces"]

@@ -187,9 +187,45 @@ def toughness() -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
+def files() -> list[dict[str, Any]]:
+    """SVG files and the ids of their shapes; of None: the file is refused."""
+    head = '<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="60mm" viewBox="0 0 80 60">'
+
+    def file(title: str, inner: str, shapes: str | None) -> dict[str, Any]:
+        for name in "abc":
+            inner = inner.replace(f"<{name}", f'<rect id="{name}" width="8" height="4"')
+        return {
+            "title": title,
+            "text": f"{head}{inner}</svg>",
+            "shapes": None if shapes is None else list(shapes),
+        }
+
+    return [
+        file("nothing hidden", "<a/><g><b/></g>", "ab"),
+        file("display none", '<a display="none"/><b/>', "b"),
+        file("a group with display none", '<g display="none"><a display="inline"/></g><b/>', "b"),
+        file("display none in a style", '<a style="fill:red; display: none"/><b/>', "b"),
+        file("a style is above an attribute", '<a display="none" style="display:inline"/>', "a"),
+        file("an important style", '<a style="DISPLAY:none !important"/><b/>', "b"),
+        file("hidden", '<a visibility="hidden"/><b visibility="collapse"/><c/>', "c"),
+        file("a hidden group", '<g visibility="hidden"><a/><g><b/></g></g><c/>', "c"),
+        file("visible within a hidden group",
+             '<g style="visibility:hidden"><a visibility="visible"/><b visibility="inherit"/></g>',
+             "a"),
+        file("of a symbol nothing is shown", "<symbol><a/></symbol><defs><b/></defs><c/>", "c"),
+        file("a style that hides nothing", "<style>.x { display: inline; }</style><a/>", "a"),
+        file("a style that hides by display",
+             '<defs><style>.x{fill:red;display:/**/none}</style></defs><a class="x"/><b/>', None),
+        file("a style that hides by visibility",
+             "<style><![CDATA[ rect { visibility : Hidden } ]]></style><a/>", None),
+        file("a comment in a style hides nothing",
+             "<style>/* display:none */ .x { fill: red }</style><a/>", "a"),
+    ]  # fmt: skip
+
+
 def vectors() -> dict[str, Any]:
     cases = [*contours(), *holes(), *stacks(), *toughness()]
-    return {"format": "scissorcal-golden-outlines/1", "cases": cases}
+    return {"format": "scissorcal-golden-outlines/1", "cases": cases, "files": files()}
 
 
 def text() -> str:

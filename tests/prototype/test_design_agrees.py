@@ -9,11 +9,12 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Browser
 
+from scissorcal.errors import InputError
 from scissorcal.recipe.drawing import read_drawing
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.plate_layers import plate_pieces
 from tests.browser import open_browser
-from tests.model.drawn import assert_pieces, golden_cases, numbers, pieces_of
+from tests.model.drawn import assert_pieces, golden_cases, golden_files, numbers, pieces_of
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design import SHEET, box, drawn, layer
 
@@ -95,6 +96,22 @@ def test_random_drawings_have_the_same_pieces(bed: Bed) -> None:
 def test_the_page_has_the_pieces_of_the_golden_vectors(bed: Bed, case: dict[str, Any]) -> None:
     found = of_page(bed, case["drawn"])
     assert_pieces(None if "refused" in found else found, case)
+
+
+@pytest.mark.parametrize("given", golden_files(), ids=lambda given: given["title"])
+def test_the_page_and_a_recipe_see_the_same_shapes_of_a_file(
+    bed: Bed, tmp_path: Path, given: dict[str, Any]
+) -> None:
+    page = bed.run("(text) => tried(() => readSvg(text).map((one) => one.id))", given["text"])
+    file = tmp_path / "drawing.svg"
+    file.write_text(given["text"], encoding="utf-8")
+    if given["shapes"] is None:
+        assert "hides something" in page["refused"]
+        with pytest.raises(InputError, match="hides something"):
+            read_drawing(file)
+    else:
+        assert page == given["shapes"]
+        assert [name for name, _ in read_drawing(file).shapes] == given["shapes"]
 
 
 def test_a_saved_recipe_is_taken_and_has_the_same_pieces(bed: Bed, tmp_path: Path) -> None:

@@ -239,6 +239,22 @@ def test_a_draw_sets_the_sliders(shown: Shown) -> None:
             assert nodes[0] + at / 400 * np.ptp(nodes) == pytest.approx(own, rel=1e-4)
 
 
+def test_a_slider_with_the_focus_follows_a_draw_and_moves_on_from_there(shown: Shown) -> None:
+    """The slider with the focus stays in its place when the others are shown anew."""
+    slider = shown.scene.sliders[0]
+    nodes, own = read(slider.nodes), read(shown.scene.draws.values)[0, slider.column]
+    field = shown.page.locator(f"[data-slider={slider.name}]")
+    field.focus()
+    shown.page.get_by_role("button", name="Next draw").dispatch_event("click")
+    at = float(field.input_value())
+    assert nodes[0] + at / 400 * np.ptp(nodes) == pytest.approx(own, rel=1e-4)
+    assert field.evaluate("(one) => document.activeElement === one")
+    field.evaluate("(one) => { one.value = 100; one.dispatchEvent(new Event('input')); }")
+    found = shown.run("() => Object.fromEntries(scissorcal.controls.choices.values)")
+    assert found[slider.name] == pytest.approx(nodes[0] + 0.25 * np.ptp(nodes))
+    assert shown.run("() => scissorcal.controls.choices.draw") is None
+
+
 def test_blades_that_nobody_moves_stand_still(shown: Shown) -> None:
     shown.page.locator("canvas.plain").press("ArrowDown")
     shown.page.wait_for_timeout(700)

@@ -1,11 +1,13 @@
 """Pages that talk nonsense, too much or too slowly, that reload, and that watch together."""
 
 import asyncio
+import contextlib
 import json
 import sys
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import aiohttp
 import numpy as np
@@ -15,6 +17,7 @@ from aiohttp import WSMsgType
 from scissorcal.prototype.rig_commands import RigCommand
 from scissorcal.prototype.rig_feed import Look
 from scissorcal.prototype.server import (
+    MOST_CONNECTIONS,
     MOST_MESSAGE_BYTES,
     MOST_PAGES,
     PrototypeServer,
@@ -139,6 +142,37 @@ def test_so_many_pages_and_no_more(tmp_path: Path) -> None:
                 await page.close()
 
     served(tmp_path, act)
+
+
+def test_so_many_connections_and_no_more_and_idle_ones_are_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("scissorcal.prototype.server.IDLE_s", 0.5)
+
+    async def act(server: PrototypeServer) -> None:
+        async with a_browser(server) as page:
+            port = urlsplit(server.url).port
+            lines = [
+                await asyncio.open_connection("127.0.0.1", port)
+                for _ in range(MOST_CONNECTIONS + 40)
+            ]
+            await asyncio.gather(*(ended(*one) for one in lines[-40:]))
+            await ask(page, "arm", "render")
+            assert await heard(page, is_state(request=REQUEST))
+            await asyncio.gather(*(ended(*one) for one in lines[:-40]))
+            async with a_browser(server) as late:
+                assert await heard(late, is_state(request=REQUEST))
+
+    served(tmp_path, act)
+
+
+async def ended(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """The other side closes, without a word."""
+    with contextlib.suppress(ConnectionResetError):
+        assert await reader.read() == b""
+    writer.close()
+    with contextlib.suppress(ConnectionResetError):
+        await writer.wait_closed()
 
 
 def test_two_pages_see_the_same_and_either_stops_what_the_other_started(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from scissorcal.prototype.rig_commands import RigCommand
-from scissorcal.prototype.server import PrototypeServer
+from scissorcal.prototype.server import MOST_PAGES, PrototypeServer
 from tests.browser import bundled, open_browser, watch
 
 from .made import a_writer, samples_of
@@ -22,16 +22,22 @@ REQUEST = "Take everything out."
 HARNESS = """
 import { connect, Recent } from "./src/socket";
 const recent = new Recent(2);
-const told = { connected: [], states: [], refused: [] as string[], samples: 0 };
+const [why, refused] = [[] as string[], [] as string[]];
+const told = { connected: [], why, states: [], refused, samples: 0 };
 const server = JSON.parse(document.getElementById("server")!.textContent!);
 const line = connect(server, {
-  connected: (is) => told.connected.push(is),
+  connected: (is, why) => { told.connected.push(is); told.why.push(why); },
   state: (state) => told.states.push(state),
   samples: (samples) => { told.samples += samples.time_s.length; recent.add(samples); },
   refused: (sentence) => told.refused.push(sentence),
 });
-Object.assign(window, { line, told, recent });
+Object.assign(window, { line, told, recent, connect, server });
 """
+
+GONE = "start scissorcal prototype again and open the address that it prints"
+OTHER_TOKEN = """() => { window.other = [];
+  connect({ socket: server.socket.replace(/=./, "=") }, { connected: (_, why) => other.push(why),
+    state: () => {}, samples: () => {}, refused: () => {} }); }"""
 
 STRANGER = """<!doctype html><title>Another site</title><script>
 const found = [];
@@ -156,7 +162,7 @@ def test_the_page_follows_asks_and_connects_again(browser: Browser, tmp_path: Pa
         assert not seen.elsewhere
 
 
-def test_a_page_waits_for_a_server_that_is_gone_and_says_so(
+def test_a_page_says_that_its_server_has_ended_and_what_to_do(
     browser: Browser, tmp_path: Path
 ) -> None:
     page_text = f"<!doctype html><title>Rig</title>SERVER<script>{bundled(HARNESS)}</script>"
@@ -166,8 +172,83 @@ def test_a_page_waits_for_a_server_that_is_gone_and_says_so(
             page.goto(server.url)
             until(page, "told.connected.at(-1) === true")
         until(page, "told.connected.at(-1) === false")
+        assert GONE in page.evaluate("told.why.at(-1)")
         page.evaluate("line.stop()")
-        assert page.evaluate("told.refused") == ["The server cannot be reached."]
+        (refused,) = page.evaluate("told.refused")
+        assert "cannot be reached" in refused
+
+
+def test_a_page_tries_again_for_some_seconds_and_then_says_what_to_do(
+    browser: Browser, tmp_path: Path
+) -> None:
+    """A server that was killed says nothing; its port refuses."""
+    page_text = f"<!doctype html><title>Rig</title>SERVER<script>{bundled(HARNESS)}</script>"
+    told = '<script type="application/json" id="server">{"socket": "/rig?token=t"}</script>'
+    with browser.new_context() as context:
+        page = context.new_page()
+        page.clock.install()
+        with another_site(page_text.replace("SERVER", told)) as site:
+            page.goto(site)
+            until(page, "told.why.length > 0")
+        assert page.evaluate("told.why.at(-1)").endswith("trying again.")
+        for _ in range(200):
+            page.clock.run_for(1000)
+            page.wait_for_timeout(50)  # for what does not go by the clock: the network
+            if GONE in page.evaluate("told.why.at(-1)"):
+                break
+        assert GONE in page.evaluate("told.why.at(-1)")
+        count = page.evaluate("told.why.length")
+        page.clock.run_for(60_000)
+        assert page.evaluate("told.why.length") == count, "it is over"
+
+
+def test_another_server_at_the_same_port_can_never_take_the_page_over(
+    browser: Browser, tmp_path: Path
+) -> None:
+    page_text = f"<!doctype html><title>Rig</title>SERVER<script>{bundled(HARNESS)}</script>"
+    with served(tmp_path, page_text) as server, browser.new_context() as context:
+        page = context.new_page()
+        page.goto(server.url)
+        until(page, "told.connected.at(-1) === true")
+        page.evaluate(OTHER_TOKEN)
+        until(page, "other.length > 1")
+        assert GONE in page.evaluate("other.at(-1)")
+
+
+def test_two_pages_of_one_server_follow_the_same_rig(browser: Browser, tmp_path: Path) -> None:
+    page_text = f"<!doctype html><title>Rig</title>SERVER<script>{bundled(HARNESS)}</script>"
+    with served(tmp_path, page_text) as server, browser.new_context() as context:
+        pages = [context.new_page() for _ in range(2)]
+        for page in pages:
+            page.goto(server.url)
+            until(page, "told.states.length > 0")
+        with a_writer(tmp_path) as writer:
+            for number in range(50):
+                writer.append(samples_of(100 * number, 100))
+            for page in pages:
+                until(page, "recent.columns.time_s.at(-1) > 4.5")
+        last = [page.evaluate("recent.columns.torque_Nm.at(-1)") for page in pages]
+        assert last[0] == pytest.approx(last[1], abs=0.5)  # 0.5 s at 1 N m/s
+        pages[0].close()
+        with a_writer(tmp_path, name="render-2.mcap") as writer:
+            writer.append(samples_of(0, 1000))
+            until(pages[1], "recent.recording.includes('render-2')")
+
+
+def test_a_page_too_many_waits_until_another_one_is_closed(
+    browser: Browser, tmp_path: Path
+) -> None:
+    page_text = f"<!doctype html><title>Rig</title>SERVER<script>{bundled(HARNESS)}</script>"
+    with served(tmp_path, page_text) as server, browser.new_context() as context:
+        pages = [context.new_page() for _ in range(MOST_PAGES + 1)]
+        for page in pages:
+            page.goto(server.url)
+            until(page, "told.connected.length > 0")
+        last = pages[-1]
+        until(last, "told.why.at(-1).includes('close another one')")
+        pages[0].close()
+        until(last, "told.states.length > 0")
+        assert server.watching == MOST_PAGES
 
 
 def test_a_page_of_another_site_gets_nothing_even_with_the_address(

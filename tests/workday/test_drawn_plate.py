@@ -16,6 +16,7 @@ from scissorcal.render.derating import needs_on, softened
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.reviewed import reviewed_content
+from scissorcal.workday.runs.prototype import workspace_scene
 from scissorcal.workday.runs.render import package_warnings
 from scissorcal.workday.workspace import Workspace
 from tests.workday.faults import run
@@ -67,6 +68,18 @@ def test_pieces_follow_the_drawing(package: ModelPackage) -> None:
     energies = [strip.fracture_energy_J_per_m / energy for strip in second.strips]
     assert energies == pytest.approx([1.0, 3.0, 1.0])
     assert {piece.scale for piece in package.pieces} == {1.0}
+
+
+def test_the_page_is_told_the_outlines_of_the_drawing(workspace: Workspace) -> None:
+    plate = workspace_scene(workspace).drawn_plate
+    assert plate is not None
+    assert plate.cut_line_mm == workspace.recipe().plate.cut_line_mm
+    (layer,) = plate.layers
+    (outline,) = layer.outline
+    assert max(x for x, _ in outline) == pytest.approx(90.0, abs=1e-3)
+    assert (len(layer.holes), [one.toughness_ratio for one in layer.regions]) == (1, [3.0])
+    path = workspace.package_path(workspace.recipe())
+    assert workspace_scene(workspace, path).drawn_plate is None
 
 
 def test_torque_is_none_in_the_hole_and_in_proportion_in_the_band(package: ModelPackage) -> None:

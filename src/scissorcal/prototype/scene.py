@@ -17,6 +17,7 @@ from scissorcal.package.manifest import Manifest, Parameter, PlateRecord
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.variations import Variations, central_values, variations
 from scissorcal.prototype.arrays import Numbers, Part
+from scissorcal.prototype.drawn_plate import DrawnPlate
 from scissorcal.prototype.parts import (
     Band,
     Draws,
@@ -60,7 +61,8 @@ class Scene(Part):
     average torque; without a ripple there are none. ``cut`` and ``friction`` are as fitted on the
     knots, from which sliders and draws differ. ``notes`` are sentences about the package that do
     not warn. ``pieces`` are the plate along the cut, None for a uniform sheet; ``recipe`` is the
-    text that a drawn plate is written into.
+    text that a drawn plate is written into; ``drawn_plate`` is the plate whose outlines stand in
+    files beside that recipe.
     """
 
     format: Literal["scissorcal-prototype/1"] = FORMAT
@@ -91,6 +93,7 @@ class Scene(Part):
     hands: tuple[Hand, ...] = ()
     pieces: tuple[PiecePart, ...] | None = None
     recipe: str | None = None
+    drawn_plate: DrawnPlate | None = None
     plate_pose: PlatePose | None = None
 
 
@@ -104,6 +107,7 @@ def scene_of(
     warnings: Sequence[str] = (),
     notes: Sequence[str] = (),
     recipe: str | None = None,
+    drawn_plate: DrawnPlate | None = None,
 ) -> Scene:
     """What a page shows of a package; ``fits`` add measured strokes and meanings.
 
@@ -144,6 +148,7 @@ def scene_of(
         hands=tuple(hands),
         pieces=_pieces(manifest),
         recipe=recipe,
+        drawn_plate=drawn_plate,
         plate_pose=_plate_pose(manifest.plate),
     )
 

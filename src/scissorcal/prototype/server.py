@@ -24,6 +24,10 @@ from scissorcal.prototype.watcher import Watcher, request_in
 
 ADDRESS = "127.0.0.1"
 MOST_PAGES = 8
+MOST_CONNECTIONS = 64
+"""With those that have not shown the token; a process may often have no more than 256 files."""
+IDLE_s = 5.0
+"""A connection without a request is closed after it."""
 MOST_MESSAGE_BYTES = 4096
 TICK_s = 0.025
 """From one message of samples to the next: 40 a second."""
@@ -85,18 +89,27 @@ class PrototypeServer:
         app.on_response_prepare.append(self._guard.put_headers)
         app.router.add_get("/", self._give_page, allow_head=False)
         app.router.add_get("/rig", self._give_rig, allow_head=False)
-        runner = web.AppRunner(app, access_log=None, handle_signals=False, shutdown_timeout=1.0)
+        runner = web.AppRunner(
+            app,
+            access_log=None,
+            handle_signals=False,
+            shutdown_timeout=1.0,
+            keepalive_timeout=IDLE_s,
+        )
         await runner.setup()
         self._closing.push_async_callback(runner.cleanup)
         try:
-            await web.TCPSite(runner, ADDRESS, self._port, reuse_address=True).start()
+            listening = await asyncio.get_running_loop().create_server(
+                _bounded(runner.server), ADDRESS, self._port, reuse_address=True
+            )
         except OSError as error:
             await self._closing.aclose()
             raise InputError(
                 f"Port {self._port} of {ADDRESS} cannot be used ({error.strerror}): choose another "
                 "with --port, or leave it out."
             ) from None
-        self._guard.port = runner.addresses[0][1]
+        self._closing.callback(listening.close)
+        self._guard.port = listening.sockets[0].getsockname()[1]
         page, self._guard.policy = self._page_of(f"/rig?token={self._guard.token}")
         self._page = page.encode("utf-8")
         self._streaming = asyncio.create_task(self._stream())
@@ -210,6 +223,19 @@ def samples_message(look: Look) -> dict[str, Any]:
         "pose": None if look.pose is None else [round(one, DIGITS) for one in look.pose],
         "recording": look.recording,
     }
+
+
+def _bounded(server: web.Server | None) -> Callable[[], asyncio.BaseProtocol]:
+    """A protocol for each new connection: closed at once where there are too many."""
+    assert server is not None, "the runner is set up"
+    return lambda: server() if len(server.connections) < MOST_CONNECTIONS else _Closed()
+
+
+class _Closed(asyncio.Protocol):
+    """A connection that is not taken."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        transport.abort()  # type: ignore[attr-defined]
 
 
 def _bound_buffers(transport: asyncio.Transport | None) -> None:

@@ -35,8 +35,11 @@ _LENGTH = re.compile(r"\+?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?(mm|cm|in|pt|pc)")
 SHAPES = ("path", "rect", "circle", "ellipse", "polygon", "polyline")
 _POINTS = ("d", "points")
 _SIZES = ("x", "y", "width", "height", "r", "rx", "ry", "cx", "cy", "viewBox")
-_PLACES = (*_POINTS, *_SIZES, "id", "transform", "display", "preserveAspectRatio")
+_PLACES = (*_POINTS, *_SIZES, "id", "transform", "preserveAspectRatio")
 _NOT_SHOWN = ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata")
+_HIDDEN = ("hidden", "collapse")
+_HIDES = re.compile(r"\bdisplay\s*:\s*none\b|\bvisibility\s*:\s*(hidden|collapse)\b", re.IGNORECASE)
+_COMMENT = re.compile(r"/\*.*?(\*/|$)", re.DOTALL)
 _NUMBERS = {"h": 1, "v": 1, "c": 6, "s": 4, "q": 4, "a": 7}
 """That a segment of a path takes; any other takes 2."""
 _TOKEN = re.compile(r"[a-df-zA-DF-Z]|[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
@@ -46,6 +49,10 @@ _TOO_MANY = (
     "draw it simpler"
 )
 _NO_PLACES = "it has numbers that are no places on a plate"
+_STYLE_HIDES = (
+    "it has a <style> that hides something: remove what is hidden, or hide it by the attribute "
+    "display of each shape"
+)
 _REFUSED = {
     "script": "it has a script, which no drawing of a plate needs: save it as plain SVG",
     "use": "it has clones (<use>): turn them into paths, such as with 'Unlink Clone'",
@@ -85,8 +92,9 @@ def read_drawing(path: Path) -> Drawing:
 
     Lengths come from the file's width and height, which need a unit, and its viewBox. Taken are
     path, rect, circle, ellipse, polygon and polyline with their transforms; curves are flattened
-    to 0.01 mm, open contours closed. Text, pictures and styles are passed over. Raises InputError
-    where it is no such file, has a document type, script or clone, or refers to another file.
+    to 0.01 mm, open contours closed. Text, pictures and styles are passed over, and what display
+    or visibility hides. Raises InputError where it is no such file, has a document type, script or
+    clone, a <style> that hides something, or refers to another file.
     """
     from scissorcal.model.plate_pieces import Outline
 
@@ -141,6 +149,8 @@ class _Plain:
         self.text: list[str] = []
         self._elements = self._shapes = self._points = 0
         self._open: list[str] = []
+        self._visibility = [""]
+        self._style: list[str] | None = None
         self._hidden = 0
 
     def begin(self, name: str, attributes: dict[str, str]) -> None:
@@ -161,7 +171,12 @@ class _Plain:
             _refuse_attribute(key.rpartition(" ")[2], value)
         is_svg = space in ("", "http://www.w3.org/2000/svg")
         tag = local if is_svg and local in (*SHAPES, "svg") else "g"
-        hidden = not is_svg or local in _NOT_SHOWN
+        if local == "style":
+            self._style = []
+        visibility = _property(attributes, "visibility")
+        self._visibility.append(visibility or self._visibility[-1])
+        hidden = not is_svg or local in _NOT_SHOWN or _property(attributes, "display") == "none"
+        hidden |= tag in SHAPES and self._visibility[-1] in _HIDDEN
         self._open.append(tag if not hidden and not self._hidden else "")
         self._hidden += hidden or self._hidden > 0
         if self._hidden:
@@ -172,12 +187,22 @@ class _Plain:
         said = " ".join(f"{key}={quoteattr(value)}" for key, value in places.items())
         self.text.append(f"<{tag} {said}>")
 
-    def end(self, _: str) -> None:
+    def end(self, name: str) -> None:
         """Called where an element ends."""
         tag = self._open.pop()
+        self._visibility.pop()
+        if name.rpartition(" ")[2] == "style":
+            if _HIDES.search(_COMMENT.sub(" ", "".join(self._style or ()))):
+                raise ValueError(_STYLE_HIDES)
+            self._style = None
         self._hidden -= self._hidden > 0
         if tag:
             self.text.append(f"</{tag}>")
+
+    def said(self, text: str) -> None:
+        """Called for text between elements; that of a style is kept until it ends."""
+        if self._style is not None:
+            self._style.append(text)
 
     def _count(self, places: dict[str, str]) -> None:
         self._shapes += 1
@@ -198,6 +223,7 @@ def _plain(data: bytes) -> bytes:
     found = _Plain()
     parser = expat.ParserCreate(namespace_separator=" ")
     parser.StartElementHandler, parser.EndElementHandler = found.begin, found.end
+    parser.CharacterDataHandler = found.said
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
     try:
         parser.Parse(data, True)
@@ -216,14 +242,25 @@ def _refuse_attribute(key: str, value: str) -> None:
 
 
 def _places(attributes: dict[str, str]) -> dict[str, str]:
-    """The attributes of an element that say what and where it is, those in its style included."""
+    """The attributes of an element that say what and where it is, a transform in its style, too."""
     found = {key: value for key, value in attributes.items() if key in _PLACES}
-    for one in attributes.get("style", "").split(";"):
-        key, _, value = one.partition(":")
-        if key.strip() in ("display", "transform"):
-            _refuse_attribute(key.strip(), value)
-            found[key.strip()] = value.strip()
+    transform = _style(attributes).get("transform")
+    if transform is not None:
+        _refuse_attribute("transform", transform)
+        found["transform"] = transform
     return found
+
+
+def _property(attributes: dict[str, str], key: str) -> str:
+    """A property of an element, in its style or else as an attribute; "" where it is inherited."""
+    value = _style(attributes).get(key, attributes.get(key, ""))
+    value = value.partition("!")[0].strip().lower()
+    return "" if value == "inherit" else value
+
+
+def _style(attributes: dict[str, str]) -> dict[str, str]:
+    said = (one.partition(":") for one in attributes.get("style", "").split(";"))
+    return {key.strip().lower(): value.strip() for key, _, value in said}
 
 
 def _nodes(drawn: str) -> int:

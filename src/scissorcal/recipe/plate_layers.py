@@ -168,6 +168,22 @@ def drawings(recipe: Recipe) -> tuple[str, ...]:
     return tuple(sorted({part.outline for part in parts if part.outline is not None}))
 
 
+def drawn_layers(recipe: Recipe, folder: Path) -> tuple[Layer, ...]:
+    """The layers of a recipe's plate with all their outlines; none for the uniform sheet.
+
+    ``folder`` is the recipe's, for its drawings. Raises InputError, with the file, where a drawing
+    cannot be read, or lacks a shape.
+    """
+    from scissorcal.recipe.drawing import read_drawing
+
+    shapes = {name: read_drawing(folder / name) for name in drawings(recipe)}
+    try:
+        return tuple(_layer(layer, shapes) for layer in recipe.plate.layers)
+    except ValueError as error:
+        files = ", ".join(str(folder / name) for name in shapes)
+        raise InputError(f"{files}: the plate of {recipe.name} cannot be drawn: {error}.") from None
+
+
 def plate_pieces(recipe: Recipe, folder: Path) -> tuple[LayerPiece, ...]:
     """The pieces of a recipe's plate on the line of the cut; none for the uniform sheet.
 

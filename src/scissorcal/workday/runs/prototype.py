@@ -18,6 +18,7 @@ from scissorcal.workday.runs.render import package_warnings
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
+    from scissorcal.prototype.drawn_plate import DrawnPlate
     from scissorcal.prototype.parts import Hand
     from scissorcal.prototype.rig_commands import RigCommand
     from scissorcal.prototype.scene import Scene
@@ -73,7 +74,26 @@ def workspace_scene(
             *(sentence for sentence in said if sentence not in package.warnings),
         ],
         recipe=None if package_path else read_text(workspace.recipe_path),
+        drawn_plate=None if package_path else workspace_plate(workspace),
     )
+
+
+def workspace_plate(workspace: Workspace) -> "DrawnPlate | None":
+    """The plate whose outlines stand in files, which a page cannot read; None where there are none.
+
+    None, too, where a file is gone or wrong: the page then says what it cannot draw.
+    """
+    from scissorcal.prototype.drawn_plate import drawn_plate
+    from scissorcal.recipe.plate_layers import drawings, drawn_layers
+
+    recipe = workspace.recipe()
+    if not drawings(recipe):
+        return None
+    try:
+        layers = drawn_layers(recipe, workspace.root)
+    except InputError:
+        return None
+    return drawn_plate(recipe.plate.cut_line_mm, layers)
 
 
 def _origin(workspace: Workspace) -> tuple[str, ...]:

@@ -15,18 +15,19 @@ import { Rig } from "./rig";
 import { RigPanel } from "./rig_panel";
 import { Ripple } from "./ripple";
 import { Scene, unpack } from "./scene";
-import { Server } from "./socket";
+import { RigSamples, Server } from "./socket";
 import { View, View3d } from "./view3d";
 
-const CHARTS_EVERY_ms = 50;
-const AT_REST_ms = 250;
+const CHARTS_EVERY_ms = 100; // as the numbers: each costs as much processor time as six pictures of the blades
+const AT_REST_ms = 250; // nothing changes then but colours and sizes
+const STIRS = ["pointerdown", "pointerup", "keydown", "wheel", "input", "change", "click", "resize", "visibilitychange"];
 
 export class App {
   readonly rig: Rig;
   readonly average: Average;
   readonly controls: Controls;
-  /** Frames drawn, and seconds since the first: frames per second. */
-  readonly frames = { count: 0, seconds: 0 };
+  /** Pictures and charts drawn, and seconds since the first. */
+  readonly frames = { count: 0, charts: 0, seconds: 0 };
   laws: { fitted: Law; whatIf: Law };
   private readonly fitted: Law;
   private readonly drawing: Drawing;
@@ -37,10 +38,15 @@ export class App {
   private readonly panel: RigPanel | null;
   private readonly solid = html("div", { class: "solid", hidden: true });
   private view3d: View3d | null = null;
+  private readonly acts = { stroke: () => this.stroke(), freshSheet: () => this.rig.freshSheet(), swap: () => this.controls.swap() };
+  private readonly bladesBox = html("label", { hidden: true }, html("input", {
+    type: "checkbox", change: (event) => this.moveBlades((event.target as HTMLInputElement).checked),
+  }), "move the blades");
   private drawn: Drawn | null = null;
   /** Edge of the blades that a person drew; null: as fitted. */
   private edge: Edge | null = null;
-  private drawnAt = 0;
+  /** Timer of the next picture while the blades stand still, else 0. */
+  private resting = 0;
   private chartedAt = 0;
   private curvesAt = NaN;
   private readonly largestTorque: number;
@@ -68,17 +74,19 @@ export class App {
     torque.append(html("h2", {}, "Torque over the opening"), html("p", { class: "note" }, torqueNote(scene)));
     time.append(html("h2", {}, "The last 8 seconds"));
     this.torque = new TorqueChart(torque, scene);
-    this.time = new TimeChart(time);
+    this.time = new TimeChart(time, scene, this.largestTorque, server !== null);
     this.readout = new Readout(now, scene, server !== null);
     this.controls = new Controls(law, scene, () => this.changed());
-    this.panel = server ? new RigPanel(rig, server, (samples) => this.rig.follow(samples)) : null;
-    takeInput(this.drawing, this.rig, scene, { stroke: () => this.stroke(), freshSheet: () => this.rig.freshSheet(), swap: () => this.controls.swap() });
+    this.panel = server ? new RigPanel(rig, server, (samples) => this.follow(samples)) : null;
+    takeInput(canvas, this.rig, scene, this.acts);
     this.changed();
     this.rig.freshSheet();
   }
 
   run(): void {
-    requestAnimationFrame((now) => this.frame(now));
+    for (const name of STIRS) window.addEventListener(name, () => this.stir(), { capture: true });
+    window.addEventListener("pointermove", (event) => event.buttons && this.stir(), { capture: true });
+    this.next();
   }
 
   /** Torque (N m) of the average law: what open_package(...).torque gives at these places. */
@@ -87,27 +95,52 @@ export class App {
     return Array.from(this.average.torque(Float32Array.from(openings), rate, contact));
   }
 
+  /** Sixty pictures a second while something moves, four at rest: then each would cost as much for nothing. */
   private frame(now: number): void {
-    const seconds = this.before ? (now - this.before) / 1e3 : 0;
-    this.before = now;
-    this.frames.count += seconds ? 1 : 0;
-    this.frames.seconds += seconds;
     const { rig } = this;
-    rig.pass(seconds);
+    this.pass(now);
+    this.frames.count += 1;
     this.ripple.released(rig.released, rig.step.torque / this.largestTorque);
     rig.released = 0;
-    // at rest nothing changes but colours and sizes: four pictures a second are enough
-    if (rig.isStill && now - this.drawnAt < AT_REST_ms) return this.run();
-    this.drawnAt = now;
     this.draw();
     this.readout.show(rig, now, rig.isFollowing ? this.panel?.recent.newestTorque : undefined);
-    if (now - this.chartedAt >= CHARTS_EVERY_ms) {
-      this.chartedAt = now;
-      if (rig.strokeContact !== this.curvesAt) this.showCurves();
-      this.torque.draw(rig);
-      this.time.draw(rig.recent, rig.time, this.panel ? this.panel.recent.columns : null);
-    }
-    this.run();
+    if (now - this.chartedAt >= CHARTS_EVERY_ms) this.chart(now);
+    if (rig.isStill) this.resting = window.setTimeout(() => this.next(), AT_REST_ms);
+    else this.next();
+  }
+
+  private next(): void {
+    this.resting = 0;
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  /** Something may move now: the time until then has passed at rest. */
+  private stir(): void {
+    if (!this.resting) return;
+    window.clearTimeout(this.resting);
+    this.pass(performance.now());
+    this.next();
+  }
+
+  private pass(now: number): void {
+    const seconds = this.before ? Math.max(now - this.before, 0) / 1e3 : 0;
+    this.before = Math.max(now, this.before);
+    this.frames.seconds += seconds;
+    this.rig.pass(seconds);
+  }
+
+  private follow(samples: RigSamples): void {
+    this.stir();
+    this.rig.follow(samples);
+  }
+
+  private chart(now: number): void {
+    const { rig } = this;
+    this.chartedAt = now;
+    this.frames.charts += 1;
+    if (rig.strokeContact !== this.curvesAt) this.showCurves();
+    this.torque.draw(rig);
+    this.time.draw(rig.recent, rig.time, this.panel ? this.panel.recent.columns : null);
   }
 
   private draw(): void {
@@ -125,6 +158,7 @@ export class App {
   /** A choice of the law changed: load both laws, and draw their curves. */
   private changed(): void {
     const { choices } = this.controls;
+    this.stir();
     const other = choices.draw === null
       ? whatIf(this.scene, this.fitted, choices.values) : ofDraw(this.scene, this.fitted, choices.draw);
     this.laws = { fitted: this.withBlades(this.fitted), whatIf: this.withBlades(other) };
@@ -181,7 +215,7 @@ export class App {
       button("Strokes", () => this.play(madeHand(this.scene))),
       ...this.scene.hands.map((hand) => button(`Hand of ${hand.name}`, () => this.play(recordedHand(hand)))),
       button("Fresh sheet", () => this.rig.freshSheet()),
-      box("3-D", (isOn) => this.show3d(isOn)), box("sound", (isOn) => this.ripple.sound(isOn)), box("gamepad rumble", (isOn) => this.ripple.rumble(isOn)));
+      box("3-D", (isOn) => this.show3d(isOn)), this.bladesBox, box("sound", (isOn) => this.ripple.sound(isOn)), box("gamepad rumble", (isOn) => this.ripple.rumble(isOn)));
   }
 
   private play(script: Parameters<Rig["play"]>[0]): void {
@@ -192,7 +226,17 @@ export class App {
   private show3d(isOn: boolean): void {
     this.solid.hidden = !isOn;
     this.drawing.canvas.hidden = isOn;
-    if (isOn) this.view3d ??= new View3d(this.solid);
+    if (isOn && !this.view3d) this.open3d();
+    this.bladesBox.hidden = !isOn || !this.view3d?.canvas;
+  }
+
+  private open3d(): void {
+    const view = this.view3d = new View3d(this.solid);
+    if (view.canvas) takeInput(view.canvas, this.rig, this.scene, this.acts, { movesBlades: () => view.movesBlades, way: () => view.way });
+  }
+
+  private moveBlades(isOn: boolean): void {
+    if (this.view3d) this.view3d.movesBlades = isOn;
   }
 
   private openDesign(details: HTMLDetailsElement, section: HTMLElement): void {

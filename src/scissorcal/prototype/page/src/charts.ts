@@ -11,6 +11,8 @@ const GRID = 361;
 const HEIGHT_px = 260;
 const LAST_s = 8;
 const TIMES = 400;
+const LEAST = 0.1; // of the package's largest torque: below it is what friction and noise do at rest
+const AIR = 1.05;
 
 type Row = (number | null)[];
 
@@ -29,6 +31,8 @@ export class TorqueChart {
   private readonly measured: Row[];
   private curves: Curves = { fitted: null, whatIf: null, draw: null };
   private theme = "";
+  /** What is drawn: nothing is drawn again that has not changed. */
+  private drawn: unknown[] = [];
 
   private readonly container = html("div", { class: "chart" });
 
@@ -47,6 +51,9 @@ export class TorqueChart {
 
   draw(rig: Rig): void {
     this.theme = rebuiltWhere(this.theme, this.container, () => this.build());
+    const now = [this.theme, this.curves, rig.strokeContact, rig.stroke, rig.stroke.length];
+    if (now.every((one, i) => one === this.drawn[i])) return;
+    this.drawn = now;
     const band = this.scene.bands.find((one) => !one.friction && one.rate < 0);
     const [low, high] = band ? bandAt(band, rig.strokeContact, this.openings) : [[], []];
     const live = latest(rig.stroke, this.openings);
@@ -92,10 +99,14 @@ export class TimeChart {
   private chart: uPlot | null = null;
   private theme = "";
   private readonly times = Array.from({ length: TIMES }, (_, i) => -LAST_s + (LAST_s * (i + 1)) / TIMES);
+  private readonly least: [number, number];
+  private ranges: [Range, Range] = [[0, 1], [0, 1]];
 
   private readonly container = html("div", { class: "chart" });
 
-  constructor(section: HTMLElement) {
+  /** `largestTorque` (N m) of the package; a rig has a curve of its own where it can be followed. */
+  constructor(section: HTMLElement, scene: Scene, largestTorque: number, private readonly followsRig: boolean) {
+    this.least = [LEAST * largestTorque, (LEAST * largestTorque) / scene.handle_radius_m];
     section.append(this.container);
     const { container } = this;
     new ResizeObserver(() => this.chart?.setSize({ width: container.clientWidth, height: HEIGHT_px })).observe(container);
@@ -115,30 +126,49 @@ export class TimeChart {
       const place = Math.ceil(((time - newest + LAST_s) / LAST_s) * TIMES) - 1;
       if (place >= 0 && place < TIMES) rig[place] = followed.torque_Nm[i];
     });
-    this.chart?.setData([this.times, torque, force, rig] as uPlot.AlignedData);
+    const rows = this.followsRig ? [torque, force, rig] : [torque, force];
+    this.ranges = withOneZero(extentOf([...torque, ...rig], this.least[0]), extentOf(force, this.least[1]));
+    this.chart?.setData([this.times, ...rows] as uPlot.AlignedData);
   }
 
   private build(): void {
     const colours = coloursOf(this.container);
     this.chart?.destroy();
     const show = { points: { show: false }, spanGaps: true };
+    const torque: uPlot.Series = {
+      label: "torque", stroke: colours.ink, width: 1.5, ...show, value: (_, v) => (v === null ? "" : `${(1e3 * v).toFixed(1)} mN m`),
+    };
     this.chart = new uPlot({
       width: this.container.clientWidth, height: HEIGHT_px,
       series: [
         { label: "time", value: (_, v) => (v === null ? "" : `${v.toFixed(2)} s`) },
-        { label: "torque with friction", stroke: colours.ink, width: 1.5, ...show, value: (_, v) => (v === null ? "" : `${(1e3 * v).toFixed(1)} mN m`) },
-        { label: "translation force", stroke: colours.vermillion, width: 1.5, scale: "N", ...show, value: (_, v) => (v === null ? "" : `${v.toFixed(2)} N`) },
-        { label: "rig", stroke: colours.blue, width: 1.5, ...show, value: (_, v) => (v === null ? "" : `${(1e3 * v).toFixed(1)} mN m`) },
+        torque,
+        { label: "force along the cut", stroke: colours.vermillion, width: 1.5, scale: "N", ...show, value: (_, v) => (v === null ? "" : `${v.toFixed(2)} N`) },
+        ...(this.followsRig ? [{ ...torque, label: "torque of the rig", stroke: colours.blue }] : []),
       ],
-      scales: { x: { time: false, range: [-LAST_s, 0] }, N: { range: (_, low, high) => [Math.min(low, -0.1), Math.max(high, 0.1)] } },
+      scales: { x: { time: false, range: [-LAST_s, 0] }, y: { range: () => this.ranges[0] }, N: { range: () => this.ranges[1] } },
       axes: [
         axis(colours, "time, s before now"),
         { ...axis(colours, "torque, mN m"), size: 56, values: (_, ticks) => ticks.map((v) => (1e3 * v).toFixed(0)) },
         { ...axis(colours, "force along the cut, N"), scale: "N", side: 1, size: 50, grid: { show: false } },
       ],
       cursor: { drag: { x: false, y: false } },
-    }, [this.times, [], [], []] as uPlot.AlignedData, this.container);
+    }, [this.times, [], [], []].slice(0, this.followsRig ? 4 : 3) as uPlot.AlignedData, this.container);
   }
+}
+
+type Range = [number, number];
+
+/** From the lowest to the highest value and 0; no less than `least` on a side. */
+function extentOf(row: Row, least: number): Range {
+  const [low, high] = row.reduce(([a, b]: Range, v): Range => [Math.min(a, v ?? 0), Math.max(b, v ?? 0)], [0, 0]);
+  return [low, Math.max(high, least, -low)];
+}
+
+/** Ranges of two axes, left and right, whose zeros stand at one height. */
+function withOneZero(...extents: [Range, Range]): [Range, Range] {
+  const below = Math.max(...extents.map(([low, high]) => -low / high));
+  return extents.map(([, high]): Range => [-AIR * below * high, AIR * high]) as [Range, Range];
 }
 
 /** Draw a chart anew where the colours of the page have changed. */

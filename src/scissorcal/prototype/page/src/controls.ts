@@ -54,8 +54,7 @@ export class Controls {
   }
 
   reset(): void {
-    window.clearInterval(this.playing);
-    this.playing = 0;
+    this.stopPlaying();
     this.choices.values.clear();
     this.choices.draw = null;
     this.choices.active = "fitted";
@@ -91,10 +90,14 @@ export class Controls {
 
   /** What a slider changed is no draw any more, and no further one takes its place. */
   private leaveDraws(): void {
-    window.clearInterval(this.playing);
-    this.playing = 0;
+    this.stopPlaying();
     this.choices.draw = null;
     this.fillDraws();
+  }
+
+  private stopPlaying(): void {
+    window.clearInterval(this.playing);
+    this.playing = 0;
   }
 
   private fillDraws(): void {
@@ -114,8 +117,8 @@ export class Controls {
     };
     const next = (): void => chosen(choices.draw === null ? 0 : (choices.draw + 1) % count);
     const play = (): void => {
-      window.clearInterval(this.playing);
-      this.playing = this.playing ? 0 : window.setInterval(next, 600);
+      if (this.playing) this.stopPlaying();
+      else this.playing = window.setInterval(next, 600);
       this.fillDraws();
     };
     refilled(this.draws,
@@ -134,18 +137,18 @@ export class Controls {
     const shown = (at: number): string => `${(scale * at).toFixed(decimals).replace("-", "−")} ${raised(unit)}`.trim();
     const output = html("output", {}, shown(value));
     const input = html("input", {
-      type: "range", min: 0, max: STEPS, step: "any", "aria-label": slider.meaning || slider.name,
+      type: "range", min: 0, max: STEPS, step: "any", value: STEPS * share(value), "aria-label": slider.meaning || slider.name,
       "aria-valuetext": shown(value), "data-slider": slider.name, "data-key": slider.name,
-      input: () => {
-        const wanted = low + (Number(input.value) / STEPS) * (high - low);
+      input: (event) => {
+        const moved = event.currentTarget as HTMLInputElement;
+        const wanted = low + (Number(moved.value) / STEPS) * (high - low);
         this.choices.values.set(slider.name, wanted);
         if (this.choices.draw !== null || this.playing) this.leaveDraws();
         output.textContent = shown(wanted);
-        input.setAttribute("aria-valuetext", shown(wanted));
+        moved.setAttribute("aria-valuetext", shown(wanted));
         this.changed();
       },
     });
-    input.value = String(STEPS * share(value));
     const range = html("span", { class: "range", "aria-hidden": "true" }, html("span", { class: "interval" }), html("span", { class: "tick" }));
     const [interval, tick] = range.children as unknown as HTMLElement[];
     interval.style.left = `${100 * share(slider.q05)}%`;

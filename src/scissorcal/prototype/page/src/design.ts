@@ -2,7 +2,7 @@
 
 import { edgeOfTable } from "./blade_edge";
 import { DesignCanvas, Tool } from "./design_canvas";
-import { openDrawing, savedFile } from "./design_files";
+import { drawnFromPlate, openDrawing, savedFile } from "./design_files";
 import { Design, Kind, plainSheet } from "./design_state";
 import { calibratedText, cornerTable, edgePanel, layerList, pieceTable } from "./design_tables";
 import { html, refilled } from "./elements";
@@ -46,8 +46,6 @@ class Designer {
   private readonly side = html("div", { class: "design-side" });
   private readonly tools = html("div", { class: "row", role: "toolbar", "aria-label": "Tools of the drawing" });
   private readonly cuts = html("input", { type: "checkbox", change: () => this.told() });
-  /** The recipe that the drawing goes into. */
-  private base: string | null;
   private pieces: Piece[] | null = null;
   private refusal = "";
   private timer = 0;
@@ -55,9 +53,8 @@ class Designer {
   constructor(container: HTMLElement, private readonly scene: Scene, private readonly apply: Apply) {
     this.calibrated = calibratedOf(scene);
     this.fitted = fittedEdge(scene);
-    this.base = scene.recipe ?? null;
     const begun = this.begun();
-    this.design = new Design(begun.drawn, (isDone) => this.changed(isDone));
+    this.design = new Design(begun.drawn, (isDone) => this.changed(isDone), scene.recipe ?? null);
     const paper = html("div", { class: "design-paper" });
     const say = (sentence: string): void => this.say(sentence);
     this.canvas = new DesignCanvas(paper, this.design, this.calibrated, say);
@@ -80,6 +77,9 @@ class Designer {
     const plain = plainSheet(this.calibrated, scene.blade_length_m);
     if (!scene.pieces) return { drawn: plain, sentence: "" };
     try {
+      if (scene.drawn_plate) {
+        return { drawn: drawnFromPlate(scene.drawn_plate), sentence: "The package's plate, from its SVG files; their y points down, and up here." };
+      }
       const own = drawnFromRecipe(scene.recipe ?? "");
       if (own.layers.length) return { drawn: { ...own, edge: null, edge_points: [] }, sentence: "" };
     } catch (error) {
@@ -103,6 +103,12 @@ class Designer {
     this.told();
   }
 
+  /** Cut what was calibrated, whatever is drawn. */
+  private uncut(): void {
+    this.cuts.checked = false;
+    this.told();
+  }
+
   private told(): void {
     if (!this.cuts.checked) this.apply(null, null);
     else if (this.pieces) this.apply(this.pieces, { drawn: this.design.drawn, edge: this.design.drawn.edge });
@@ -119,7 +125,7 @@ class Designer {
     }
   }
 
-  /** Show the tables anew once the focus has moved on, so that it stays where it went. */
+  /** Show the tables anew, once for all that changes now; what is typed meanwhile stays in its field. */
   private refresh(): void {
     clearTimeout(this.timer);
     this.timer = window.setTimeout(() => this.tables());
@@ -172,7 +178,7 @@ class Designer {
       }) }, `Save ${name}`);
     return html("div", { class: "row" },
       html("label", { class: "button" }, "Load SVG or recipe ", file),
-      saves("recipe.toml", "application/toml", () => recipeText(design.drawn, scene, this.base)),
+      saves("recipe.toml", "application/toml", () => recipeText(design.drawn, scene, design.base)),
       saves("drawing.svg", "image/svg+xml", () => svgOf(design.drawn)),
       html("label", { class: "field" }, this.cuts, ` cut this drawing instead of ${scene.pieces ? "the package's plate" : "the plain sheet"}`));
   }
@@ -182,13 +188,13 @@ class Designer {
     this.tried(() => {
       const { design, canvas } = this;
       const found = openDrawing(chosen.name, text, design.drawn, {
-        kind: canvas.draws, layer: design.part.layer, thickness_mm: 1e3 * this.calibrated.thickness_m,
+        kind: canvas.draws, layer: design.part.layer, sheet: plainSheet(this.calibrated, this.scene.blade_length_m).layers[0],
       });
-      this.base = found.base ?? this.base;
       design.part = found.part;
       design.corner = null;
-      design.replace(found.drawn);
+      design.replace(found.drawn, true, found.base);
       canvas.fit();
+      if (found.isUniform) this.uncut();
       this.say(found.sentence);
     });
   }

@@ -1,17 +1,19 @@
 // Files of a drawing: what was loaded becomes a drawing, what is saved goes to the person's disk.
 
 import { Kind, Part, withAdded } from "./design_state";
-import { boundsOf, moved, Outline, Point, stretches } from "./outline";
-import { Drawn, materialOf } from "./pieces";
+import { boundsOf, moved, nested, Outline, Point, stretches } from "./outline";
+import { Drawn, Layer, layerName, materialOf } from "./pieces";
 import { pointsOf } from "./design_tables";
 import { drawnFromRecipe } from "./recipe_text";
+import { Contours, DrawnPlate } from "./scene";
 import { drawnFromSvg } from "./svg_file";
 
 interface Wanted {
   /** What outlines of a foreign SVG file become. */
   kind: Kind;
   layer: number;
-  thickness_mm: number;
+  /** The uniform sheet: what a recipe without layers is about, and how thick foreign outlines are. */
+  sheet: Layer;
 }
 
 interface Opened {
@@ -20,6 +22,8 @@ interface Opened {
   sentence: string;
   /** The recipe's text, which keeps all but the drawing. */
   base?: string;
+  /** Nothing was drawn: the blades cut the uniform sheet. */
+  isUniform?: boolean;
 }
 
 const FIRST: Part = { kind: "outline", layer: 0, index: 0 };
@@ -27,19 +31,17 @@ const FIRST: Part = { kind: "outline", layer: 0, index: 0 };
 /** A recipe, a drawing of ours or any SVG file as a drawing. Raises Error with a sentence. */
 export function openDrawing(name: string, text: string, present: Drawn, wanted: Wanted): Opened {
   if (/\.toml$/i.test(name)) {
-    const drawn = drawnFromRecipe(text);
-    const edge_points = drawn.edge ? pointsOf(drawn.edge) : [];
-    const count = drawn.layers.length;
-    return { drawn: { ...drawn, edge_points }, part: FIRST, base: text, sentence: `${name}: ${count || "no"} layer${count === 1 ? "" : "s"}.` };
+    return { part: FIRST, base: text, ...recipeOf(name, drawnFromRecipe(text), wanted.sheet) };
   }
-  const drawn = drawnFromSvg(text, wanted.thickness_mm);
+  const { thickness_mm } = wanted.sheet;
+  const drawn = drawnFromSvg(text, thickness_mm);
   const { isOurs, ...found } = drawn;
   if (isOurs) return { drawn: found, part: FIRST, sentence: `${name}: the drawing as it was saved.` };
   if (wanted.kind === "outline") return placed(name, found);
   const outlines = found.layers.map((layer) => layer.outline);
   if (wanted.kind === "edge") {
     const points = lowerSide(outlines[0] ?? found.edge_points);
-    const added = withAdded(present, "edge", 0, points, wanted.thickness_mm);
+    const added = withAdded(present, "edge", 0, points, thickness_mm);
     return { ...added, sentence: `${name}: an edge through ${points.length} points.` };
   }
   if (!outlines.length) throw new Error(`${name} has no closed outline with an area.`);
@@ -48,10 +50,40 @@ export function openDrawing(name: string, text: string, present: Drawn, wanted: 
   const up = outlines.some((outline) => stretches(outline, line).length) ? 0 : line - 0.5 * (low[1] + high[1]);
   let [now, part] = [present, FIRST];
   for (const outline of outlines) {
-    ({ drawn: now, part } = withAdded(now, wanted.kind, wanted.layer, moved(outline, 0, up), wanted.thickness_mm));
+    ({ drawn: now, part } = withAdded(now, wanted.kind, wanted.layer, moved(outline, 0, up), thickness_mm));
   }
   const added = `${name}: ${outlines.length} outline${outlines.length === 1 ? "" : "s"} added`;
   return { drawn: now, part, sentence: `${added}${up ? ", moved onto the line of the cut" : ""}.` };
+}
+
+/** A recipe without layers is about the uniform sheet, which is drawn and not cut as drawn. */
+function recipeOf(name: string, drawn: Drawn, sheet: Layer): Pick<Opened, "drawn" | "sentence" | "isUniform"> {
+  const edge_points = drawn.edge ? pointsOf(drawn.edge) : [];
+  const count = drawn.layers.length;
+  if (count) return { drawn: { ...drawn, edge_points }, sentence: `${name}: ${count} layer${count === 1 ? "" : "s"}.` };
+  return {
+    drawn: { ...drawn, cut_line_mm: 0, layers: [sheet], edge_points }, isUniform: true,
+    sentence: `${name} draws no plate: it is about the uniform sheet, as it was calibrated. A piece of that is drawn here; tick the box to cut it.`,
+  };
+}
+
+/** A plate whose outlines were read from files, as a drawing: each closed contour is an outline. */
+export function drawnFromPlate({ cut_line_mm, layers }: DrawnPlate): Drawn {
+  const drawn: Drawn = { cut_line_mm, layers: [], edge: null, edge_points: [] };
+  for (const { outline, holes, regions, ...own } of layers) {
+    const whole = (shape: Contours, what: string): Outline[] => nested(shape).map((one) => {
+      if (one.holes.length) throw new Error(`${what} of its layer ${own.name} has a hole, which cannot be drawn here.`);
+      return one.outline;
+    });
+    const taken = holes.flatMap((shape) => whole(shape, "a hole"));
+    const parts = regions.flatMap(({ toughness_ratio, outline: shape }) =>
+      whole(shape, "a part").map((one) => ({ toughness_ratio, outline: one })));
+    for (const plate of nested(outline)) {
+      const name = layerName(own.name, drawn.layers.map((one) => one.name), "plate");
+      drawn.layers.push({ ...own, name, outline: plate.outline, holes: [...plate.holes, ...taken], regions: parts });
+    }
+  }
+  return drawn;
 }
 
 /** Offer text as a file to save. */

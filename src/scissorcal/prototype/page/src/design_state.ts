@@ -16,23 +16,37 @@ export interface Part {
 const MOST_STEPS = 200;
 const TOUGHER = 2;
 
+/** A drawing, and the text of the recipe that it goes into. */
+interface Step {
+  drawn: Drawn;
+  base: string | null;
+}
+
 /** A drawing with its history. Drawings are never changed, only replaced. */
 export class Design {
   part: Part = { kind: "outline", layer: 0, index: 0 };
   /** The chosen corner of the chosen part, null for the part as a whole. */
   corner: number | null = null;
-  private readonly before: Drawn[] = [];
-  private readonly after: Drawn[] = [];
+  private present: Step;
+  private readonly before: Step[] = [];
+  private readonly after: Step[] = [];
   private isOpen = false;
 
-  constructor(private present: Drawn, private readonly changed: (isDone: boolean) => void) {}
+  constructor(drawn: Drawn, private readonly changed: (isDone: boolean) => void, base: string | null = null) {
+    this.present = { drawn, base };
+  }
 
   get drawn(): Drawn {
-    return this.present;
+    return this.present.drawn;
+  }
+
+  /** Text of the recipe that the drawing goes into; null: the page makes one. */
+  get base(): string | null {
+    return this.present.base;
   }
 
   get outline(): Outline {
-    return outlineAt(this.present, this.part);
+    return outlineAt(this.drawn, this.part);
   }
 
   choose(part: Part, corner: number | null = null): void {
@@ -43,14 +57,14 @@ export class Design {
   }
 
   /** Replace the drawing. Replacements up to one that is done are one step back. */
-  replace(drawn: Drawn, isDone = true): void {
+  replace(drawn: Drawn, isDone = true, base = this.base): void {
     if (!this.isOpen) {
       this.before.push(this.present);
       if (this.before.length > MOST_STEPS) this.before.shift();
       this.after.length = 0;
     }
     this.isOpen = !isDone;
-    this.present = drawn;
+    this.present = { drawn, base };
     this.settle();
     this.changed(isDone);
   }
@@ -63,7 +77,7 @@ export class Design {
   }
 
   reshape(outline: Outline, isDone = true): void {
-    this.replace(withOutline(this.present, this.part, outline), isDone);
+    this.replace(withOutline(this.drawn, this.part, outline), isDone);
   }
 
   undo(): void {
@@ -82,7 +96,7 @@ export class Design {
     return this.after.length > 0;
   }
 
-  private step(from: Drawn[], to: Drawn[]): void {
+  private step(from: Step[], to: Step[]): void {
     const next = from.pop();
     if (!next) return;
     this.isOpen = false;
@@ -94,10 +108,10 @@ export class Design {
 
   /** Keep the choice within what there is. */
   private settle(): void {
-    const { layers } = this.present;
+    const { layers } = this.drawn;
     const { kind } = this.part;
     if (kind === "edge") {
-      if (!this.present.edge_points.length) this.part = { kind: "outline", layer: 0, index: 0 };
+      if (!this.drawn.edge_points.length) this.part = { kind: "outline", layer: 0, index: 0 };
     } else {
       const layer = Math.max(Math.min(this.part.layer, layers.length - 1), 0);
       const count = kind === "hole" ? layers[layer]?.holes.length : kind === "region" ? layers[layer]?.regions.length : 1;

@@ -20,26 +20,27 @@ export function layerList(design: Design): HTMLElement {
     html("h3", {}, "Layers, the lowest first"),
     rows.length ? html("ol", { class: "design-layers" }, ...rows) : html("p", {}, "There is no plate: draw one or load one."),
     numberField("Line of the cut, y", drawn.cut_line_mm, { key: "cut", unit: "mm", least: -1e4, most: 1e4 }, (value) =>
-      design.replace({ ...drawn, cut_line_mm: value })));
+      design.replace({ ...design.drawn, cut_line_mm: value })));
 }
 
 function layerFields(design: Design, layer: Layer, i: number, isChosen: boolean): HTMLLIElement {
   const { drawn } = design;
-  const change = (values: Partial<Layer>): void => design.replace(withLayer(drawn, i, (own) => ({ ...own, ...values })));
+  const change = (values: Partial<Layer>): void => design.replace(withLayer(design.drawn, i, (own) => ({ ...own, ...values })));
   const choose = (kind: Kind, index = 0): void => design.choose({ kind, layer: i, index });
   const name = html("input", {
     type: "text", value: layer.name, maxlength: 60, "aria-label": `Name of layer ${i + 1}`, "data-key": `name${i}`,
-    change: () => {
-      const others = drawn.layers.filter((_, k) => k !== i).map((one) => one.name);
-      name.value = layerName(name.value, others, layer.name);
-      if (name.value !== layer.name) change({ name: name.value });
+    change: (event) => {
+      const field = event.currentTarget as HTMLInputElement;
+      const others = design.drawn.layers.filter((_, k) => k !== i).map((one) => one.name);
+      field.value = layerName(field.value, others, layer.name);
+      if (field.value !== layer.name) change({ name: field.value });
     },
   });
   const swap = (j: number): void => {
-    const layers = [...drawn.layers];
+    const layers = [...design.drawn.layers];
     [layers[i], layers[j]] = [layers[j], layers[i]];
     design.part = { kind: "outline", layer: j, index: 0 };
-    design.replace({ ...drawn, layers });
+    design.replace({ ...design.drawn, layers });
   };
   const small = (text: string, label: string, click: () => void, isOff = false): HTMLButtonElement =>
     html("button", { type: "button", class: "small", "aria-label": `${label}: ${layer.name}`, title: label, disabled: isOff, click, "data-key": `${label}${i}` }, text);
@@ -52,7 +53,7 @@ function layerFields(design: Design, layer: Layer, i: number, isChosen: boolean)
       name,
       small("↑", "Up", () => swap(i + 1), i + 1 === drawn.layers.length),
       small("↓", "Down", () => swap(i - 1), i === 0),
-      small("×", "Remove", () => design.replace(withoutPart(drawn, { kind: "outline", layer: i, index: 0 })))),
+      small("×", "Remove", () => design.replace(withoutPart(design.drawn, { kind: "outline", layer: i, index: 0 })))),
     html("div", { class: "row" },
       numberField("Thickness", layer.thickness_mm, { key: `h${i}`, unit: "mm", least: 1e-4, most: 100 }, (value) => change({ thickness_mm: value })),
       numberField("Toughness", layer.toughness_ratio, { key: `j${i}`, unit: "× calibrated", least: 0.01, most: 100 }, (value) => change({ toughness_ratio: value }))),
@@ -72,12 +73,12 @@ function partRow(design: Design, part: Part): HTMLElement {
       type: "button", class: "small", "aria-pressed": String(isChosen), "data-key": `choose${key}`, click: () => design.choose(part),
     }, `${isChosen ? "●" : "○"} ${name.replace(` of ${layer.name}`, "")}`),
     ratio === null ? null : numberField("Toughness", ratio, { key: `j${key}`, unit: "×", least: 0.01, most: 100 }, (value) =>
-      design.replace(withLayer(drawn, part.layer, (own) => ({
+      design.replace(withLayer(design.drawn, part.layer, (own) => ({
         ...own, regions: own.regions.map((one, k) => (k === part.index ? { ...one, toughness_ratio: value } : one)),
       })))),
     html("button", {
       type: "button", class: "small", "aria-label": `Remove ${name}`, title: "Remove", "data-key": `remove${key}`,
-      click: () => design.replace(withoutPart(drawn, part)),
+      click: () => design.replace(withoutPart(design.drawn, part)),
     }, "×"));
 }
 
@@ -134,13 +135,21 @@ function sizeFields(design: Design): HTMLElement {
   const [width, height] = [high[0] - low[0], high[1] - low[1]];
   const size = { unit: "mm", least: 1e-3, most: 1e4 };
   const place = { unit: "mm", least: -1e4, most: 1e4 };
-  const shape = (other: Outline): void => design.reshape(other);
   if (!(width > 0 && height > 0)) return html("div");
+  /** To a place or size; the others are those of the outline at that time. */
+  const shape = (k: 0 | 1, isSize: boolean) => (value: number): void => {
+    const now = boundsOf(design.outline);
+    const sizes: Point = [now.high[0] - now.low[0], now.high[1] - now.low[1]];
+    const by: Point = [0, 0];
+    if (isSize) sizes[k] = value;
+    else by[k] = value - now.low[k];
+    design.reshape(isSize ? resized(design.outline, ...sizes) : moved(design.outline, ...by));
+  };
   return html("div", { class: "row" },
-    numberField("Left", low[0], { ...place, key: "left" }, (value) => shape(moved(outline, value - low[0], 0))),
-    numberField("Bottom", low[1], { ...place, key: "bottom" }, (value) => shape(moved(outline, 0, value - low[1]))),
-    numberField("Width", width, { ...size, key: "width" }, (value) => shape(resized(outline, value, height))),
-    numberField("Height", height, { ...size, key: "height" }, (value) => shape(resized(outline, width, value))));
+    numberField("Left", low[0], { ...place, key: "left" }, shape(0, false)),
+    numberField("Bottom", low[1], { ...place, key: "bottom" }, shape(1, false)),
+    numberField("Width", width, { ...size, key: "width" }, shape(0, true)),
+    numberField("Height", height, { ...size, key: "height" }, shape(1, true)));
 }
 
 /** What the blades meet along the line of the cut: one row for each strip. */
@@ -168,7 +177,7 @@ export function edgePanel(design: Design, fitted: Edge): HTMLElement {
   const { edge } = drawn;
   const begin = (): void => {
     const points = pointsOf(fitted);
-    const added = withAdded(drawn, "edge", 0, points, 1);
+    const added = withAdded(design.drawn, "edge", 0, points, 1);
     design.part = added.part;
     design.replace({ ...added.drawn, edge: fitted });
   };
@@ -178,12 +187,12 @@ export function edgePanel(design: Design, fitted: Edge): HTMLElement {
       html("button", { type: "button", "data-key": "blade", click: begin }, "Draw another edge"));
   }
   const change = (values: Partial<Edge>): void => {
-    const other = { ...edge, ...values };
-    design.replace({ ...drawn, edge: other, edge_points: pointsOf(other) });
+    const other = { ...(design.drawn.edge ?? edge), ...values };
+    design.replace({ ...design.drawn, edge: other, edge_points: pointsOf(other) });
   };
   const family = html("select", {
     "data-key": "family", "aria-label": "Family of the edge",
-    change: () => design.replace(withFamily(drawn, family.value as Edge["family"])),
+    change: (event) => design.replace(withFamily(design.drawn, (event.currentTarget as HTMLSelectElement).value as Edge["family"])),
   }, ...["line", "arc"].map((one) => html("option", { value: one, selected: one === edge.family }, one)));
   const number = (label: string, name: "offset_mm" | "taper_deg" | "curvature_per_m" | "length_mm", unit: string, least: number, most: number): HTMLElement =>
     numberField(label, edge[name], { key: name, unit, least, most }, (value) => change({ [name]: value }));
@@ -196,7 +205,7 @@ export function edgePanel(design: Design, fitted: Edge): HTMLElement {
     html("p", {}, `The points leave the ${edge.family} by up to ${misfit(drawn.edge_points, edge).toFixed(2)} mm.`),
     html("div", { class: "row" },
       html("button", { type: "button", "data-key": "points", click: () => design.choose({ kind: "edge", layer: 0, index: 0 }) }, "Choose its points"),
-      html("button", { type: "button", "data-key": "blade", click: () => design.replace(withoutPart(drawn, { kind: "edge", layer: 0, index: 0 })) }, "As fitted again")));
+      html("button", { type: "button", "data-key": "blade", click: () => design.replace(withoutPart(design.drawn, { kind: "edge", layer: 0, index: 0 })) }, "As fitted again")));
 }
 
 function withFamily(drawn: Drawn, family: Edge["family"]): Drawn {

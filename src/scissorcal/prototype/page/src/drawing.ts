@@ -26,6 +26,8 @@ interface Colours {
 
 type Point = [number, number];
 
+/** Width of the picture, in lengths of the blades. */
+export const LENGTHS_ACROSS = 2.1;
 const EDGE_POINTS = 40;
 const STRIP_px = 56;
 const LENS_m = 0.0012; // across the magnified circle
@@ -43,7 +45,7 @@ export class Drawing {
     const { width, height } = this.fit();
     const colours = coloursOf(this.canvas);
     const length = view.scene.blade_length_m;
-    this.scale = width / (2.1 * length);
+    this.scale = width / (LENGTHS_ACROSS * length);
     this.origin = [0.29 * width, 0.5 * (height - STRIP_px)];
     const context = this.context;
     context.clearRect(0, 0, width, height);
@@ -55,14 +57,6 @@ export class Drawing {
     this.circle(this.origin, 4, colours.ink);
     this.lens(view, colours, width);
     this.strip(view, colours, width, height);
-  }
-
-  /** The pose that a pointer at a place of the canvas asks for. */
-  poseAt(x: number, scene: Scene, y: number, began: { x: number; y: number; pose: Pose }): Pose {
-    const [closed, open] = scene.opening_rad;
-    const opening = began.pose.opening - ((y - began.y) / this.canvas.clientHeight) * 2 * (open - closed);
-    const advance = began.pose.advance + (x - began.x) / this.scale;
-    return { opening: Math.min(Math.max(opening, 0.5 * closed), open), advance };
   }
 
   private fit(): { width: number; height: number } {
@@ -177,8 +171,10 @@ export class Drawing {
 
   /** The contact, some hundred times larger: how the edges press the sheet. */
   private lens(view: View, colours: Colours, width: number): void {
-    const radius = Math.min(58, 0.13 * width);
-    const [x, y] = [width - radius - 10, radius + 10];
+    // right of the blades' tips, and with its caption above the line of the cut
+    const [beside, above] = [width - this.at([view.scene.blade_length_m, 0])[0], this.origin[1]];
+    const radius = Math.max(Math.min(58, 0.5 * beside - 7, 0.5 * (above - 44)), 10);
+    const [x, y] = [width - radius - 10, radius + 8];
     const context = this.context;
     const kept: [number, Point] = [this.scale, this.origin];
     const contact = Math.max(view.crack - view.pose.advance, 0);
@@ -223,7 +219,9 @@ export class Drawing {
     context.fillStyle = colours.muted;
     context.font = "11px system-ui, sans-serif";
     context.textAlign = "center";
-    context.fillText(`contact, ${(1e3 * LENS_m).toFixed(1)} mm wide`, x, y + radius + 13);
+    const middle = Math.min(x, width - 36);
+    context.fillText("contact,", middle, y + radius + 13);
+    context.fillText(`${(1e3 * LENS_m).toFixed(1)} mm wide`, middle, y + radius + 25);
   }
 
   /** The sheet from above: what is cut, and where the scissors stand. */

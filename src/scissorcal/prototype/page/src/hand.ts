@@ -19,6 +19,9 @@ const HELD = 5; // times the largest torque: what a hand at the other end of the
 const PUSH_N = 3;
 const STILL_rad_per_s = 1e-4; // a hand that would move the blades no faster lets them rest
 
+const FASTEST_rad_per_s = 0.6; // of a made hand
+const STEEPEST = 0.5 * Math.PI; // of an eased motion, against a steady one
+
 /** A hand that holds the handles by a spring: it feels by how far the blades stay behind. */
 export class Coupling {
   private readonly stiffness: number;
@@ -69,8 +72,7 @@ function materialStiffness(scene: Scene, law: Law, torque: number): number {
 /** One stroke from where the blades are: close, and open again. */
 export function oneStroke(scene: Scene, from: Pose): Script {
   const [closed, open] = scene.opening_rad;
-  const speed = Math.min(0.6, scene.opening_rate_rad_per_s[1]);
-  const [down, up] = [Math.max(from.opening - closed, 0) / speed, (open - closed) / speed];
+  const [down, up] = [durationOf(from.opening - closed, scene), durationOf(open - closed, scene)];
   return (time) => {
     if (time >= down + up) return null;
     const opening = time < down
@@ -83,8 +85,7 @@ export function oneStroke(scene: Scene, from: Pose): Script {
 /** Strokes as a lab makes them: close, open, move on by what was cut, over and over. */
 export function madeHand(scene: Scene, strokes = 3): Script {
   const [closed, open] = scene.opening_rad;
-  const speed = Math.min(0.6, scene.opening_rate_rad_per_s[1]);
-  const half = (open - closed) / speed;
+  const half = durationOf(open - closed, scene);
   const [near, far] = scene.contact_m;
   const step = 0.6 * (far - near);
   return (time) => {
@@ -113,7 +114,12 @@ export function recordedHand(hand: Hand): Script {
   };
 }
 
-/** From 0 to 1, beginning and ending at rest. */
+/** Seconds of an eased turn that is fastest, in its middle, at the fastest rate of a hand or of the scene. */
+function durationOf(turn: number, scene: Scene): number {
+  return (STEEPEST * Math.max(turn, 0)) / Math.min(FASTEST_rad_per_s, scene.opening_rate_rad_per_s[1]);
+}
+
+/** From 0 to 1, beginning and ending at rest, steepest in the middle. */
 function eased(share: number): number {
   return 0.5 - 0.5 * Math.cos(Math.PI * share);
 }

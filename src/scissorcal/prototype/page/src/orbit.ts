@@ -15,6 +15,8 @@ const HIGHEST_rad = 1.5;
 
 export class Orbit {
   readonly camera = new PerspectiveCamera(32, 1, 1, 4000);
+  /** Whether drags and arrow keys move the blades, which others see to; zooming stays here. */
+  movesBlades = false;
   private place = { ...HOME };
   private readonly pointers = new Map<number, PointerEvent>();
   private readonly ends = new AbortController();
@@ -36,6 +38,11 @@ export class Orbit {
       this.turn(0, 0, Math.exp(0.0015 * event.deltaY));
     }, { signal, passive: false });
     element.addEventListener("keydown", (event) => this.keyed(event), { signal });
+  }
+
+  /** Where the right of the view points: 1 along the cut, -1 back. */
+  get way(): 1 | -1 {
+    return Math.cos(this.place.round) < 0 ? -1 : 1;
   }
 
   dispose(): void {
@@ -71,7 +78,7 @@ export class Orbit {
     const before = this.pointers.get(event.pointerId);
     if (!before) return;
     if (this.pointers.size === 1) {
-      this.turn(-TURN_rad_per_px * (event.clientX - before.clientX), TURN_rad_per_px * (event.clientY - before.clientY));
+      if (!this.movesBlades) this.turn(-TURN_rad_per_px * (event.clientX - before.clientX), TURN_rad_per_px * (event.clientY - before.clientY));
     } else {
       const apart = (a: PointerEvent, b: PointerEvent): number => Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY);
       const other = [...this.pointers.values()].find((one) => one.pointerId !== event.pointerId);
@@ -81,6 +88,7 @@ export class Orbit {
   }
 
   private keyed(event: KeyboardEvent): void {
+    if (this.movesBlades && event.key.startsWith("Arrow")) return;
     const keys: Record<string, (() => void) | undefined> = {
       ArrowLeft: () => this.turn(-KEY_rad, 0), ArrowRight: () => this.turn(KEY_rad, 0),
       ArrowUp: () => this.turn(0, KEY_rad), ArrowDown: () => this.turn(0, -KEY_rad),
@@ -94,6 +102,5 @@ export class Orbit {
     if (!done) return;
     done();
     event.preventDefault();
-    event.stopPropagation(); // arrows elsewhere on the page move the hand
   }
 }

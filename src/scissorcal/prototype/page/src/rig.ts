@@ -166,12 +166,13 @@ export class Rig {
     return this.script !== null;
   }
 
-  /** Let time pass, in ticks of the loop. */
+  /** Let time pass, in ticks of the loop. While the page slept, none did. */
   pass(seconds: number): void {
     const dt = 1 / this.scene.loop_rate_Hz;
-    this.followed.quiet_s += seconds;
+    const awake = Math.min(seconds, MOST_STEPS * dt);
+    this.followed.quiet_s += awake;
     if (this.isFollowing) return;
-    this.left += Math.min(seconds, MOST_STEPS * dt);
+    this.left += awake;
     while (this.left >= dt) {
       this.left -= dt;
       this.one(dt);

@@ -17,9 +17,9 @@ export class RigPanel {
     container.append(html("h2", {}, "Rig"), this.state, this.following, this.buttons, this.refusal,
       html("p", { class: "note" }, "Stop here is a convenience, not an emergency stop: keep the rig's own at hand."));
     this.line = connect(server, {
-      connected: (isConnected) => {
+      connected: (isConnected, sentence) => {
         if (isConnected) return;
-        this.state.textContent = "The server cannot be reached; trying again.";
+        this.state.textContent = sentence;
         refilled(this.buttons);
       },
       state: (state) => this.show(state),

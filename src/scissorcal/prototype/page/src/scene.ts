@@ -59,6 +59,21 @@ export interface PlatePose {
   rotation_vector_rad: [number, number, number];
 }
 
+/** Closed contours in mm; inside is what lies within an odd number of them. */
+export type Contours = [number, number][][];
+
+export interface DrawnPlate {
+  cut_line_mm: number;
+  layers: {
+    name: string;
+    thickness_mm: number;
+    toughness_ratio: number;
+    outline: Contours;
+    holes: Contours[];
+    regions: { toughness_ratio: number; outline: Contours }[];
+  }[];
+}
+
 export interface Scene {
   format: string;
   name: string;
@@ -90,6 +105,8 @@ export interface Scene {
   pieces: Piece[] | null;
   /** Text of the recipe that the package was built from, where it is known. */
   recipe?: string | null;
+  /** The plate whose outlines stand in files beside that recipe. */
+  drawn_plate?: DrawnPlate | null;
   /** Where the plate stands in the frame of the pivot, where a pose is known. */
   plate_pose?: PlatePose | null;
 }

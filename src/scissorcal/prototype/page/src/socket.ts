@@ -38,7 +38,8 @@ export interface RigSamples {
 }
 
 export interface Handlers {
-  connected(isConnected: boolean): void;
+  /** Of a line that is broken the sentence says why, and what to do. */
+  connected(isConnected: boolean, sentence: string): void;
   state(state: RigState): void;
   samples(samples: RigSamples): void;
   refused(sentence: string): void;
@@ -55,36 +56,61 @@ export interface Line {
 
 const SOONEST_ms = 300;
 const LATEST_ms = 5000;
+const GIVES_UP_ms = 10_000; // without an answer: a computer that wakes up has its network back by then
+const GOES_AWAY = 1001; // code with which an ending server closes its sockets
+const [FORBIDDEN, UNAVAILABLE] = [403, 503];
+const AGAIN = "The server cannot be reached; trying again.";
+const FULL = "The server shows as many pages as it can: close another one.";
+const GONE = "The server of this page has ended, and no other one takes its place: start scissorcal prototype again and open the address "
+  + "that it prints. The package on this page can be used as before.";
 const COLUMNS = ["time_s", "opening_rad", "advance_m", "torque_Nm", "force_N"] as const;
 const MOST_ROWS = 1000; // of a message; the server sends 250 at most
 
-/** Opens the line and keeps it: where it breaks it is opened again, later and later. */
+/**
+ * Opens the line and keeps it: where it breaks it is opened again, later and later, as long as that
+ * can succeed. A server has its own token, so once it has ended, each other one refuses this page.
+ */
 export function connect(server: Server, handlers: Handlers): Line {
   let socket: WebSocket | null = null;
   let wait = SOONEST_ms;
   let timer = 0;
   let isOver = false;
+  let lostAt: number | null = null;
 
   function open(): void {
     const own = new WebSocket(`ws://${location.host}${server.socket}`);
     socket = own;
     own.onopen = () => {
       wait = SOONEST_ms;
-      handlers.connected(true);
+      lostAt = null;
+      handlers.connected(true, "");
     };
     own.onmessage = (event) => hear(event.data, handlers);
-    own.onclose = () => {
+    own.onclose = (event) => {
       if (socket !== own) return;
       socket = null;
-      handlers.connected(false);
-      if (!isOver) timer = window.setTimeout(open, wait);
-      wait = Math.min(2 * wait, LATEST_ms);
+      lostAt ??= Date.now();
+      if (event.code === GOES_AWAY) handlers.connected(false, GONE);
+      else void again();
     };
+  }
+
+  /** Open the line again, if that can succeed: a socket does not say why it was refused. */
+  async function again(): Promise<void> {
+    if (isOver) return;
+    handlers.connected(false, AGAIN);
+    const status = await fetch(server.socket).then((answer) => answer.status, () => null);
+    const isGone = status === FORBIDDEN || (status === null && Date.now() - (lostAt ?? 0) > GIVES_UP_ms);
+    if (isOver) return;
+    if (isGone) return handlers.connected(false, GONE);
+    if (status === UNAVAILABLE) handlers.connected(false, FULL);
+    timer = window.setTimeout(open, wait);
+    wait = Math.min(2 * wait, LATEST_ms);
   }
 
   function say(message: { do: string; command?: string; question?: number }): void {
     if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
-    else handlers.refused("The server cannot be reached.");
+    else handlers.refused("Nothing was sent: the server cannot be reached.");
   }
 
   open();

@@ -20,6 +20,8 @@ const NAMESPACE = "http://www.w3.org/2000/svg";
 const DRAWN = new Set(["path", "rect", "circle", "ellipse", "polygon", "polyline"]);
 const KINDS = new Set(["cut", "edge", "outline", "hole", "region"]);
 /** What these hold is not itself in the picture. */
+const HIDES = /\bdisplay\s*:\s*none\b|\bvisibility\s*:\s*(hidden|collapse)\b/i;
+const COMMENT = /\/\*[\s\S]*?(\*\/|$)/g;
 const NOT_SHOWN = "defs, symbol, clipPath, mask, pattern, marker, metadata, foreignObject";
 
 /** One element's outlines in mm, y up; `marks` are its data- attributes and those of its group. */
@@ -33,7 +35,8 @@ export interface Shape {
  * The shapes of an SVG file: paths, rectangles, circles, ellipses, polygons and polylines.
  *
  * Curves become points within 0.02 mm. Nothing of the file is shown or run: scripts, styles, texts,
- * pictures and references are passed over. Places are from the upper left corner of the page, y up
+ * pictures and references are passed over, and so is what display or visibility hides; a style that
+ * hides something is refused. Places are from the upper left corner of the page, y up
  * and so below 0; units are those of the width and the viewBox, a pixel (1/96 inch) where it states
  * none. Raises Error with a sentence.
  */
@@ -45,13 +48,17 @@ export function readSvg(text: string): Shape[] {
   if (page.querySelector("parsererror") || root.namespaceURI !== NAMESPACE || root.localName !== "svg") {
     throw new Error("This is no SVG file: it does not parse as one.");
   }
+  for (const style of root.getElementsByTagNameNS("*", "style")) {
+    if (!HIDES.test((style.textContent ?? "").replace(COMMENT, " "))) continue;
+    throw new Error("This SVG file has a <style> that hides something: remove what is hidden, or hide it by the attribute display of each shape.");
+  }
   const svg = root as unknown as SVGSVGElement;
   const [unit, box] = [unitOf(svg), svg.viewBox.baseVal];
   const corner: Point = box ? [box.x, box.y] : [0, 0];
   const found: Shape[] = [];
   let points = 0;
   for (const element of root.querySelectorAll<SVGGeometryElement>("*")) {
-    if (!DRAWN.has(element.localName) || element.namespaceURI !== NAMESPACE || element.closest(NOT_SHOWN)) continue;
+    if (!DRAWN.has(element.localName) || element.namespaceURI !== NAMESPACE || element.closest(NOT_SHOWN) || isHidden(element)) continue;
     if (found.length === MOST_SHAPES) throw new Error(`This SVG file has more than ${MOST_SHAPES} shapes.`);
     const outlines = outlinesOf(element, unit, corner).filter((outline) => outline.length >= 2);
     points += outlines.reduce((sum, one) => sum + one.length, 0);
@@ -193,6 +200,24 @@ function settled(outline: Outline): Outline {
 
 function round(value: number): number {
   return Math.round(value * 1e4) / 1e4 + 0;
+}
+
+/** Whether display, of it or of what it stands in, or visibility, which is inherited, hides an element. */
+function isHidden(element: Element): boolean {
+  let visibility = "";
+  for (let at: Element | null = element; at; at = at.parentElement) {
+    if (propertyOf(at, "display") === "none") return true;
+    visibility ||= propertyOf(at, "visibility");
+  }
+  return visibility === "hidden" || visibility === "collapse";
+}
+
+/** A property of an element, in its style or else as an attribute; "" where it is inherited. */
+function propertyOf(element: Element, name: string): string {
+  const said = (element.getAttribute("style") ?? "").split(";").map((one) => one.split(":"));
+  const own = said.filter(([key]) => key.trim().toLowerCase() === name).pop();
+  const value = (own ? own[1] ?? "" : element.getAttribute(name) ?? "").split("!")[0].trim().toLowerCase();
+  return value === "inherit" ? "" : value;
 }
 
 /** All transforms from the file's root down to an element. */

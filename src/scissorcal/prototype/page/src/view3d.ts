@@ -33,7 +33,8 @@ const UPRIGHT = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), 0.5 * Ma
 const MOST_RATIO = 2; // pixels of a screen to one of the page
 // Lines on a face are in front of it.
 const PLATE = { side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2 } as const;
-const HELP = "Drag or arrow keys turn the view, + and − zoom, Home sets it back.";
+const ZOOMS = "two fingers, + and − zoom, Home sets the view back.";
+const HELP = [`Drag or arrow keys turn the view; ${ZOOMS}`, `Drag or arrow keys move the blades; ${ZOOMS}`];
 const NONE = "This browser has no WebGL, which the 3-D view needs; the plain drawing shows the same.";
 
 export class View3d {
@@ -77,15 +78,15 @@ export class View3d {
     }
     const canvas = this.renderer.domElement;
     canvas.tabIndex = 0;
-    canvas.setAttribute("role", "img");
+    canvas.setAttribute("role", "application");
     container.prepend(canvas);
-    this.note.textContent = HELP;
+    this.note.textContent = this.help;
     this.orbit = new Orbit(canvas, () => this.again());
     this.resizes = new ResizeObserver(() => this.again());
     this.resizes.observe(container);
     canvas.addEventListener("webglcontextlost", () => (this.note.textContent = "The 3-D view lost its graphics; it comes back with them."));
     canvas.addEventListener("webglcontextrestored", () => {
-      this.note.textContent = HELP;
+      this.note.textContent = this.help;
       this.again();
     });
     this.light();
@@ -98,6 +99,31 @@ export class View3d {
       this.cracks.push(line);
       this.plate.add(line);
     }
+  }
+
+  /** What a person drags and steers by keys; null without WebGL. */
+  get canvas(): HTMLElement | null {
+    return this.renderer?.domElement ?? null;
+  }
+
+  /** Where the right of the picture points: 1 along the cut, -1 back. */
+  get way(): 1 | -1 {
+    return this.orbit?.way ?? 1;
+  }
+
+  get movesBlades(): boolean {
+    return this.orbit?.movesBlades ?? false;
+  }
+
+  set movesBlades(isOn: boolean) {
+    if (!this.orbit) return;
+    this.orbit.movesBlades = isOn;
+    this.note.textContent = this.help;
+    this.again();
+  }
+
+  private get help(): string {
+    return HELP[this.movesBlades ? 1 : 0];
   }
 
   draw(view: View): void {
@@ -269,7 +295,7 @@ export class View3d {
 
   private tell(view: View): void {
     const degrees = Math.round((180 / Math.PI) * view.pose.opening);
-    const text = `3-D view of the scissors: opening ${degrees} degrees, ${Math.round(1e3 * crackOf(view))} mm cut. ${HELP}`;
+    const text = `3-D view of the scissors: opening ${degrees} degrees, ${Math.round(1e3 * crackOf(view))} mm cut. ${this.help}`;
     const canvas = this.renderer?.domElement;
     if (canvas && canvas.getAttribute("aria-label") !== text) canvas.setAttribute("aria-label", text);
   }

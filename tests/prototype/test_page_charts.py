@@ -1,0 +1,69 @@
+"""The charts of the page: axes at rest and under load, and names."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+
+from scissorcal.prototype.document import page_of
+from scissorcal.prototype.scene import Scene
+from tests.prototype.test_page_hand import (
+    Open,
+    browser,
+    file,
+    opened,
+    package,
+    scene,
+)
+
+__all__ = ["browser", "file", "opened", "package", "scene"]
+
+AXES = """() => { const { y, N } = scissorcal.time.chart.scales;
+  return [[y.min, y.max], [N.min, N.max]]; }"""
+CURVES = """scissorcal.time.chart.data.slice(1, 3)
+  .map((row) => row.filter((one) => one !== null))"""
+LEGEND = """() => [...document.querySelectorAll(".time .u-legend .u-label")]
+  .map((one) => one.textContent)"""
+
+
+def zero(axis: list[float]) -> float:
+    """Where 0 stands on an axis, as a share of its height."""
+    low, high = axis
+    return -low / (high - low)
+
+
+def test_at_rest_the_axes_of_the_last_seconds_reach_no_farther_than_the_package(
+    opened: Open, scene: Scene
+) -> None:
+    opened.settle()
+    largest = opened.run("() => scissorcal.largestTorque")
+    torque, force = opened.run(AXES)
+    assert 0.05 * largest < torque[1] < largest
+    assert 0.05 * largest < scene.handle_radius_m * force[1] < largest
+    assert zero(torque) == pytest.approx(zero(force))
+
+
+def test_under_load_both_axes_hold_their_curves_and_share_one_zero(opened: Open) -> None:
+    opened.page.get_by_role("button", name="One stroke").click()
+    opened.settle(1.5)
+    (torque, force), drawn = opened.run(f"() => [({AXES})(), {CURVES}]")
+    for axis, values in zip((torque, force), drawn, strict=True):
+        assert axis[0] <= min(values) < max(values) <= axis[1]
+    assert zero(torque) == pytest.approx(zero(force))
+    assert max(drawn[0]) > 0.9 * torque[1], "the curve fills the chart"
+
+
+def test_one_force_has_one_name_and_a_rig_is_named_where_it_can_be_followed(
+    browser: Browser, opened: Open, scene: Scene, tmp_path: Path
+) -> None:
+    names = ["time", "torque", "force along the cut"]
+    assert opened.run(LEGEND) == names
+    assert opened.page.locator('[data-number="force along the cut"]').count() == 1
+    served = tmp_path / "served.html"
+    text = page_of(scene).replace('id="server">null', 'id="server">{"socket": "/rig"}')
+    served.write_text(text, encoding="utf-8")
+    page = browser.new_context(offline=True).new_page()
+    page.goto(served.as_uri())
+    page.locator("[data-number=torque]").wait_for()
+    assert page.evaluate(LEGEND) == [*names, "torque of the rig"]
+    page.context.close()
