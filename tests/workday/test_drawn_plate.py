@@ -76,7 +76,7 @@ def test_the_page_is_told_the_outlines_of_the_drawing(workspace: Workspace) -> N
     assert plate.cut_line_mm == workspace.recipe().plate.cut_line_mm
     (layer,) = plate.layers
     (outline,) = layer.outline
-    assert max(x for x, _ in outline) == pytest.approx(90.0, abs=1e-3)
+    assert max(x for x, _ in outline) == pytest.approx(180.0, abs=1e-3)
     assert (len(layer.holes), [one.toughness_ratio for one in layer.regions]) == (1, [3.0])
     path = workspace.package_path(workspace.recipe())
     assert workspace_scene(workspace, path).drawn_plate is None
