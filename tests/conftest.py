@@ -1,8 +1,16 @@
-"""One thread for linear algebra, as the command line has it: test processes share the machine."""
+"""One thread for linear algebra, as the command line has it, and no time limits of examples.
+
+Test processes share the machine: how long an example takes says nothing of the code.
+"""
 
 import os
+
+import hypothesis
 
 from scissorcal.cli.root import THREAD_VARIABLES
 
 for variable in THREAD_VARIABLES:
     os.environ.setdefault(variable, "1")
+
+hypothesis.settings.register_profile("scissorcal", deadline=None)
+hypothesis.settings.load_profile("scissorcal")

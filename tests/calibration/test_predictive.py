@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult, fit_friction, load_fit, save
-from scissorcal.calibration.predictive import REPLICATES
+from scissorcal.calibration.predictive import REPLICATES, _rounded
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
 from tests.calibration.truth import RATE_HZ, Truth, friction_recording, make_recording, sweep
@@ -55,6 +55,13 @@ def data(stored: Path) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         return arviz.from_netcdf(stored)
+
+
+def test_values_beyond_32_bits_stay_finite() -> None:
+    rounded = _rounded(np.array([1e300, -1e39, 1.2345, 0.0, np.nan]))
+    assert np.all(np.isfinite(rounded[:4]))
+    assert rounded[2] == pytest.approx(1.2345, rel=5e-4)
+    assert np.isnan(rounded[4])
 
 
 def test_arviz_finds_its_groups_with_the_same_variable_and_dimensions(

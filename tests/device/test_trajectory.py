@@ -18,6 +18,7 @@ from scissorcal.device.trajectory import (
     usable_opening,
 )
 from scissorcal.errors import DeviceError, InputError
+from scissorcal.recipe.edge import Edge
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.pace import TURN_ACCELERATION
 from tests.device.conftest import IDENTITY
@@ -194,17 +195,64 @@ def test_approach_starts_where_the_rig_stands_and_moves_one_axis_at_a_time() -> 
 
 
 def test_the_crossing_is_the_root_of_the_edge() -> None:
-    blade = dataclasses.replace(
-        Blade.of(builtin_recipe("paper-80gsm")), curvature=-1.5, moving_blades=1
-    )
+    edge = {"family": "arc", "offset_mm": -8.0, "taper_deg": 2.0, "length_mm": 75.0}
+    given = Edge.model_validate({**edge, "curvature_per_m": -1.5})
+    paper = builtin_recipe("paper-80gsm")
+    upper = paper.model_copy(update={"rig": paper.rig.model_copy(update={"edge": given})})
+    blade = dataclasses.replace(Blade.of(upper), moving_blades=1)
     for opening in np.radians([15.0, 25.0, 35.0]):
         x = float(blade.crossing(opening))
         station = np.linspace(0, blade.length, 200_001)
-        edge = blade.offset + blade.slope * station + blade.curvature * station**2 / 2
-        along = station * np.cos(opening) - edge * np.sin(opening)
-        height = station * np.sin(opening) + edge * np.cos(opening)
+        offset = -8e-3 + np.tan(np.radians(2.0)) * station - 1.5 * station**2 / 2
+        along = station * np.cos(opening) - offset * np.sin(opening)
+        height = station * np.sin(opening) + offset * np.cos(opening)
         assert np.interp(x, along, height) == pytest.approx(blade.upper_face, abs=1e-9)
         assert blade.opening_at(x, (0.1, 0.9)) == pytest.approx(opening, abs=1e-6)
+
+
+def points_edge(lift_mm: float = 0.0) -> dict[str, object]:
+    stations = np.linspace(0.0, 75.0, 40)
+    offsets = -8.0 + lift_mm + 0.035 * stations + 0.4 * np.sin(2 * np.pi * stations / 40.0)
+    pairs = tuple(zip(stations.tolist(), offsets.tolist(), strict=True))
+    nothing = dict.fromkeys(("offset_mm", "taper_deg", "length_mm"))
+    return {"family": "points", "points_mm": pairs, **nothing}
+
+
+@pytest.mark.parametrize("name", ["paper-80gsm", "press-only"])
+def test_points_on_a_line_are_planned_as_the_line(name: str) -> None:
+    line = builtin_recipe(name).rig.edge
+    stations = np.linspace(0.0, 1e3 * line.length_m, 9)
+    offsets = line.offset_mm + stations * np.tan(np.radians(line.taper_deg))
+    pairs = tuple(zip(stations.tolist(), offsets.tolist(), strict=True))
+    edge = points_edge() | {"points_mm": pairs}
+    for planned, expected in zip(
+        cut_plan(changed(name, rig__edge=edge), IDENTITY).segments,
+        cut_plan(builtin_recipe(name), IDENTITY).segments,
+        strict=True,
+    ):
+        for key in ("opening", "advance"):
+            own, other = getattr(planned.reference, key), getattr(expected.reference, key)
+            assert own == pytest.approx(other, abs=1e-9)
+
+
+def test_cuts_along_a_wave_meet_the_plate_where_the_wave_is() -> None:
+    recipe = changed("paper-80gsm", rig__edge=points_edge())
+    blade, low = Blade.of(recipe), recipe.scene.contact_m[0]
+    stations = np.linspace(0.0, 0.075, 20_001)
+    offset = -8e-3 + 0.035 * stations + 0.4e-3 * np.sin(2 * np.pi * stations / 0.04)
+    for _, opening, _, _ in each_stroke(cut_plan(recipe, IDENTITY)):
+        beta = opening[len(opening) // 2] / 2
+        height = stations * np.sin(beta) + offset * np.cos(beta) - recipe.upper_face_m
+        (at,) = np.flatnonzero(np.diff(np.sign(height)) > 0)
+        along = stations[at] * np.cos(beta) - offset[at] * np.sin(beta)
+        assert float(blade.crossing(2 * beta)) == pytest.approx(along, abs=2e-4)
+        assert low - 1e-4 <= along <= recipe.scene.contact_m[1] + 1e-4
+
+
+def test_points_that_never_meet_the_plate_are_refused() -> None:
+    edge = points_edge(lift_mm=20.0)
+    with pytest.raises(InputError, match=r"With rig\.edge \(40 points\).*without waves"):
+        cut_plan(changed("paper-80gsm", rig__edge=edge), IDENTITY)
 
 
 def test_a_rig_without_advance_motor_cuts_by_hand_only() -> None:

@@ -181,3 +181,19 @@ def test_the_focus_leaves_a_button_that_can_do_no_more(bed: Bed) -> None:
     bed.page.locator("[data-key=undo]").press("Enter")
     assert bed.page.locator("[data-key=undo]").is_disabled()
     assert focus(bed) == "circle"
+
+
+def test_the_caption_of_the_cut_lies_over_no_line_of_a_layer(bed: Bed, tmp_path: Path) -> None:
+    layer = """[[plate.layers]]
+name = "l{}"
+thickness_mm = 0.1
+outline_mm = [[0, -20], [60, -20], [60, 20], [0, 20]]
+"""
+    load(bed, tmp_path, "".join(layer.format(i) for i in range(5)))
+    bottom = bed.run(
+        "() => { const at = document.querySelector('.design-cut text').getBBox();"
+        " return at.y + at.height; }"
+    )
+    lines = bed.run("() => [...document.querySelectorAll('.design-met')].map((e) => e.getBBox().y)")
+    assert len(lines) == 5
+    assert bottom < min(lines) - 1.9  # half of a line's width

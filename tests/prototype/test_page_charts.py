@@ -67,3 +67,60 @@ def test_one_force_has_one_name_and_a_rig_is_named_where_it_can_be_followed(
     page.locator("[data-number=torque]").wait_for()
     assert page.evaluate(LEGEND) == [*names, "torque of the rig"]
     page.context.close()
+
+
+COUNTS = """async (milliseconds) => {
+  const a = scissorcal, before = { ...a.frames };
+  await new Promise((done) => setTimeout(done, milliseconds));
+  const since = Object.keys(before).map((name) => [name, a.frames[name] - before[name]]);
+  return Object.fromEntries(since);
+}"""
+
+
+def test_at_rest_four_pictures_a_second_at_most_and_a_key_is_answered_at_once(opened: Open) -> None:
+    opened.settle()
+    counted = opened.page.evaluate(COUNTS, 1500)
+    assert 1 <= counted["count"] <= 7
+    waited = opened.run(
+        """async () => {
+          const { rig } = scissorcal, frame = () => new Promise(requestAnimationFrame);
+          await new Promise((done) => setTimeout(done, 400));
+          document.querySelector("canvas.plain").dispatchEvent(
+            new KeyboardEvent("keydown", { key: "ArrowDown", bubbles: true, cancelable: true }));
+          let frames = 0;
+          while (rig.rate === 0 && frames < 60) { await frame(); frames += 1; }
+          return frames;
+        }"""
+    )
+    assert waited <= 5
+
+
+def test_charts_are_drawn_ten_times_a_second_at_most_and_pictures_once_a_frame(
+    opened: Open,
+) -> None:
+    opened.page.get_by_role("button", name="Strokes", exact=True).click()
+    for _ in range(3):  # what stirs resting blades starts no second row of pictures
+        opened.page.keyboard.press("Shift")
+    own = f"""async () => {{
+      let asked = 0, going = true;
+      const count = () => {{ asked += 1; if (going) requestAnimationFrame(count); }};
+      requestAnimationFrame(count);
+      const counted = await ({COUNTS})(1500);
+      going = false;
+      return {{ ...counted, asked }};
+    }}"""
+    counted = opened.run(own)
+    assert counted["charts"] <= 10 * counted["seconds"] + 1
+    assert counted["count"] <= counted["asked"] + 2
+
+
+def test_the_torque_over_the_opening_is_drawn_where_something_changed(opened: Open) -> None:
+    opened.settle()
+    opened.run("""() => {
+      window.drawn = 0;
+      const { chart } = scissorcal.torque, own = chart.setData;
+      chart.setData = function (...data) { drawn += 1; return own.apply(this, data); }; }""")
+    opened.page.wait_for_timeout(800)
+    assert opened.run("() => drawn") == 0
+    opened.page.get_by_role("button", name="One stroke").click()
+    opened.page.wait_for_function("() => drawn > 2")

@@ -124,8 +124,8 @@ def test_builtin_recipes_load(name: str) -> None:
         (
             'family = "line"',
             'family = "lien"',
-            'rig.edge.family: "lien" is not allowed here; allowed: "line", "arc". Did you mean '
-            '"line"?',
+            'rig.edge.family: "lien" is not allowed here; allowed: "line", "arc", "points". Did '
+            'you mean "line"?',
         ),
         (
             "contact_mm = [15.0, 60.0]",

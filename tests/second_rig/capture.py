@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.advance_trajectory import advance_plan
-from scissorcal.device.capture import identity_facts
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.hand import hand_travel
+from scissorcal.device.rig_record import identity_facts
 from scissorcal.device.trajectory import Plan, friction_plan
 from scissorcal.kernel import Capability, Identity, StateFlag
 from scissorcal.recipe.schema import Recipe

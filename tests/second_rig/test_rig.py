@@ -28,7 +28,7 @@ from tests.second_rig.simulate import BRAKE, HAND, OFF, SERVO
 HERE = Path(__file__).parent
 ALLOWED = {
     "scissorcal.device.advance_trajectory",
-    "scissorcal.device.capture",
+    "scissorcal.device.rig_record",
     "scissorcal.device.cut_trajectory",
     "scissorcal.device.hand",
     "scissorcal.device.trajectory",

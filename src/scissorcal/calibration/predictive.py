@@ -17,6 +17,7 @@ RESAMPLED = 3 * DRAWS // 4
 """Equally weighted draws, few enough that hardly one is repeated: repeated ones raise k-hats."""
 
 REPLICATES = 50
+LARGEST = 3e38
 MANTISSA_BITS = 10
 """Bits of a replicated value's mantissa, which compresses it to a third: within 0.05 %."""
 
@@ -75,7 +76,7 @@ def _resampled(left_out: LeftOut) -> Array:
 
 
 def _rounded(values: Array) -> NDArray[np.float32]:
-    """The nearest numbers with a short mantissa."""
-    bits = values.astype(np.float32).view(np.uint32)
+    """The nearest numbers with a short mantissa; those of a law that is far off are bounded."""
+    bits = np.clip(values, -LARGEST, LARGEST).astype(np.float32).view(np.uint32)
     step = np.uint32(1 << (23 - MANTISSA_BITS))
     return ((bits + step // np.uint32(2)) & ~(step - np.uint32(1))).view(np.float32)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.recipe.edge import StatedCurve, stated_curve
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
@@ -17,33 +18,26 @@ GRID = 2001
 
 @dataclass(frozen=True)
 class Blade:
-    """The recipe's edge e(s) = offset + s tan(taper) + curvature s^2 / 2 over its plate, SI."""
+    """The recipe's edge over its plate, SI; the curve is the model's."""
 
     moving_blades: int
-    offset: float
-    slope: float
-    curvature: float
-    length: float
+    curve: StatedCurve
     upper_face: float
 
     @classmethod
     def of(cls, recipe: Recipe) -> "Blade":
-        edge = recipe.rig.edge
-        return cls(
-            moving_blades=recipe.rig.moving_blades,
-            offset=edge.offset_mm * 1e-3,
-            slope=float(np.tan(np.radians(edge.taper_deg))),
-            curvature=edge.curvature_per_m,
-            length=edge.length_mm * 1e-3,
-            upper_face=recipe.upper_face_m,
-        )
+        return cls(recipe.rig.moving_blades, stated_curve(recipe.rig.edge), recipe.upper_face_m)
+
+    @property
+    def length(self) -> float:
+        return self.curve.edge.length_m
 
     def crossing(self, opening: ArrayLike, above: float = 0.0) -> Array:
         """Distance from the pivot (m) at which the edge is ``above`` m over the upper face.
 
-        The root of s sin(beta) + e(s) cos(beta) = y_top + above, a quadratic in s, put into
-        x = s cos(beta) - e(s) sin(beta). NaN where the edge never reaches it, or only beyond
-        the blade's tip.
+        The root of s sin(beta) + e(s) cos(beta) = y_top + above, put into x = s cos(beta) - e(s)
+        sin(beta). NaN where the edge never reaches it, or only beyond the blade's tip, and where a
+        curve through points rises through it more than once.
 
         >>> from scissorcal.recipe.library import builtin_recipe
         >>> blade = Blade.of(builtin_recipe("paper-80gsm"))
@@ -51,15 +45,11 @@ class Blade:
         array([17.7, 57.8])
         """
         beta = np.asarray(opening, dtype=np.float64) / self.moving_blades
-        sine, cosine = np.sin(beta), np.cos(beta)
-        rise = self.upper_face + above - self.offset * cosine
-        grade = sine + self.slope * cosine
-        with np.errstate(invalid="ignore", divide="ignore"):
-            root = grade + np.sqrt(grade**2 + 2.0 * self.curvature * cosine * rise)
-            station = np.where(root > 0, 2.0 * rise / root, np.nan)
-        edge = self.offset + station * (self.slope + 0.5 * self.curvature * station)
+        edge = self.curve.edge
+        station = edge.station_at_height(self.upper_face + above, beta)
         reached = (station >= 0) & (station <= TIP_SHARE * self.length)
-        return np.where(reached, station * cosine - edge * sine, np.nan)
+        along = station * np.cos(beta) - edge.offset_at(station) * np.sin(beta)
+        return np.where(reached, along, np.nan)
 
     def opening_at(
         self, contact: float, openings: tuple[float, float], above: float = 0.0

@@ -212,9 +212,14 @@ def _sledge_travel(identity: Identity) -> tuple[float, float]:
 
 def _never_crosses(recipe: Recipe) -> str:
     scene, edge = recipe.scene, recipe.rig.edge
+    stated, signs = (
+        (f"offset {edge.offset_mm:g} mm, taper {edge.taper_deg:g} deg", "offset_mm < 0")
+        if edge.points_mm is None
+        else (f"{len(edge.points_mm)} points", "offsets of points_mm < 0, without waves")
+    )
     return (
-        f"With rig.edge (offset {edge.offset_mm:g} mm, taper {edge.taper_deg:g} deg) the blades "
-        f"reach the plate nowhere within scene.opening_deg = {list(scene.opening_deg)} and "
+        f"With rig.edge ({stated}) the blades reach the plate nowhere within "
+        f"scene.opening_deg = {list(scene.opening_deg)} and "
         f"scene.contact_mm = {list(scene.contact_mm)} that this device can go to: check the "
-        "edge's signs (the edges of scissors lie beyond the pivot, offset_mm < 0) and the ranges."
+        f"edge's signs (the edges of scissors lie beyond the pivot, {signs}) and the ranges."
     )

@@ -54,39 +54,32 @@ def _evaluate(weights: ArrayLike, start: float, end: float, at: ArrayLike, slope
     if pieces < 1 or not end > start:
         raise ValueError("a cubic spline needs at least four weights, and its end after its start")
     width = (end - start) / pieces
-    place = np.clip((s - start) / width, 0.0, float(pieces))
+    along = (s - start) / width
+    place = np.clip(along, 0.0, float(pieces))
     known = np.where(np.isnan(place), 0.0, place)  # NaN stays NaN by t
     piece = np.minimum(known.astype(np.int64), pieces - 1)
     t = place - piece
-    rates = _basis_slope(t)
-    used = _four(w, piece)
-    tilt = sum(weight * rate for weight, rate in zip(used, rates, strict=True)) / width
+    zeroth, first, second, third = (_of_piece(row, piece) for row in _rows(w))
+    beyond = along - place
+    outside = bool(np.any(beyond))
+    if slope or outside:
+        tilt = first + t * (2.0 * second + 3.0 * third * t)
     if slope:
-        return np.asarray(tilt)
-    value = sum(weight * share for weight, share in zip(used, _basis(t), strict=True))
-    return np.asarray(value + tilt * (s - start - width * place))
+        return np.asarray(tilt / width)
+    value = zeroth + t * (first + t * (second + t * third))
+    return np.asarray(value + tilt * beyond if outside else value)
 
 
-def _four(weights: Array, piece: NDArray[np.int64]) -> list[Array]:
-    """The four weights that act on each piece, each of the broadcast shape."""
-    if weights.ndim == 1:
-        return [weights[piece + k] for k in range(FEWEST)]
-    shape = np.broadcast_shapes(weights.shape[:-1], piece.shape)
+def _rows(weights: Array) -> tuple[Array, ...]:
+    """Coefficients of 1, t, t^2 and t^3, each (..., pieces)."""
+    return tuple(np.moveaxis(spline_powers(weights), -1, 0))
+
+
+def _of_piece(row: Array, piece: NDArray[np.int64]) -> Array:
+    """The coefficient that acts at each place, of the broadcast shape."""
+    if row.ndim == 1:
+        return np.asarray(row[piece])
+    shape = np.broadcast_shapes(row.shape[:-1], piece.shape)
+    spread = np.broadcast_to(row, (*shape, row.shape[-1]))
     index = np.broadcast_to(piece, shape)[..., None]
-    spread = np.broadcast_to(weights, (*shape, weights.shape[-1]))
-    return [np.take_along_axis(spread, index + k, axis=-1)[..., 0] for k in range(FEWEST)]
-
-
-def _basis(t: Array) -> tuple[Array, ...]:
-    u = 1.0 - t
-    return (
-        u**3 / 6.0,
-        (3.0 * t**3 - 6.0 * t**2 + 4.0) / 6.0,
-        (3.0 * u**3 - 6.0 * u**2 + 4.0) / 6.0,
-        t**3 / 6.0,
-    )
-
-
-def _basis_slope(t: Array) -> tuple[Array, ...]:
-    u = 1.0 - t
-    return -(u**2) / 2.0, (1.5 * t - 2.0) * t, (2.0 - 1.5 * u) * u, t**2 / 2.0
+    return np.asarray(np.take_along_axis(spread, index, axis=-1)[..., 0])

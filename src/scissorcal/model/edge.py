@@ -15,6 +15,7 @@ Family = Literal["line", "arc", "cubic", "spline"]
 
 NEWTON_STEPS = 30
 HALVINGS = 64
+CROSSING_CELLS = 512
 CLOSE = 1e-9
 """Share of the place within which Newton's last step must stay."""
 
@@ -91,6 +92,31 @@ class Edge:
         if self.family == "spline":
             slope = slope + spline_slope(self.spline_m, self.spline_start_m, self.length_m, s)
         return np.asarray(slope)
+
+    def station_at_height(self, height: ArrayLike, blade_angle: ArrayLike) -> Array:
+        """Station (m) at which the turned edge comes up through a height over the cut (m).
+
+        The root of s sin(beta) + e(s) cos(beta) = height at which the left side rises with s.
+        ``height`` and ``blade_angle`` beta (rad) broadcast; the edge is one, not draws of it. A
+        line and an arc are solved exactly and anywhere along their continuation. Other families
+        are searched on the blade; NaN where they rise through the height nowhere, or more than
+        once.
+
+        >>> edge = Edge("line", offset_m=-0.008, taper_rad=0.0, length_m=0.07)
+        >>> round(float(edge.station_at_height(0.0, np.radians(15.0))), 6)
+        0.029856
+        """
+        level, beta = np.broadcast_arrays(
+            np.asarray(height, dtype=np.float64), np.asarray(blade_angle, dtype=np.float64)
+        )
+        if self.family not in ("line", "arc"):
+            return _rising_station(self, level.ravel(), beta.ravel()).reshape(beta.shape)
+        cosine = np.cos(beta)
+        rise = level - self.offset_m * cosine
+        grade = np.sin(beta) + np.tan(self.taper_rad) * cosine
+        with np.errstate(invalid="ignore", divide="ignore"):
+            root = grade + np.sqrt(grade**2 + 2.0 * self.curvature_per_m * cosine * rise)
+            return np.asarray(np.where(root > 0.0, 2.0 * rise / root, np.nan))
 
 
 @dataclass(frozen=True)
@@ -264,6 +290,31 @@ def _station_by_halving(edge: Edge, x: Array, sine: Array, cosine: Array) -> Arr
         beyond = away(middle) > 0.0
         below, above = np.where(beyond, below, middle), np.where(beyond, middle, above)
     return np.where(within, 0.5 * (below + above), np.nan)
+
+
+def _rising_station(edge: Edge, level: Array, beta: Array) -> Array:
+    """Where the edge alone rises through each level (n,): cells of a grid, then Newton in a cell.
+
+    A Newton step that leaves what is known to hold the root is replaced by half of that.
+    """
+    sine, cosine = np.sin(beta), np.cos(beta)
+    stations = np.linspace(0.0, edge.length_m, CROSSING_CELLS + 1)
+    heights = np.multiply.outer(sine, stations)
+    heights += np.multiply.outer(cosine, edge.offset_at(stations)) - level[:, None]
+    rising = (heights[:, :-1] < 0.0) & (heights[:, 1:] >= 0.0)
+    cell = np.argmax(rising, axis=1)
+    low, high = stations[cell], stations[cell + 1]
+    station = 0.5 * (low + high)
+    for _ in range(HALVINGS):
+        away = station * sine + edge.offset_at(station) * cosine - level
+        low, high = np.where(away < 0.0, station, low), np.where(away < 0.0, high, station)
+        with np.errstate(all="ignore"):
+            stepped = station - away / (sine + edge.slope_at(station) * cosine)
+        within = (stepped >= low) & (stepped <= high)
+        before, station = station, np.where(within, stepped, 0.5 * (low + high))
+        if np.all(np.abs(station - before) <= 1e-15 * edge.length_m):
+            break
+    return np.where(np.count_nonzero(rising, axis=1) == 1, station, np.nan)
 
 
 def _plain(value: Array) -> float | Array:

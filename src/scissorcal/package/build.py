@@ -38,7 +38,8 @@ from scissorcal.package.manifest import (
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.review import Review
 from scissorcal.package.table_record import Bound
-from scissorcal.recipe.schema import Edge, Recipe
+from scissorcal.recipe.edge import Edge, stated_curve
+from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict, failed
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ if TYPE_CHECKING:
     from scissorcal.package.simplest.model import Simplified
 
 MOST_DRAWS = 200
+SAME_M = 1e-9
+"""Curves that are closer than this are one: solved on other computers they differ by rounding."""
 UNHASHED = "0" * 64
 NO_IDENTITY = "0" * 64
 """Identity of a package that is built outside a workspace: no workspace takes it as current."""
@@ -197,8 +200,7 @@ def _wanted(
         **_stated_edge(structure["edge"], recipe.rig.edge),
     }
     for key, (fitted, wanted) in stated.items():
-        same = math.isclose(fitted, wanted) if isinstance(wanted, float) else fitted == wanted
-        if not same:
+        if not _same(fitted, wanted):
             raise InputError(
                 f"The fit of the cut was made with another {key} than the recipe now has: run "
                 "'scissorcal fit' again."
@@ -210,13 +212,26 @@ def _stated_edge(fitted: Mapping[str, Any], edge: Edge) -> dict[str, tuple[Any, 
     """The edge of a fit and the recipe's, which does not describe a photographed one."""
     if edge.source == "photographs":
         return {}
+    wanted = stated_curve(edge).edge
+    curve = (*fitted.get("spline_m", ()), fitted.get("spline_start_m", 0.0), fitted["length_m"])
+    points = (*wanted.spline_m, wanted.spline_start_m, wanted.length_m)
     return {
-        "rig.edge.family": (fitted["family"], edge.family),
-        "rig.edge.offset_mm": (fitted["offset_m"], edge.offset_mm * 1e-3),
-        "rig.edge.taper_deg": (fitted["taper_rad"], math.radians(edge.taper_deg)),
-        "rig.edge.length_mm": (fitted["length_m"], edge.length_mm * 1e-3),
-        "rig.edge.curvature_per_m": (fitted["curvature_per_m"], edge.curvature_per_m),
+        "rig.edge.family": (fitted["family"], wanted.family),
+        **({"rig.edge.points_mm": (curve, points)} if wanted.family == "spline" else {}),
+        "rig.edge.offset_mm": (fitted["offset_m"], wanted.offset_m),
+        "rig.edge.taper_deg": (fitted["taper_rad"], wanted.taper_rad),
+        "rig.edge.length_mm": (fitted["length_m"], wanted.length_m),
+        "rig.edge.curvature_per_m": (fitted["curvature_per_m"], wanted.curvature_per_m),
     }
+
+
+def _same(fitted: Any, wanted: Any) -> bool:
+    """Numbers but for their last digits, shapes of a curve within a nanometre."""
+    if isinstance(wanted, tuple):
+        return len(fitted) == len(wanted) and bool(
+            np.allclose(fitted, wanted, rtol=0.0, atol=SAME_M)
+        )
+    return math.isclose(fitted, wanted) if isinstance(wanted, float) else bool(fitted == wanted)
 
 
 def _plate_record(plate: PlateFit) -> PlateRecord:

@@ -141,7 +141,7 @@ def _strokes_s(recipe: Recipe) -> float:
     low, high = recipe.scene.opening_rad
     cut = recipe.capture.cut
     opening_speed = min(OPENING_SPEED, recipe.scene.opening_rate_rad_per_s[1])
-    moved = 1e-3 * (recipe.material.sheet_length_mm + recipe.rig.edge.length_mm)
+    moved = 1e-3 * recipe.material.sheet_length_mm + recipe.rig.edge.length_m
     pauses = 2.0 * DWELL_S + SETTLE_S
     strokes, turn = cut.sheets * cut.strokes_per_sheet, TURN_ACCELERATION
     times = [glide_time(high - low, speed, turn) for speed in cut.speeds_rad_per_s]

@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, model_validator
 
+from scissorcal.recipe.edge import Edge as Edge
 from scissorcal.recipe.fields import (
     Count,
     Finite,
@@ -33,36 +34,11 @@ from scissorcal.recipe.friction import FrictionRung as FrictionRung
 from scissorcal.recipe.friction import FrictionTerm as FrictionTerm
 from scissorcal.recipe.photograph_priors import BladePriors, CameraPriors, PlatePriors
 from scissorcal.recipe.plate_layers import Layers, Place_mm, refuse_impossible_layers
-from scissorcal.recipe.plate_surface import PlateSurface
+from scissorcal.recipe.plate_surface import PlateSurface, Touch
 from scissorcal.recipe.plate_tracking import PlateTracking
 from scissorcal.recipe.priors import CutPriors, LogNormalPrior, Section
-from scissorcal.recipe.touch import Touch
 
 Rendered = Literal["torque", "handle_force", "translation_force"]
-
-
-class Edge(Section):
-    """The cutting edge e(s) of one blade in its own frame, until photographs give it.
-
-    ``line``: e = offset + s tan(taper). ``arc``: the same plus curvature s^2 / 2. ``offset_sd_mm``
-    and ``taper_sd_deg`` say how well both are known; 0 holds them as they are. With ``source =
-    "photographs"`` the fit of the blade takes their place, and these only plan the captures.
-    """
-
-    source: Literal["recipe", "photographs"] = "recipe"
-    family: Literal["line", "arc"] = "line"
-    offset_mm: Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
-    taper_deg: Annotated[float, Field(gt=-90, lt=90, allow_inf_nan=False)]
-    curvature_per_m: Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)] = 0.0
-    length_mm: Length_mm
-    offset_sd_mm: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)] = 0.0
-    taper_sd_deg: Annotated[float, Field(ge=0, le=45, allow_inf_nan=False)] = 0.0
-
-    @model_validator(mode="after")
-    def _curvature_needs_arc(self) -> Edge:
-        if self.family == "line" and self.curvature_per_m != 0.0:
-            raise ValueError('curvature_per_m needs family = "arc"')
-        return self
 
 
 class Control(Section):

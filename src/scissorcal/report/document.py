@@ -128,6 +128,10 @@ def compose(
         from scissorcal.report.subjects.simplest import simplest_panel
 
         scene = [*scene, simplest_panel(evidence.choice, list(named.values()))]
+    if recipe.rig.edge.points_mm is not None and not sliding:
+        from scissorcal.report.subjects.stated_edge import stated_edge_panel
+
+        scene = [*scene, stated_edge_panel(recipe)]
     if evidence.pieces:
         from scissorcal.report.subjects.drawn_plate import drawn_plate_panel
 

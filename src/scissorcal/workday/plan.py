@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from scissorcal.recipe.capture_cost import CaptureCost, CaptureKind, capture_cost
+from scissorcal.recipe.edge import edge_sentence
 from scissorcal.recipe.plate_layers import plate_pieces, plate_sentence
 from scissorcal.recipe.requirements import Requirement, requirements
 from scissorcal.workday.engine import Engine
@@ -34,13 +35,14 @@ class Plan:
     costs: tuple[CaptureCost, ...] = ()
     choice: "SceneChoice | None" = None
     design: "CaptureDesign | None" = None
+    edge: str = ""
     plate: str = ""
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a drawn plate is, then sentences on single steps, each once, in their order."""
-        plate = (self.plate,) if self.plate else ()
-        return (*plate, *dict.fromkeys(note for step in self.steps for note in step.notes))
+        """What drawn edges and plates are, then sentences on single steps, each once, in order."""
+        drawn = filter(None, (self.edge, self.plate))
+        return (*drawn, *dict.fromkeys(note for step in self.steps for note in step.notes))
 
     @property
     def next_command(self) -> str | None:
@@ -72,6 +74,7 @@ def make_plan(workspace: Workspace) -> Plan:
         _costs(engine),
         _choice(engine),
         _design(engine),
+        edge_sentence(engine.recipe),
         plate_sentence(engine.recipe, plate_pieces(engine.recipe, workspace.root)),
     )
 

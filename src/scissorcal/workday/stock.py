@@ -133,7 +133,7 @@ def nominal_identity(recipe: Recipe) -> Identity:
         force_limit=recipe.limits.force_N,
         opening_min=max(low - margin, 0.0),
         opening_max=high + margin,
-        advance_min=-2.0 * recipe.rig.edge.length_mm * 1e-3,
+        advance_min=-2.0 * recipe.rig.edge.length_m,
         advance_max=recipe.material.sheet_length_mm * 1e-3,
         opening_resolution=2.0 * np.pi / 2**17,
         advance_resolution=1e-6,

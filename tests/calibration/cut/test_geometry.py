@@ -7,6 +7,7 @@ import pytest
 
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.model import Edge, EdgeBelief, Response
+from scissorcal.model.edge_points import edge_through
 from tests.calibration.truth import Truth
 
 TRUTH = Truth()
@@ -123,6 +124,34 @@ def test_running_cracks_are_expanded_as_differences_say(edge):
     assert view.place + view.place_de @ away == pytest.approx(place, abs=2e-6)
     _, lever = shape.depth_and_lever(other, OPENING, place)
     assert view.lever + view.lever_de @ away == pytest.approx(lever, abs=2e-6)
+
+
+@pytest.mark.parametrize("depth", [5e-5, 3e-4, 6e-4])
+def test_rests_are_expanded_about_where_they_are(depth):
+    """On a wave a line from the reference's place misses by 0.1 mm what the slope there hits."""
+    wave = -0.008 + 0.0004 * np.sin(2 * np.pi * np.linspace(0.0, 0.075, 40) / 0.04)
+    edge, _ = edge_through(np.stack([np.linspace(0.0, 0.075, 40), wave], axis=1))
+    shape = geometry(edge, names=())
+    opening = np.linspace(0.25, 0.8, 7)
+    true = shape.place(opening, depth)
+    view = shape.resting(opening, true)
+    assert view.slope == pytest.approx(shape.slope(opening, true), abs=1e-12)
+    there = view.place - (depth - shape.reference_m) / view.slope
+    assert there == pytest.approx(true, abs=1e-12)
+    far = shape.running(opening)
+    missed = far.place - (depth - shape.reference_m) / far.slope - true
+    assert np.abs(missed).max() > (1e-4 if depth > 5e-4 else 1e-6)
+
+
+def test_rests_of_a_line_are_where_running_says():
+    shape = geometry(LINE)
+    at = shape.place(OPENING, 4e-4)
+    view, plain = shape.resting(OPENING, at), shape.running(OPENING)
+    assert view.place == pytest.approx(plain.place, abs=1e-15)
+    assert view.slope == pytest.approx(plain.slope, abs=1e-15)
+    unknown = shape.resting(OPENING, np.full(7, np.nan))
+    assert np.array_equal(unknown.place, plain.place)
+    assert np.array_equal(shape.resting(OPENING, np.full(7, 1.0)).slope, plain.slope)
 
 
 def test_an_exact_edge_has_no_derivatives():

@@ -1,6 +1,6 @@
 """The edge over the sheet, linearised about an estimate of the crack's place."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -121,18 +121,15 @@ class Geometry:
             lever_de=self._by_edge([a[1] - b[1] for a, b in pairs]),
         )
 
-    def running(self, opening: Array) -> Running:
-        """Expand about the reference's indentation at openings (k,)."""
-        place, lever, slope = self._at_depth(self.edge, opening, self.reference_m)
+    def running(self, opening: Array, depth: float | Array | None = None) -> Running:
+        """Expand about an indentation at openings (k,): the reference's where none is given."""
+        about = self.reference_m if depth is None else depth
+        place, lever, slope = self._at_depth(self.edge, opening, about)
         step = 0.01 * self.reference_m
-        high = self._at_depth(self.edge, opening, self.reference_m + step)
-        low = self._at_depth(self.edge, opening, self.reference_m - step)
-        above = [
-            self._at_depth(self.edge_off(i, 1), opening, self.reference_m) for i in self._uncertain
-        ]
-        below = [
-            self._at_depth(self.edge_off(i, -1), opening, self.reference_m) for i in self._uncertain
-        ]
+        high = self._at_depth(self.edge, opening, about + step)
+        low = self._at_depth(self.edge, opening, about - step)
+        above = [self._at_depth(self.edge_off(i, 1), opening, about) for i in self._uncertain]
+        below = [self._at_depth(self.edge_off(i, -1), opening, about) for i in self._uncertain]
         pairs = list(zip(above, below, strict=True))
         return Running(
             place=place,
@@ -144,6 +141,19 @@ class Geometry:
             slope_de=self._by_edge([a[2] - b[2] for a, b in pairs]),
             place_de=self._by_edge([a[0] - b[0] for a, b in pairs]),
         )
+
+    def resting(self, opening: Array, near: Array) -> Running:
+        """As :meth:`running`, expanded about the indentations at places ``near`` (k,).
+
+        ``place`` is where the line through such a place, with the slope there, has the reference's
+        indentation: the same for a straight edge. Where ``near`` is NaN, or the indentation there
+        no positive number, the reference's is taken.
+        """
+        with np.errstate(invalid="ignore"):
+            depth = self.depth_and_lever(self.edge, opening, near)[0]
+            depth = np.where(depth > 0.0, depth, self.reference_m)
+        found = self.running(opening, depth)
+        return replace(found, place=found.place + (depth - self.reference_m) / found.slope)
 
     def edge_off(self, index: int, sign: int) -> Edge:
         """The edge with one parameter off by ``EDGE_STEP_SDS`` standard deviations."""
@@ -178,7 +188,7 @@ class Geometry:
             return np.zeros((0, 0))
         return np.stack(differences, axis=-1) / (2.0 * self._edge_steps)
 
-    def _at_depth(self, edge: Edge, opening: Array, depth: float) -> tuple[Array, Array, Array]:
+    def _at_depth(self, edge: Edge, opening: Array, depth: ArrayLike) -> tuple[Array, Array, Array]:
         place = self.place(opening, depth, edge)
         _, lever = self.depth_and_lever(edge, opening, place)
         view: Any = edge_height(edge, place, opening / self.moving_blades)

@@ -146,10 +146,11 @@ class CutLikelihood:
         known = np.array([rest.fresh or self.fracture == "none" for rest in rests])
         opening = np.array([0.5 if rest.fresh else rest.opening for rest in rests])
         advance = np.array([0.0 if rest.fresh else rest.advance for rest in rests])
-        at = geometry.running(opening)
+        place = np.array([rest.place for rest in rests])
+        at = geometry.resting(opening, np.where(known, np.nan, place - advance))
         return {
             "rest_known": known.astype(np.int32),
-            "rest_place": np.array([rest.place for rest in rests]),
+            "rest_place": place,
             "rest_at_reference": at.place + advance,
             "rest_slope": at.slope,
             "rest_de": at.place_de.ravel(),

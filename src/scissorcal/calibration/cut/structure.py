@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.model import Cutting, Edge, EdgeBelief, Response
 from scissorcal.model.transforms import IDENTITY
+from scissorcal.recipe.edge import stated_curve
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
@@ -103,20 +104,13 @@ def geometry_of(recipe: Recipe, edge: Edge) -> dict[str, Any]:
 def edge_of(recipe: Recipe) -> EdgeBelief:
     """The edge that a recipe states, with what it says of its uncertainty."""
     edge = recipe.rig.edge
-    stated = Edge(
-        edge.family,
-        edge.offset_mm * 1e-3,
-        float(np.radians(edge.taper_deg)),
-        edge.length_mm * 1e-3,
-        edge.curvature_per_m,
-    )
     sds = {
         "offset_m": edge.offset_sd_mm * 1e-3,
         "taper_rad": float(np.radians(edge.taper_sd_deg)),
     }
     open_ones = {name: sd for name, sd in sds.items() if sd > 0.0}
     return EdgeBelief(
-        stated,
+        stated_curve(edge).edge,
         tuple(open_ones),
         np.diag(np.square(list(open_ones.values()))).reshape(len(open_ones), len(open_ones)),
     )

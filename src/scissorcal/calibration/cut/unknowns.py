@@ -140,7 +140,7 @@ def _verdict(one: Unknown, limit: float) -> Verdict:
 
 def _opening_zero(scene: SceneMean, recipe: Recipe) -> tuple[float, str, str]:
     cure = "Zero the opening with the centrelines together and state rig.opening_zero_sd_deg."
-    spread = recipe.rig.moving_blades * BY_EYE_M / (recipe.rig.edge.length_mm * 1e-3)
+    spread = recipe.rig.moving_blades * BY_EYE_M / recipe.rig.edge.length_m
     stated = recipe.rig.opening_zero_sd_deg
     if stated is not None:
         spread, cure = SURE * float(np.radians(stated)), ""

@@ -8,10 +8,12 @@ crack.
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 from scissorcal.device.sim.material import Response
 from scissorcal.device.sim.specimen import Specimen
+from scissorcal.device.sim.wave import Wave
 
 
 class Touch(NamedTuple):
@@ -29,11 +31,16 @@ class Touch(NamedTuple):
     share: float
 
 
+NEWTON_STEPS, HALVINGS, CELLS = 20, 200, 8
+CLOSE_M = 1e-15
 APART = Touch(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class BladeOnSheet:
-    """The exact contact law of one specimen. Angles in rad, lengths in m, forces in N."""
+    """The exact contact law of one specimen. Angles in rad, lengths in m, forces in N.
+
+    Of a specimen whose blade has a wave it makes a :class:`WavyBladeOnSheet`.
+    """
 
     __slots__ = (
         "curvature",
@@ -45,6 +52,10 @@ class BladeOnSheet:
         "taper",
         "upper_face",
     )
+
+    def __new__(cls, specimen: Specimen) -> "BladeOnSheet":
+        wavy = cls is BladeOnSheet and specimen.blade.wave_mm
+        return super().__new__(WavyBladeOnSheet if wavy else cls)
 
     def __init__(self, specimen: Specimen) -> None:
         blade = specimen.blade
@@ -62,17 +73,14 @@ class BladeOnSheet:
         beta = opening / self.moving
         sine = math.sin(beta)
         cosine = math.cos(beta)
-        station = self._station(sine, cosine, contact)
+        station, edge, taper = self._place(sine, cosine, contact)
         beyond = station - self.length
         if beyond >= self.fade:
             return APART
-        bend = self.curvature * station if station > 0.0 else 0.0
-        edge = self.offset + station * (self.taper + 0.5 * bend)
         height = station * sine + edge * cosine
         indentation = self.upper_face - height
         if indentation <= 0.0:
             return APART
-        taper = self.taper + bend
         run = cosine - taper * sine
         slope = (sine + taper * cosine) / run
         lever = contact + height * slope
@@ -93,19 +101,20 @@ class BladeOnSheet:
         """How deep the edge stands below the sheet's upper face; negative where it is above."""
         beta = opening / self.moving
         sine, cosine = math.sin(beta), math.cos(beta)
-        station = self._station(sine, cosine, contact)
-        bend = self.curvature * station if station > 0.0 else 0.0
-        edge = self.offset + station * (self.taper + 0.5 * bend)
+        station, edge, _ = self._place(sine, cosine, contact)
         return self.upper_face - station * sine - edge * cosine
 
     def energy(self, opening: float, contact: float) -> float:
         """Energy in joules that the sheet stores, all moving blades together."""
         beta = opening / self.moving
-        beyond = self._station(math.sin(beta), math.cos(beta), contact) - self.length
+        sine, cosine = math.sin(beta), math.cos(beta)
+        station, edge, _ = self._place(sine, cosine, contact)
+        beyond = station - self.length
         weight = 1.0 if beyond <= 0.0 else self._fading(beyond)[0]
         if weight == 0.0:
             return 0.0
-        return self.moving * weight * self.response.energy(self.indentation(opening, contact))
+        indentation = self.upper_face - station * sine - edge * cosine
+        return self.moving * weight * self.response.energy(indentation)
 
     def crossing(self, opening: float) -> float:
         """Distance from the pivot at which the edge passes the sheet's upper face.
@@ -128,9 +137,10 @@ class BladeOnSheet:
         edge = self.offset + station * (self.taper + 0.5 * bend)
         return station * cosine - edge * sine
 
-    def _station(self, sine: float, cosine: float, contact: float) -> float:
-        """Solve contact = s cos(beta) - e(s) sin(beta), a quadratic in s, for its near root.
+    def _place(self, sine: float, cosine: float, contact: float) -> tuple[float, float, float]:
+        """Station over ``contact``, and the edge's offset e and slope there.
 
+        Solves contact = s cos(beta) - e(s) sin(beta), a quadratic in s, for its near root.
         Written so that it neither divides by the curvature nor cancels. Behind the pivot the
         edge goes on straight. Where a curved edge never stands over ``contact``, a station beyond
         its tip is given.
@@ -138,9 +148,12 @@ class BladeOnSheet:
         run = cosine - self.taper * sine
         reach = contact + self.offset * sine
         if self.curvature == 0.0 or reach <= 0.0:
-            return reach / run
+            station = reach / run
+            return station, self.offset + station * self.taper, self.taper
         below = run * run - 2.0 * self.curvature * sine * reach
-        return 2.0 * reach / (run + math.sqrt(below)) if below > 0.0 else 2.0 * reach / run
+        station = 2.0 * reach / (run + math.sqrt(below)) if below > 0.0 else 2.0 * reach / run
+        bend = self.curvature * station if station > 0.0 else 0.0
+        return station, self.offset + station * (self.taper + 0.5 * bend), self.taper + bend
 
     def _fading(self, beyond: float) -> tuple[float, float]:
         """Weight w and its derivative with the station, ``beyond`` metres past the blade's tip."""
@@ -149,3 +162,96 @@ class BladeOnSheet:
             return 0.0, 0.0
         weight = 1.0 - along * along * (3.0 - 2.0 * along)
         return weight, -6.0 * along * (1.0 - along) / self.fade
+
+
+class WavyBladeOnSheet(BladeOnSheet):
+    """The same law for a line with a wave on it, e(s) = offset + s tan(taper) + wave(s)."""
+
+    __slots__ = ("wave",)
+
+    def __init__(self, specimen: Specimen) -> None:
+        super().__init__(specimen)
+        wave = specimen.blade.wave
+        if wave is None:
+            raise ValueError("this blade has no wave: make a BladeOnSheet of it")
+        self.wave: Wave = wave
+
+    def crossing(self, opening: float) -> float:
+        """As for other edges; where the edge comes up more than once, the place nearest its tip."""
+        beta = opening / self.moving
+        sine, cosine = math.sin(beta), math.cos(beta)
+        bracket = self._last_rise(sine, cosine)
+        if bracket is None:
+            return math.inf
+        station = _root(lambda s: self._height(sine, cosine, s), *bracket)
+        edge = self.offset + station * self.taper + self.wave.at(station)[0]
+        return station * cosine - edge * sine
+
+    def _height(self, sine: float, cosine: float, station: float) -> tuple[float, float]:
+        """Height of the edge over the sheet's upper face, and its derivative with the station."""
+        value, slope = self.wave.at(station)
+        edge = self.offset + station * self.taper + value
+        return station * sine + edge * cosine - self.upper_face, sine + (
+            self.taper + slope
+        ) * cosine
+
+    def _last_rise(self, sine: float, cosine: float) -> tuple[float, float] | None:
+        """Stations between which the edge comes up for the last time, on a fine grid."""
+        first, last = min(0.0, self.wave.stations[0]), max(self.length, self.wave.stations[-1])
+        height, grade = self._height(sine, cosine, last)
+        if height < 0.0:
+            return (last, last - 2.0 * height / grade) if grade > 0.0 else None
+        width = (last - first) / (CELLS * len(self.wave.stations))
+        high = last
+        while high > first:
+            low = high - width
+            if self._height(sine, cosine, low)[0] < 0.0:
+                return low, high
+            high = low
+        height, grade = self._height(sine, cosine, high)
+        return (high - 2.0 * height / grade, high) if grade > 0.0 else None
+
+    def _place(self, sine: float, cosine: float, contact: float) -> tuple[float, float, float]:
+        """Newton from where the line alone stands: x rises with s, as no edge is near upright."""
+        wave, line = self.wave, self.taper
+        run = cosine - line * sine
+        reach = contact + self.offset * sine
+        station = reach / run
+        for _ in range(NEWTON_STEPS):
+            value, slope = wave.at(station)
+            step = (station * run - value * sine - reach) / (run - slope * sine)
+            station -= step
+            if -CLOSE_M < step < CLOSE_M:
+                break
+        else:
+            station = self._place_by_halving(sine, run, reach)
+        value, slope = wave.at(station)
+        return station, self.offset + station * line + value, line + slope
+
+    def _place_by_halving(self, sine: float, run: float, reach: float) -> float:
+        """Between two bounds that the least and the largest slope of x(s) give."""
+        wave = self.wave
+
+        def away(station: float) -> tuple[float, float]:
+            value, slope = wave.at(station)
+            return station * run - value * sine - reach, run - slope * sine
+
+        middle = reach / run
+        off = abs(away(middle)[0]) / (run - wave.largest[1] * sine) + CLOSE_M
+        return _root(away, middle - off, middle + off)
+
+
+def _root(law: Callable[[float], tuple[float, float]], low: float, high: float) -> float:
+    """Root of a law (value, slope) that is below 0 at ``low`` and not at ``high``.
+
+    Newton, and halving where that leaves the bracket, to the last bits.
+    """
+    station = 0.5 * (low + high)
+    for _ in range(HALVINGS):
+        value, slope = law(station)
+        low, high = (station, high) if value < 0.0 else (low, station)
+        trial = station - value / slope if slope > 0.0 else low
+        before, station = station, trial if low < trial < high else 0.5 * (low + high)
+        if abs(station - before) < CLOSE_M:
+            break
+    return station

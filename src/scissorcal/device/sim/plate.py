@@ -53,6 +53,9 @@ class PlateContact:
         length = blade.length_mm * 1e-3
         taper = math.tan(math.radians(blade.taper_deg))
         edge = blade.offset_mm * 1e-3 + length * (taper + 0.5 * blade.curvature_per_m * length)
+        wave = blade.wave
+        if wave is not None:
+            edge += wave.at(length)[0]
         self._station = (length, edge, float(blade.moving_blades))
         self._plate = plate
         self._step = step_s

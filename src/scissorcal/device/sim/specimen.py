@@ -7,11 +7,13 @@ does. The keys have the units; the properties that end in ``_m`` or ``_rad`` giv
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from scissorcal.device.sim.wave import Wave
 from scissorcal.recipe.library import specimen_path
 from scissorcal.recipe.load import load_toml
 
@@ -22,6 +24,10 @@ NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
 Range = tuple[Finite, Finite]
+WavePoint = tuple[
+    Annotated[float, Field(ge=-500, le=500, allow_inf_nan=False)],
+    Annotated[float, Field(ge=-50, le=50, allow_inf_nan=False)],
+]
 
 
 def load_specimen(name_or_path: str | Path) -> Specimen:
@@ -49,7 +55,8 @@ class Blade(Section):
 
     ``moving`` says which blades turn. ``tip_fade_mm`` is the length beyond the tip over which
     the edge lets go of the sheet: a tip is rounded, and a force that ended in a step would make
-    energy.
+    energy. ``wave_mm`` are points [station, departure] of a smooth curve that is added to a line:
+    a natural cubic spline, straight beyond its ends.
     """
 
     moving: Literal["both", "upper"] = "both"
@@ -58,6 +65,7 @@ class Blade(Section):
     taper_deg: Annotated[float, Field(ge=-20, le=20)]
     curvature_per_m: Annotated[float, Field(ge=-5, le=5)] = 0.0
     length_mm: Annotated[float, Field(ge=10, le=500)]
+    wave_mm: Annotated[tuple[WavePoint, ...], Field(min_length=3, max_length=200)] | None = None
     tip_fade_mm: Annotated[float, Field(ge=0.1, le=20)] = 1.0
 
     @model_validator(mode="after")
@@ -65,6 +73,23 @@ class Blade(Section):
         if self.family == "line" and self.curvature_per_m != 0.0:
             raise ValueError('curvature_per_m needs family = "arc"')
         return self
+
+    @model_validator(mode="after")
+    def _wave_is_one_on_a_line(self) -> Blade:
+        if self.wave_mm is None:
+            return self
+        if self.family != "line":
+            raise ValueError('wave_mm needs family = "line": it is added to a straight edge')
+        if any(end[0] <= start[0] for start, end in pairwise(self.wave_mm)):
+            raise ValueError("wave_mm must have stations that rise strictly, from pivot to tip")
+        return self
+
+    @property
+    def wave(self) -> Wave | None:
+        """What departs from the line, in metres; None for a plain line or arc."""
+        if self.wave_mm is None:
+            return None
+        return Wave([(1e-3 * station, 1e-3 * value) for station, value in self.wave_mm])
 
     @property
     def moving_blades(self) -> int:
@@ -292,12 +317,18 @@ class Specimen(Section):
         blade = self.blade
         widest = self.mechanism.opening_range_deg[1] / blade.moving_blades
         taper = math.tan(math.radians(blade.taper_deg))
-        for station_mm in (0.0, blade.length_mm + blade.tip_fade_mm):
-            lean = math.degrees(math.atan(taper + blade.curvature_per_m * station_mm * 1e-3))
+        wave = blade.wave
+        end_mm = blade.length_mm + blade.tip_fade_mm
+        leans = [(0.0, taper), (end_mm, taper + blade.curvature_per_m * end_mm * 1e-3)]
+        if wave is not None:
+            leans = [(1e3 * at, taper + slope) for at, slope in (wave.least, wave.largest)]
+        for station_mm, slope in leans:
+            lean = math.degrees(math.atan(slope))
             if not -80.0 < widest + lean < 80.0:
                 raise ValueError(
                     f"the edge stands almost upright at {station_mm:g} mm when the blades are "
-                    "wide open: lower blade.taper_deg, blade.curvature_per_m or the opening range"
+                    "wide open: lower blade.taper_deg, blade.curvature_per_m, the slopes of "
+                    "blade.wave_mm or the opening range"
                 )
         return self
 

@@ -21,6 +21,12 @@ def specimen_blade(recipe: "Recipe") -> "BladeShape":
             'photograph: add specimen = "...", or give photographs with --image.'
         )
     blade = load_specimen(recipe.specimen).blade
+    if blade.wave_mm is not None:
+        raise InputError(
+            f'The blade of the specimen "{recipe.specimen}" has a wave (blade.wave_mm), and the '
+            "virtual camera draws lines and arcs only: take it out, or give photographs with "
+            "--image."
+        )
     taper = math.radians(blade.taper_deg)
     return BladeShape(
         length_m=1e-3 * blade.length_mm,

@@ -215,19 +215,10 @@ def _fits(engine: Engine) -> "tuple[FitResult, FitResult]":
 
 def blade_edge(engine: Engine, recipe: "Recipe") -> "Edge":
     """The edge of photographs, else the recipe's."""
-    from scissorcal.model.edge import Edge
+    from scissorcal.calibration.cut.structure import edge_of
 
     belief, _ = edge_of_photographs(engine)
-    if belief is not None:
-        return belief.edge
-    stated = recipe.rig.edge
-    return Edge(
-        stated.family,
-        offset_m=1e-3 * stated.offset_mm,
-        taper_rad=math.radians(stated.taper_deg),
-        length_m=1e-3 * stated.length_mm,
-        curvature_per_m=stated.curvature_per_m,
-    )
+    return (belief or edge_of(recipe)).edge
 
 
 def _mechanics(

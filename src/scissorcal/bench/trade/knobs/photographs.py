@@ -84,7 +84,7 @@ class Photographs:
         chosen = Resolution(setting.value["count"], setting.value["factor"])
         fit, seconds = fit_edge(case, chosen, np.random.default_rng([case.seed, repeat]))
         model, edge = fitted_model(case), fit.belief.edge
-        length = 1e-3 * case.recipe.rig.edge.length_mm
+        length = case.recipe.rig.edge.length_m
         station = np.linspace(0.1, 0.95, STATIONS) * length
         changed = ExactModel(replace(model.cutting, edge=edge), model.friction)
         torque = model_torque(case, changed, scene_places(case))

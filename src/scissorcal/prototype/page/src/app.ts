@@ -47,6 +47,7 @@ export class App {
   private edge: Edge | null = null;
   /** Timer of the next picture while the blades stand still, else 0. */
   private resting = 0;
+  private stirredAt = 0;
   private chartedAt = 0;
   private curvesAt = NaN;
   private readonly largestTorque: number;
@@ -105,7 +106,7 @@ export class App {
     this.draw();
     this.readout.show(rig, now, rig.isFollowing ? this.panel?.recent.newestTorque : undefined);
     if (now - this.chartedAt >= CHARTS_EVERY_ms) this.chart(now);
-    if (rig.isStill) this.resting = window.setTimeout(() => this.next(), AT_REST_ms);
+    if (rig.isStill && now - this.stirredAt > AT_REST_ms) this.resting = window.setTimeout(() => this.next(), AT_REST_ms);
     else this.next();
   }
 
@@ -116,6 +117,7 @@ export class App {
 
   /** Something may move now: the time until then has passed at rest. */
   private stir(): void {
+    this.stirredAt = performance.now();
     if (!this.resting) return;
     window.clearTimeout(this.resting);
     this.pass(performance.now());

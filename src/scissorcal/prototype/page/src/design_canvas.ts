@@ -189,7 +189,8 @@ export class DesignCanvas {
       }
     });
     group.append(svg("path", { class: "design-arrow", d: `M6 ${y - 5}l9 5l-9 5z` }));
-    group.append(svg("text", { x: 20, y: y - 6 }, `cut, y = ${cut_line_mm}`));
+    // above the lines of all layers
+    group.append(svg("text", { x: 20, y: y - 6 - 3 * Math.max(layers.length - 1, 0) }, `cut, y = ${cut_line_mm}`));
     return group;
   }
 

@@ -38,7 +38,7 @@ export class Drawing {
   private readonly context: CanvasRenderingContext2D;
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    this.context = canvas.getContext("2d") as CanvasRenderingContext2D;
+    this.context = canvas.getContext("2d", { alpha: false }) as CanvasRenderingContext2D;
   }
 
   draw(view: View): void {
@@ -48,7 +48,8 @@ export class Drawing {
     this.scale = width / (LENGTHS_ACROSS * length);
     this.origin = [0.29 * width, 0.5 * (height - STRIP_px)];
     const context = this.context;
-    context.clearRect(0, 0, width, height);
+    context.fillStyle = colours.paper;
+    context.fillRect(0, 0, width, height);
     this.sheet(view, colours, width);
     const beta = view.pose.opening / view.scene.moving_blades;
     this.blade(view, beta, 1, colours);

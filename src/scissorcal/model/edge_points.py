@@ -1,0 +1,76 @@
+"""An edge through points, as one spline: the rule by which drawn blades become a curve."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scissorcal.model.bspline import FEWEST, spline_design
+from scissorcal.model.edge import Edge
+
+Array = NDArray[np.float64]
+
+FEWEST_POINTS, MOST_POINTS = 3, 200
+MOST_PIECES = 16
+LARGEST_MISFIT_M = 2e-5
+SMOOTHING = 1e-3
+"""Weight of each third difference of the spline's weights against one point."""
+
+STEEPEST = np.tan(np.radians(80.0))
+
+
+def edge_through(points_m: ArrayLike) -> tuple[Edge, float]:
+    """The spline edge through points (n, 2) of station and offset, and its largest misfit (m).
+
+    Knots are even from the first station to the last, which is the blade's length. The weights are
+    least squares over the points, with ``SMOOTHING`` on their third differences, which leaves
+    parabolas as they are. Of 1 to 16 pieces the fewest are taken that leave no point by more than
+    0.02 mm. Raises ValueError, a sentence, where no such edge is there, or it is steeper than
+    80 deg.
+
+    >>> edge, misfit = edge_through([[0.0, -0.008], [0.03, -0.007], [0.07, -0.005]])
+    >>> len(edge.spline_m), bool(misfit < 1e-8)
+    (4, True)
+    """
+    points = np.asarray(points_m, dtype=np.float64)
+    refuse_unfit(points)
+    station, offset = points.T
+    start, end = float(station[0]), float(station[-1])
+    misfit = np.inf
+    for pieces in range(1, MOST_PIECES + 1):
+        weights = _weights(station, offset, pieces + FEWEST - 1)
+        edge = Edge("spline", 0.0, 0.0, end, spline_m=tuple(weights.tolist()), spline_start_m=start)
+        misfit = float(np.max(np.abs(edge.offset_at(station) - offset)))
+        if misfit <= LARGEST_MISFIT_M:
+            break
+    else:
+        raise ValueError(
+            f"a smooth edge of {MOST_PIECES} pieces leaves the points by {misfit * 1e3:.3g} mm, "
+            f"more than {LARGEST_MISFIT_M * 1e3:g} mm: smooth corners and notches out"
+        )
+    if float(edge.steepest) > STEEPEST:
+        raise ValueError("the edge is steeper than 80 deg on the blade: check its points")
+    return edge, misfit
+
+
+def refuse_unfit(points: Array) -> None:
+    """ValueError, a sentence, for points that are no edge from the pivot to a tip beyond it."""
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError("points of an edge are pairs [station, offset]")
+    if not FEWEST_POINTS <= len(points) <= MOST_POINTS:
+        raise ValueError(
+            f"an edge needs {FEWEST_POINTS} to {MOST_POINTS} points, and these are {len(points)}"
+        )
+    if not np.all(np.isfinite(points)):
+        raise ValueError("points of an edge must be finite numbers")
+    if np.any(np.diff(points[:, 0]) <= 0.0):
+        raise ValueError("stations of an edge's points must rise strictly, from pivot to tip")
+    if points[0, 0] > 0.0 or points[-1, 0] <= 0.0:
+        raise ValueError("an edge's first station must be 0 (the pivot) or less, its last above 0")
+
+
+def _weights(station: Array, offset: Array, count: int) -> Array:
+    """Least squares of the points, with third differences held small."""
+    design = spline_design(count, float(station[0]), float(station[-1]), station)
+    smooth = SMOOTHING * np.diff(np.eye(count), n=FEWEST - 1, axis=0)
+    rows = np.vstack([design, smooth])
+    wanted = np.concatenate([offset, np.zeros(len(smooth))])
+    return np.asarray(np.linalg.lstsq(rows, wanted, rcond=None)[0])

@@ -1,0 +1,108 @@
+"""Where a turned edge comes up through a height: closed forms, a search on curves, one root."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from scissorcal.model import Edge
+from scissorcal.model.edge_points import LARGEST_MISFIT_M, MOST_POINTS, edge_through
+
+BETA = np.radians(np.linspace(3.0, 40.0, 60))
+
+
+@st.composite
+def points(draw: st.DrawFn) -> np.ndarray:
+    """Points of a smooth edge, 10 to 500 mm long, few or many, evenly spread or clustered."""
+    length = draw(st.floats(0.01, 0.5))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    count = draw(st.sampled_from([3, 4, 12, 60, MOST_POINTS]))
+    cluster = draw(st.sampled_from([0.2, 1.0, 5.0]))
+    inner = np.sort(rng.uniform(0.0, 0.999, count - 2)) ** cluster
+    first = -draw(st.sampled_from([0.0, 0.05, 0.3]))
+    share = np.unique(np.concatenate([[first], inner[inner > 1e-7], [1.0]]))
+    waves = draw(st.floats(0.1, 1.5))
+    size = draw(st.floats(-1.0, 1.0)) * 0.02 / waves
+    station = length * share
+    offset = length * (-0.1 + 0.03 * share + size * np.sin(2 * np.pi * waves * share))
+    return np.stack([station, offset], axis=1)
+
+
+@given(points())
+@settings(max_examples=150, deadline=None)
+def test_any_smooth_points_become_an_edge_near_them(given_points: np.ndarray) -> None:
+    assume(len(given_points) >= 3)
+    edge, misfit = edge_through(given_points)
+    station, offset = given_points.T
+    assert misfit <= LARGEST_MISFIT_M
+    assert np.max(np.abs(edge.offset_at(station) - offset)) == misfit
+    assert edge.length_m == station[-1]
+    assert 4 <= len(edge.spline_m) <= 19
+
+
+@given(points(), st.floats(-0.02, 0.02))
+@settings(max_examples=150, deadline=None)
+def test_at_the_station_the_edge_has_the_height_and_rises(
+    given_points: np.ndarray, height: float
+) -> None:
+    assume(len(given_points) >= 3)
+    edge, _ = edge_through(given_points)
+    found = edge.station_at_height(height, BETA)
+    known = np.isfinite(found)
+    at, beta = found[known], BETA[known]
+    reached = at * np.sin(beta) + edge.offset_at(at) * np.cos(beta)
+    assert reached == pytest.approx(height, abs=1e-13)
+    assert np.all(np.sin(beta) + edge.slope_at(at) * np.cos(beta) >= 0.0)
+    stations = np.linspace(0.0, edge.length_m, 4001)
+    heights = np.multiply.outer(np.sin(BETA), stations) + np.multiply.outer(
+        np.cos(BETA), edge.offset_at(stations)
+    )
+    above = heights >= height
+    rises = np.count_nonzero(~above[:, :-1] & above[:, 1:], axis=1)
+    assert np.all(rises[known] >= 1)
+    assert np.all(known | (rises != 1))
+
+
+@given(
+    st.floats(-0.02, 0.0),
+    st.floats(-5.0, 10.0),
+    st.floats(-1.5, 3.0),
+    st.floats(-0.002, 0.002),
+)
+@settings(max_examples=100, deadline=None)
+def test_lines_and_arcs_are_the_quadratics_root_wherever_it_is(
+    offset: float, taper: float, curvature: float, height: float
+) -> None:
+    slope = np.tan(np.radians(taper))
+    edge = Edge("arc", offset, float(np.radians(taper)), 0.075, curvature_per_m=curvature)
+    found = edge.station_at_height(height, BETA)
+    for station, beta in zip(found, BETA, strict=True):
+        law = np.array(
+            [
+                0.5 * curvature * np.cos(beta),
+                np.sin(beta) + slope * np.cos(beta),
+                offset * np.cos(beta) - height,
+            ]
+        )
+        if np.isfinite(station):
+            size = np.abs(law * [station**2, station, 1.0]).max()
+            assert np.polyval(law, station) == pytest.approx(0.0, abs=1e-14 + 1e-12 * size)
+            assert 2.0 * law[0] * station + law[1] >= -1e-9
+
+
+def test_a_cubic_without_bend_is_found_where_its_arc_is() -> None:
+    arc = Edge("arc", -0.008, 0.03, 0.075, curvature_per_m=1.0)
+    cubic = Edge("cubic", -0.008, 0.03, 0.075, curvature_per_m=1.0)
+    exact, found = (edge.station_at_height(5e-5, BETA) for edge in (arc, cubic))
+    on_blade = (exact > 0.0) & (exact < 0.075)
+    assert np.count_nonzero(on_blade) > 20
+    assert found[on_blade] == pytest.approx(exact[on_blade], abs=1e-15)
+    assert np.all(np.isnan(found[~on_blade]))
+
+
+def test_an_edge_that_comes_up_twice_has_no_one_station() -> None:
+    hump = (*np.zeros(6), 0.006, *np.zeros(10))
+    edge = Edge("spline", -0.008, 0.0, 0.075, spline_m=hump)
+    wide, narrow = edge.station_at_height(0.0, np.radians([25.0, 10.0]))
+    assert np.isfinite(wide)
+    assert np.isnan(narrow)
