@@ -78,6 +78,17 @@ def test_what_is_assumed_and_declared_is_said() -> None:
     said = plate_sentence(recipe, plate_pieces(recipe, Path()))
     assert "rest on an assumption: response and fracture energy proportional" in said
     assert "declared in the recipe, not measured" in said
+    assert "the whole plate is taken to be of that one material" in said
+
+
+@pytest.mark.parametrize("table", ["", "[[plate.layers.regions]]\ntoughness_ratio = 2\n"])
+def test_a_layer_of_another_material_is_refused(table: str) -> None:
+    text = f'{BASE}\n{SHEET}{table}outline_mm = {BOX}\nmaterial = "foil"\n'
+    if not table:
+        text = f'{BASE}\n{SHEET}material = "foil"\n'
+    line = text.splitlines().index('material = "foil"') + 1
+    with pytest.raises(InputError, match=rf"line {line}, .*one material.*another workspace"):
+        parse_recipe(text)
 
 
 def test_the_shown_recipe_has_the_same_meaning() -> None:

@@ -19,7 +19,8 @@ from scissorcal.render.admission_rule import (
     delayed_stiffness,
 )
 from scissorcal.render.cures import stated_cures
-from scissorcal.render.derating import felt_change, needs_of, softened
+from scissorcal.render.derating import needs_of, softened
+from scissorcal.render.felt_cost import felt_change
 from scissorcal.render.result import _admitted
 from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts, with_probe
 from tests.kernel.zoo import make_tables

@@ -1,4 +1,4 @@
-"""The built-in plate with a hole and a band, 90 mm of it: planned, built, rendered as drawn."""
+"""The built-in plate with a hole and a band: planned, built, rendered as drawn."""
 
 import json
 import re
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scissorcal.identity import file_digest
-from scissorcal.kernel import PiecesModel
+from scissorcal.kernel import ModelTables, PiecesModel
 from scissorcal.package import ModelPackage, open_package
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recording import read_recording
@@ -34,9 +34,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     text = made.recipe_path.read_text(encoding="utf-8")
     made.recipe_path.write_text(f"{text}\n{plate[0]}", encoding="utf-8")
     drawing = BUILT_IN.with_suffix(".svg").read_text(encoding="utf-8")
-    shorter = drawing.replace('width="180" height="60"/>', 'width="90" height="60"/>')
-    assert shorter != drawing
-    (made.root / DRAWING).write_text(shorter, encoding="utf-8")
+    (made.root / DRAWING).write_text(drawing, encoding="utf-8")
     record_friction(made)
     record_cut(made)
     for words in (("fit",), ("report",), ("package", "build")):
@@ -65,7 +63,7 @@ def test_pieces_follow_the_drawing(package: ModelPackage) -> None:
     energy = fracture.energy_J_per_m
     assert (first.begin_m, first.end_m) == pytest.approx((0.0, 22e-3), abs=1e-5)
     assert [strip.end_m for strip in second.strips] == pytest.approx(
-        [35e-3, 45e-3, 90e-3], abs=1e-5
+        [35e-3, 45e-3, 180e-3], abs=1e-5
     )
     energies = [strip.fracture_energy_J_per_m / energy for strip in second.strips]
     assert energies == pytest.approx([1.0, 3.0, 1.0])
@@ -78,7 +76,7 @@ def test_the_page_is_told_the_outlines_of_the_drawing(workspace: Workspace) -> N
     assert plate.cut_line_mm == workspace.recipe().plate.cut_line_mm
     (layer,) = plate.layers
     (outline,) = layer.outline
-    assert max(x for x, _ in outline) == pytest.approx(90.0, abs=1e-3)
+    assert max(x for x, _ in outline) == pytest.approx(180.0, abs=1e-3)
     assert (len(layer.holes), [one.toughness_ratio for one in layer.regions]) == (1, [3.0])
     path = workspace.package_path(workspace.recipe())
     assert workspace_scene(workspace, path).drawn_plate is None
@@ -108,14 +106,14 @@ def test_the_report_says_of_the_plate_what_plan_says(workspace: Workspace) -> No
     assert panel["sentence"] == make_plan(workspace).plate
     assert "declared in the recipe, not measured" in panel["sentence"]
     whole, tough = panel["charts"][0]["series"]
-    assert whole["x"] == pytest.approx([0, 22, None, 28, 35, None, 45, 90], abs=0.01)
+    assert whole["x"] == pytest.approx([0, 22, None, 28, 35, None, 45, 180], abs=0.01)
     assert tough["x"] == pytest.approx([35.0, 45.0])
     assert set(whole["y"]) == {0.1, None}
     second = {value["name"]: value for value in panel["rows"][1]["values"]}
     assert second["from"]["number"] == pytest.approx(28.0, abs=0.01)
     assert (
         second["declared toughness ratio"]["text"]
-        == "1 (up to 35 mm), 3 (up to 45 mm), 1 (up to 90 mm)"
+        == "1 (up to 35 mm), 3 (up to 45 mm), 1 (up to 180 mm)"
     )
     page = workspace.report_html.read_text(encoding="utf-8")
     assert panel["sentence"] in " ".join(page.split())
@@ -156,28 +154,57 @@ def test_overlapping_pieces_need_a_stiffer_rig(package: ModelPackage) -> None:
     sheet = needs_on(package.tables, limit, ())
     one = needs_on(package.tables, limit, package.pieces[:1])
     stack = needs_on(package.tables, limit, (package.pieces[0], package.pieces[0]))
-    assert one.stiffness == pytest.approx(sheet.stiffness, rel=1e-3)
+    assert one.found <= sheet.stiffness * 1.01
+    assert sheet.stiffness <= one.stiffness < 1.1 * sheet.stiffness
     assert stack.stiffness == pytest.approx(2.0 * one.stiffness, rel=1e-6)
 
 
+def rendered_friction(
+    tables: ModelTables, opening: np.ndarray, rate: np.ndarray, width: float
+) -> np.ndarray:
+    """The friction that the loop renders: built up over ``width`` of opening since a reversal."""
+    anchor, stretch = opening[0], np.zeros(len(opening))
+    for i, place in enumerate(opening):
+        anchor = min(max(anchor, place - width), place + width)
+        stretch[i] = (place - anchor) / width
+    speed = np.maximum(np.abs(rate), tables.friction_rate_eps)
+    level = np.where(
+        stretch > 0.0,
+        tables.friction_opening.evaluate(speed, held=True),
+        tables.friction_closing.evaluate(speed, held=True),
+    )
+    return np.asarray(-level * tables.friction_angle.evaluate(opening, held=True) * stretch)
+
+
 def test_the_rig_renders_the_drawn_plate(workspace: Workspace, package: ModelPackage) -> None:
+    """What is sent is friction and the pieces' torque: none of it in the hole, nor off the plate.
+
+    Friction is the law's, and not one level for all frames: it depends on the rate, and where the
+    blades begin to close it has not built up yet.
+    """
     words = ("render", "--device", "sim", "--strokes", "3", "--seed", "3")
     done = run(words, workspace.root)
     assert done.code == 0, done.err
     (path,) = sorted((workspace.root / "captures").glob("render-*.mcap"))
     samples = read_recording(path).samples
-    rate = np.gradient(samples["opening"]) * package.manifest.mechanics.loop_rate_Hz
-    cutting = rate < -0.05
+    opening, advance = samples["opening"], samples["advance"]
+    rate = np.gradient(opening) * package.manifest.mechanics.loop_rate_Hz
     admitted = workspace.package_path(workspace.recipe()).with_suffix(".admission.json")
-    steepest = json.loads(admitted.read_text(encoding="utf-8"))["steepest_N_per_m"]
+    admission = json.loads(admitted.read_text(encoding="utf-8"))
+    steepest = admission["steepest_N_per_m"]
     tables = softened(package.tables, steepest) if steepest else package.tables
     quiet = PiecesModel(replace(tables, render_friction=False), package.pieces)
-    felt = quiet.step_many(samples["opening"], rate, samples["advance"])["torque"]
-    started = np.arange(len(rate)) > 600  # after the ramp of the force
-    sent = samples["torque_command"] - np.median(samples["torque_command"][cutting & (felt == 0.0)])
-    touching = started & cutting & (felt > 0.0)
+    step = quiet.step_many(opening, rate, advance)
+    felt, place = step["torque"], step["contact"] + advance
+    friction = rendered_friction(tables, opening, rate, admission["friction_width_rad"])
+    sent = samples["torque_command"] - friction
+    closing = (np.arange(len(rate)) > 600) & (rate < -0.05)  # after the ramp of the force
+    touching = closing & (felt > 0.0)
     assert np.count_nonzero(touching) > 100
     error = np.sqrt(np.mean((sent[touching] - felt[touching]) ** 2))
     assert error < 0.05 * felt.max()
-    free = started & cutting & (felt == 0.0)
+    free = closing & (felt == 0.0)
     assert np.quantile(np.abs(sent[free]), 0.9) < 0.05 * felt.max()
+    hole = free & (np.abs(place - package.pieces[1].begin_m) < 1e-6)
+    assert np.count_nonzero(hole) >= 10
+    assert np.abs(sent[hole]).max() < 0.05 * felt.max()

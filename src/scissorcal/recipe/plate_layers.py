@@ -25,6 +25,12 @@ MOST_CORNERS = 2000
 
 SMALLEST_AREA_MM2 = 1e-4
 
+ONE_MATERIAL = (
+    "a plate is of one material, the one of [material] that is captured and fitted; of a layer "
+    "thickness_mm and toughness_ratio may differ, and another material needs another workspace, "
+    "with its captures and fits: remove material"
+)
+
 Place_mm = Annotated[float, Field(ge=-100_000, le=100_000, allow_inf_nan=False)]
 Corner = Annotated[tuple[Place_mm, Place_mm], Strict(False)]
 Corners = Annotated[tuple[Corner, ...], Strict(False), Field(min_length=3, max_length=1000)]
@@ -42,6 +48,13 @@ class DrawnPart(Section):
     outline_mm: Corners | None = None
     outline: DrawingName | None = None
     id: Id | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_of_the_material(cls, given: Any) -> Any:
+        if isinstance(given, dict) and "material" in given:
+            raise ValueError(ONE_MATERIAL)
+        return given
 
     @model_validator(mode="after")
     def _outline_is_written_or_drawn(self) -> DrawnPart:
@@ -205,7 +218,8 @@ def plate_sentence(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> str:
         f"{_counted(len(pieces), 'piece')} with {_counted(gaps, 'gap')} within layers, from "
         f"{min(piece.begin_m for piece in pieces) * 1e3:.4g} to "
         f"{max(piece.end_m for piece in pieces) * 1e3:.4g} mm. Captured and fitted is a uniform "
-        f"sheet of {recipe.material.name}, {recipe.material.thickness_mm:g} mm thick."
+        f"sheet of {recipe.material.name}, {recipe.material.thickness_mm:g} mm thick; the whole "
+        "plate is taken to be of that one material."
     )
     if thick != [recipe.material.thickness_mm]:
         said += (

@@ -21,7 +21,8 @@ from scissorcal.render.admission_rule import (
     allowed_stiffness,
 )
 from scissorcal.render.cures import stated_cures
-from scissorcal.render.derating import Needs, felt_change, needs_on, softened
+from scissorcal.render.derating import Needs, needs_on, softened, stiffness_on
+from scissorcal.render.felt_cost import felt_change
 from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts
 
 LEAST_FACTOR = 0.05
@@ -39,10 +40,14 @@ class Admission:
 
     ``allowed_alone`` and ``allowed_in_hand`` are the rule's stiffness without and with the hand's
     damping ``hand_damping_Nm_s_per_rad``; ``needed`` the package's largest over the scene, at
-    ``needed_at`` (opening rad, contact m), ``rendered`` what is left of it. ``steepest_N_per_m``
+    about ``needed_at`` (opening rad, contact m), ``rendered`` what is left of it. Of a drawn plate
+    both are proved bounds, and ``needed_found`` is the largest slope that its strokes show; of the
+    uniform sheet it is ``needed``. ``steepest_N_per_m``
     is to what the response was limited (None: not derated), ``felt_share`` the relative rms change
-    of mean torque that this costs, ``damping_share`` the share of the material's rate damping that
-    is rendered. ``friction_width_rad`` is over which opening rendered friction
+    of mean torque that this costs (`felt_cost.felt_change`) in what is cut: a stroke through the
+    uniform sheet, or those through the drawn plate (``is_drawn``); ``felt_sheet_share`` is that of
+    the uniform sheet in any case. ``damping_share`` is the share of the material's rate damping
+    that is rendered. ``friction_width_rad`` is over which opening rendered friction
     builds up. ``facts`` are the rig's, None where its friction is not known: then nothing was
     checked. ``sources`` say where each comes from, ``reasons`` what was done and why, ``cures``
     what would make it unnecessary, each by itself.
@@ -53,11 +58,14 @@ class Admission:
     allowed_alone: float
     allowed_in_hand: float
     needed: float
+    needed_found: float
     needed_at: tuple[float, float]
     rendered: float
     drop_Nm: float
     steepest_N_per_m: float | None
     felt_share: float
+    felt_sheet_share: float
+    is_drawn: bool
     damping_share: float
     friction_width_rad: float
     sources: tuple[str, ...]
@@ -84,7 +92,8 @@ class Admission:
         """What is rendered of the package's stiffness, in a line."""
         if not self.evaluated:
             return f"stiffness {self.rendered:.3g} N m/rad, not checked against this rig"
-        changed = f", which changes the uniform sheet's torque by {self.felt_share:.1%} (rms)"
+        what = "drawn plate" if self.is_drawn else "uniform sheet"
+        changed = f", which changes the {what}'s torque by {self.felt_share:.1%} (rms)"
         cost = changed if self.derated else ""
         return (
             f"stiffness {self.rendered:.3g} of the package's {self.needed:.3g} N m/rad{cost} "
@@ -108,7 +117,7 @@ def admit(
     """
     needs = needs_on(tables, limit, pieces)
     if facts is None:
-        return _unchecked(needs, hand)
+        return _unchecked(needs, hand, is_drawn=bool(pieces))
     rate = max(rate, OSCILLATION_RATE)
     alone, held = (allowed_stiffness(facts, damping, rate) for damping in (0.0, hand))
     cures = stated_cures(facts, hand, rate, needs.stiffness)
@@ -121,7 +130,7 @@ def admit(
             f"and {held:.2g} N m/rad allowed in a hand, which would leave less than "
             f"{LEAST_FACTOR:.0%} of the elastic slope. What would cure it: {' '.join(cures)}"
         )
-    felt = 0.0 if steepest is None else felt_change(tables, softened(tables, steepest), limit)
+    felt = _felt(tables, steepest, limit, pieces)
     damping = min(1.0, allowed_damper(facts) / needs.damper) if needs.damper > 0.0 else 1.0
     return Admission(
         facts=facts,
@@ -129,15 +138,22 @@ def admit(
         allowed_alone=alone,
         allowed_in_hand=held,
         needed=needs.stiffness,
+        needed_found=needs.found,
         needed_at=(needs.opening, needs.contact),
         rendered=left,
         drop_Nm=needs.drop_Nm,
         steepest_N_per_m=steepest,
-        felt_share=felt,
+        felt_share=felt[0],
+        felt_sheet_share=felt[1],
+        is_drawn=bool(pieces),
         damping_share=damping,
         friction_width_rad=_friction_width(needs, facts, held),
         sources=(),
-        reasons=(*_reasons(needs, facts, (alone, held), left, felt), *_damped(needs, damping)),
+        reasons=(
+            *_reasons(needs, facts, (alone, held), is_drawn=bool(pieces)),
+            *_cost(needs, left, felt, is_drawn=bool(pieces)),
+            *_damped(needs, damping),
+        ),
         cures=() if steepest is None else cures,
     )
 
@@ -192,18 +208,21 @@ def _hand_damping(package: ModelPackage) -> float:
     return damping * mechanics.handle_radius_m**2 / mechanics.moving_blades
 
 
-def _unchecked(needs: Needs, hand: float) -> Admission:
+def _unchecked(needs: Needs, hand: float, *, is_drawn: bool) -> Admission:
     return Admission(
         facts=None,
         hand_damping_Nm_s_per_rad=hand,
         allowed_alone=math.nan,
         allowed_in_hand=math.nan,
         needed=needs.stiffness,
+        needed_found=needs.found,
         needed_at=(needs.opening, needs.contact),
         rendered=needs.stiffness,
         drop_Nm=needs.drop_Nm,
         steepest_N_per_m=None,
         felt_share=0.0,
+        felt_sheet_share=0.0,
+        is_drawn=is_drawn,
         damping_share=1.0,
         friction_width_rad=0.0,
         sources=(),
@@ -234,27 +253,50 @@ def _soften(
         return None, needed
     while left > allowed and left > LEAST_FACTOR * needed:
         steepest *= max(0.999 * allowed / left, 0.5)
-        left = needs_on(softened(tables, steepest), limit, pieces).stiffness
+        left = stiffness_on(softened(tables, steepest), limit, pieces)
     return steepest, left
 
 
+def _felt(
+    tables: ModelTables, steepest: float | None, limit: float, pieces: Sequence[Piece]
+) -> tuple[float, float]:
+    """What a response costs that is limited to ``steepest``: of the plate, of the uniform sheet."""
+    if steepest is None:
+        return 0.0, 0.0
+    soft = softened(tables, steepest)
+    sheet = felt_change(tables, soft, limit)
+    return (felt_change(tables, soft, limit, pieces) if pieces else sheet), sheet
+
+
 def _reasons(
-    needs: Needs, facts: LoopFacts, allowed: tuple[float, float], left: float, felt: float
+    needs: Needs, facts: LoopFacts, allowed: tuple[float, float], *, is_drawn: bool
 ) -> tuple[str, ...]:
     place = f"{math.degrees(needs.opening):.0f} deg, contact {needs.contact * 1e3:.0f} mm"
-    found = (
-        f"The package needs up to {needs.stiffness:.3g} N m/rad (at {place}); this rig renders "
-        f"{allowed[0]:.2g} N m/rad stably alone and {allowed[1]:.2g} N m/rad in a hand, at "
-        f"{facts.delay_s * 1e3:.2g} ms of delay."
-    )
-    if left == needs.stiffness:
-        return (found,)
-    share = left / needs.stiffness
+    known = f"at {place}"
+    if is_drawn:
+        known += f"; a bound for any motion, {needs.found:.3g} N m/rad are found in strokes"
     return (
-        found,
-        f"The steepest elastic slope is rendered at {share:.0%}, which changes the "
-        f"mean torque of a stroke through the uniform sheet by {felt:.1%}; the fracture energy is "
-        "unchanged.",
+        f"The package needs up to {needs.stiffness:.3g} N m/rad ({known}); this rig renders "
+        f"{allowed[0]:.2g} N m/rad stably alone and {allowed[1]:.2g} N m/rad in a hand, at "
+        f"{facts.delay_s * 1e3:.2g} ms of delay.",
+    )
+
+
+def _cost(
+    needs: Needs, left: float, felt: tuple[float, float], *, is_drawn: bool
+) -> tuple[str, ...]:
+    """What derating costs; nothing where all is rendered."""
+    if left == needs.stiffness:
+        return ()
+    begun = f"The steepest elastic slope is rendered at {left / needs.stiffness:.0%}, which changes"
+    kept = "the fracture energy is unchanged."
+    if not is_drawn:
+        said = f"the mean torque of a stroke through the uniform sheet by {felt[0]:.1%}"
+        return (f"{begun} {said}; {kept}",)
+    return (
+        f"{begun} the mean torque of strokes through the drawn plate by {felt[0]:.1%}, of one "
+        f"through a uniform sheet by {felt[1]:.1%}: ends of pieces and of stretches of another "
+        f"toughness are felt at smaller openings; {kept}",
     )
 
 

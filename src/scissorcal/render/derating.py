@@ -6,7 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.kernel import Kernel, ModelTables, Piece, Table, largest_overlap
+from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel, Table
+from scissorcal.package.plate_slopes import PlateSlopes
+from scissorcal.render.drops import largest_drop
+from scissorcal.render.felt_cost import plate_strokes
 
 Array = NDArray[np.float64]
 
@@ -14,21 +17,21 @@ OPENINGS, CONTACTS = 48, 24
 STEP_RAD = 1e-3
 """Opening over which a slope is taken: some hundred steps of float32 in torque, and an indentation
 change of some 20 um."""
-BINS = 25
+TRIED_EVERY = 4
+"""Ticks of a stroke between places at which a slope is taken."""
 WIDENINGS = 8
 """Rounds in which intervals are widened; each takes most of what is too steep."""
-STROKE_TICKS = 4000
-LEAST_SHARE = 0.05
-"""Of a stroke's largest torque; the cost of derating is compared where torque is above."""
 
 
 @dataclass(frozen=True)
 class Needs:
     """What a package asks of the loop, within its torque limit.
 
-    ``stiffness`` (N m/rad): largest elastic slope of torque over the opening, found at ``opening``
-    (rad) and ``contact`` (m). ``drop_Nm``: largest drop of torque as a crack runs. ``damper``
-    (N m s/rad): largest damping of the material. ``friction_Nm``: largest rendered friction.
+    ``stiffness`` (N m/rad): largest elastic slope of torque over the opening, at about ``opening``
+    (rad) and ``contact`` (m): of a drawn plate a proved bound, else the largest that is found.
+    ``found`` is the largest that is found in any case. ``drop_Nm``: largest drop of torque as a
+    crack runs. ``damper`` (N m s/rad): largest damping of the material, a bound as ``stiffness``
+    is. ``friction_Nm``: largest rendered friction.
     """
 
     stiffness: float
@@ -37,6 +40,7 @@ class Needs:
     drop_Nm: float
     damper: float
     friction_Nm: float
+    found: float
 
 
 def needs_of(tables: ModelTables, torque_limit: float) -> Needs:
@@ -47,7 +51,7 @@ def needs_of(tables: ModelTables, torque_limit: float) -> Needs:
     """
     quiet = replace(tables, render_friction=False)
     smooth, teeth = Kernel(replace(quiet, kappa=1.0)), Kernel(quiet)
-    found = Needs(0.0, tables.opening_max, tables.contact_min, 0.0, 0.0, _friction(tables))
+    found = Needs(0.0, tables.opening_max, tables.contact_min, 0.0, 0.0, _friction(tables), 0.0)
     for opening in np.linspace(tables.opening_min, tables.opening_max, OPENINGS):
         for contact in np.linspace(tables.contact_min, tables.contact_max, CONTACTS):
             smooth.reset(float(contact))
@@ -71,51 +75,55 @@ def needs_of(tables: ModelTables, torque_limit: float) -> Needs:
                 found = replace(
                     found, stiffness=slope, opening=float(opening), contact=float(settled)
                 )
-    return found
+    return replace(found, found=found.stiffness)
 
 
 def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) -> Needs:
     """What a package with a drawn plate asks of the loop; without pieces as `needs_of`.
 
-    Each piece is a uniform sheet of its toughest strip. Those that a blade can press at once add
-    up, each at its own worst, which a stack reaches where all are worst at one place. Slopes are
-    found on a grid: in random steps the largest was up to 7 % above. ``drop_Nm`` leaves out the
-    drop at a weaker strip and where a piece is cut through.
+    ``stiffness`` and ``damper`` are the proved bounds of `package.plate_slopes` over all pieces
+    that can be pressed at once, ``found`` the largest slope in the strokes that cut the plate
+    (`felt_cost.plate_strokes`). ``drop_Nm`` is found at 48 openings: within a strip, at the border
+    of one that a running crack goes on into, and where a piece is cut through, added up over
+    pieces that can be pressed at once. What is pressed beyond the blade's tip is not in it.
     """
     if not pieces:
         return needs_of(tables, torque_limit)
-    each = []
-    for piece in pieces:
-        energy = max(strip.fracture_energy_J_per_m for strip in piece.strips) / piece.scale
-        sheet = replace(tables, upper_face=piece.upper_face_m, fracture_energy=energy)
-        each.append(needs_of(sheet, torque_limit / piece.scale))
-    reach = _pressed_m(tables, pieces)
-    scales = [piece.scale for piece in pieces]
-
-    def together(amounts: Sequence[float]) -> float:
-        own = [scale * amount for scale, amount in zip(scales, amounts, strict=True)]
-        return largest_overlap(pieces, reach, own)
-
-    worst = each[int(np.argmax([s * one.stiffness for s, one in zip(scales, each, strict=True)]))]
-    return replace(
-        worst,
-        stiffness=together([one.stiffness for one in each]),
-        drop_Nm=together([one.drop_Nm for one in each]),
-        damper=together([one.damper for one in each]),
+    friction = _friction(tables)
+    slopes = PlateSlopes(tables, torque_limit + friction, pieces)
+    steepest = slopes.bound("opening")
+    damper = slopes.bound("rate").value if tables.rate_damping > 0.0 else 0.0
+    return Needs(
+        stiffness=steepest.value,
+        opening=steepest.opening,
+        contact=steepest.contact,
+        drop_Nm=largest_drop(tables, torque_limit, pieces),
+        damper=damper,
+        friction_Nm=friction,
+        found=_found_on(tables, torque_limit, pieces),
     )
 
 
-def _pressed_m(tables: ModelTables, pieces: Sequence[Piece]) -> float:
-    """Most length (m) of material along the cut that lies below a blade's edge at once.
+def stiffness_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) -> float:
+    """The stiffness of `needs_on` alone."""
+    if not pieces:
+        return needs_of(tables, torque_limit).stiffness
+    return PlateSlopes(tables, torque_limit + _friction(tables), pieces).bound("opening").value
 
-    Between the place where it stands deepest and the one where it leaves the highest face: the
-    depth of the response's table, and what faces differ in height, over the least slope.
-    """
-    beta = tables.opening_min / tables.moving_blades
-    slope = np.tan(beta + np.arctan(float(tables.edge.slope.min())))
-    faces = [piece.upper_face_m for piece in pieces]
-    depth = float(tables.response.x[-1]) + max(faces) - min(faces)
-    return float(min(depth / max(slope, 1e-6), tables.tip_station))
+
+def _found_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) -> float:
+    """The largest slope of the torque (N m/rad) where blades open a little, along the strokes."""
+    quiet = replace(tables, render_friction=False)
+    model, found = PiecesModel(quiet, pieces), 0.0
+    for opening, advance, counts in plate_strokes(quiet, pieces):
+        model.step_many(opening[~counts], 0.0, advance[~counts])
+        places = np.repeat(opening[counts][::TRIED_EVERY], 3)
+        places[1::3] += STEP_RAD
+        torque = model.step_many(places, 0.0, advance[-1])["torque"].astype(np.float64)
+        at, opened = torque[0::3], torque[1::3]
+        slope = (at - opened)[at <= torque_limit] / STEP_RAD
+        found = max(found, float(np.max(slope, initial=0.0)))
+    return found
 
 
 def softened(tables: ModelTables, steepest: float) -> ModelTables:
@@ -149,30 +157,6 @@ def _steepest_inside(width: Array, rise: Array, slope: Array) -> Array:
     )
     inside = first + turn * (2.0 * second + 3.0 * turn * third)
     return np.asarray(np.maximum(inside, np.maximum(first, last)) / width)
-
-
-def felt_change(tables: ModelTables, other: ModelTables, torque_limit: float) -> float:
-    """Relative rms difference of torque, averaged over its ripple, in one closing stroke.
-
-    Torque is held to its limit, as it is rendered, and averaged in 25 bins of opening. The blades
-    close over the scene's openings: on a sheet whose near edge is at the scene's nearest contact,
-    or, where nothing is cut, at the middle of its contacts. Zero where no torque is felt.
-    """
-    one, two = (np.minimum(_stroke(each), torque_limit) for each in (tables, other))
-    felt = one > LEAST_SHARE * one.max()
-    if not felt.any() or one.max() <= 0.0:
-        return 0.0
-    return float(np.sqrt(np.mean((two - one)[felt] ** 2) / np.mean(one[felt] ** 2)))
-
-
-def _stroke(tables: ModelTables) -> Array:
-    quiet = replace(tables, render_friction=False)
-    kernel = Kernel(quiet)
-    pressed = 0.5 * (tables.contact_min + tables.contact_max)
-    kernel.reset(tables.contact_min if tables.fracture_energy > 0.0 else pressed)
-    opening = np.linspace(tables.opening_max, tables.opening_min, STROKE_TICKS)
-    torque = kernel.step_many(opening, 0.0, 0.0)["torque"].astype(np.float64)
-    return np.asarray(torque.reshape(BINS, -1).mean(axis=1))
 
 
 def _friction(tables: ModelTables) -> float:
