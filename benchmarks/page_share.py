@@ -27,13 +27,13 @@ from typing import Any
 
 import numpy as np
 from playwright.sync_api import Browser, CDPSession, Page
+from tests.browser import open_browser
 
 from scissorcal.prototype.document import page_of, policy_of
 from scissorcal.prototype.server import PrototypeServer
 from scissorcal.recording import Recording, RecordingWriter, read_recording
-from scissorcal.workday.workspace import Workspace
 from scissorcal.workday.runs.prototype import workspace_scene
-from tests.browser import open_browser
+from scissorcal.workday.workspace import Workspace
 
 VIEW = {"width": 1280, "height": 900}
 SETTLES_s = 1.5

@@ -7,6 +7,7 @@ the equations of the residuals, and stays within the stated misfit of the closed
 
 import json
 from collections.abc import Callable
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 FILE = Path(__file__).parents[1] / "golden" / "edges.json"
-MOST_PIECES, MISFIT_M, SMOOTHING = 16, 2e-5, 1e-3
+MOST_PIECES, WANTED_M, LARGEST_M, SMOOTHING = 16, 5e-6, 2e-5, 1e-3
 PLACES = 41
 
 Array = NDArray[np.float64]
@@ -49,15 +50,18 @@ def solved(points: Array, pieces: int) -> tuple[Array, Array]:
 
 def curve(points: Array, at: Array) -> dict[str, Any]:
     start, end = points[0, 0], points[-1, 0]
+    found = []
     for pieces in range(1, MOST_PIECES + 1):
         spline = BSpline(*solved(points, pieces), 3)
         misfit = float(np.max(np.abs(spline(points[:, 0]) - points[:, 1])))
-        if misfit <= MISFIT_M:
-            inside = np.clip(at, start, end)
-            tilt = spline.derivative()(inside)
-            offset = spline(inside) + tilt * (at - inside)  # straight on beyond both ends
-            return {"pieces": pieces, "offset_m": offset.tolist(), "slope": tilt.tolist()}
-    raise AssertionError("no golden curve is refused")
+        found.append((misfit, pieces, spline))
+    enough = [one for one in found if one[0] <= WANTED_M]
+    misfit, pieces, spline = enough[0] if enough else min(found, key=itemgetter(0))
+    assert misfit <= LARGEST_M, "no golden curve is refused"
+    inside = np.clip(at, start, end)
+    tilt = spline.derivative()(inside)
+    offset = spline(inside) + tilt * (at - inside)  # straight on beyond both ends
+    return {"pieces": pieces, "offset_m": offset.tolist(), "slope": tilt.tolist()}
 
 
 def case(title: str, stations: Any, law: Law, exact: bool = False) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """An edge through points, as one spline: the rule by which drawn blades become a curve."""
 
+from operator import itemgetter
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -10,6 +12,9 @@ Array = NDArray[np.float64]
 
 FEWEST_POINTS, MOST_POINTS = 3, 200
 MOST_PIECES = 16
+WANTED_MISFIT_M = 5e-6
+"""Of a sheet of paper, whose indentation is some 0.1 mm, 9 um cost 2 % of the torque, 4 um 1 %."""
+
 LARGEST_MISFIT_M = 2e-5
 SMOOTHING = 1e-3
 """Weight of each third difference of the spline's weights against one point."""
@@ -23,8 +28,8 @@ def edge_through(points_m: ArrayLike) -> tuple[Edge, float]:
     Knots are even from the first station to the last, which is the blade's length. The weights are
     least squares over the points, with ``SMOOTHING`` on their third differences, which leaves
     parabolas as they are. Of 1 to 16 pieces the fewest are taken that leave no point by more than
-    0.02 mm. Raises ValueError, a sentence, where no such edge is there, or it is steeper than
-    80 deg.
+    0.005 mm, else those that leave them least. Raises ValueError, a sentence, where that is more
+    than 0.02 mm, or the edge is steeper than 80 deg.
 
     >>> edge, misfit = edge_through([[0.0, -0.008], [0.03, -0.007], [0.07, -0.005]])
     >>> len(edge.spline_m), bool(misfit < 1e-8)
@@ -34,17 +39,18 @@ def edge_through(points_m: ArrayLike) -> tuple[Edge, float]:
     refuse_unfit(points)
     station, offset = points.T
     start, end = float(station[0]), float(station[-1])
-    misfit = np.inf
+    found: list[tuple[Edge, float]] = []
     for pieces in range(1, MOST_PIECES + 1):
         weights = _weights(station, offset, pieces + FEWEST - 1)
         edge = Edge("spline", 0.0, 0.0, end, spline_m=tuple(weights.tolist()), spline_start_m=start)
-        misfit = float(np.max(np.abs(edge.offset_at(station) - offset)))
-        if misfit <= LARGEST_MISFIT_M:
+        found.append((edge, float(np.max(np.abs(edge.offset_at(station) - offset)))))
+        if found[-1][1] <= WANTED_MISFIT_M:
             break
-    else:
+    edge, misfit = min(found, key=itemgetter(1))
+    if not misfit <= LARGEST_MISFIT_M:
         raise ValueError(
-            f"a smooth edge of {MOST_PIECES} pieces leaves the points by {misfit * 1e3:.3g} mm, "
-            f"more than {LARGEST_MISFIT_M * 1e3:g} mm: smooth corners and notches out"
+            f"a smooth edge of up to {MOST_PIECES} pieces leaves the points by {misfit * 1e3:.3g} "
+            f"mm, more than {LARGEST_MISFIT_M * 1e3:g} mm: smooth corners and notches out"
         )
     if float(edge.steepest) > STEEPEST:
         raise ValueError("the edge is steeper than 80 deg on the blade: check its points")
