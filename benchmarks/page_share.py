@@ -88,17 +88,17 @@ def main() -> None:
 
 def show(found: list[dict[str, Any]], cases: list[str]) -> None:
     """Medians over the rounds, in percent of a processor; frames and charts a second."""
-    print("".join(f"{name:>15}" for name in ("", *COLUMNS)))
+    print(f"{'':>9}" + "".join(f"{name:>19}" for name in COLUMNS))
     for case in cases:
-        line = f"{case:>15}"
+        line = f"{case:>9}"
         for name in COLUMNS:
             values = [one[name] for one in found if one["case"] == case and name in one]
             if not values:
-                line += f"{'':>15}"
+                line += f"{'':>19}"
                 continue
             scale = 1.0 if name in ("frames", "charts") else 100.0
             middle, low, high = (f"{scale * f(values):.1f}" for f in (statistics.median, min, max))
-            line += f"{f'{middle} ({low}-{high})':>15}" if len(values) > 1 else f"{middle:>15}"
+            line += f"{f'{middle} ({low}-{high})':>19}" if len(values) > 1 else f"{middle:>19}"
         print(line)
 
 
