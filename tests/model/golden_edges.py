@@ -51,7 +51,7 @@ def solved(points: Array, pieces: int) -> tuple[Array, Array]:
 def curve(points: Array, at: Array) -> dict[str, Any]:
     start, end = points[0, 0], points[-1, 0]
     found = []
-    for pieces in range(1, MOST_PIECES + 1):
+    for pieces in range(1, min(MOST_PIECES, max(1, len(points) - 3)) + 1):
         spline = BSpline(*solved(points, pieces), 3)
         misfit = float(np.max(np.abs(spline(points[:, 0]) - points[:, 1])))
         found.append((misfit, pieces, spline))
@@ -115,6 +115,20 @@ def refusals() -> list[dict[str, Any]]:
             ([[-0.02, 0.0], [-0.01, 0.0], [0.0, 0.0]], "last above 0"),
             ([[0.0, 0.0], [0.01, 0.1], [0.02, 0.25]], "steeper than 80"),
             (zigzag, "pieces leaves"),
+            # few points that many weights would run through, 96 mm away between them
+            (
+                [
+                    [0.0, -8e-3],
+                    [1e-3, -7.9e-3],
+                    [2e-3, -8e-3],
+                    [3e-3, -7.95e-3],
+                    [0.07, -5.5e-3],
+                    [0.075, -5.4e-3],
+                ],
+                "3 pieces leaves",
+            ),
+            ([[0.0, 0.0], [0.01, -0.1], [0.02, -0.25]], "steeper than 80"),
+            ([], "3 to 200"),
         )
     ]
 

@@ -24,26 +24,29 @@ const THIRD_DIFFERENCE = [-1, 3, -3, 1];
 
 /**
  * The spline through points, of the fewest pieces (1 to 16) that leave no point by more than 0.005 mm,
- * else of those that leave them least.
+ * else of those that leave them least. Of n points at most n - 3 pieces: with more weights than points the
+ * misfit would say nothing.
  *
  * Least squares of the points, with the weights' third differences held small, which leaves parabolas
- * as they are. An Error, a sentence, where that is more than 0.02 mm or it is steeper than 80 deg.
+ * as they are. An Error, a sentence, where it is more than 0.02 mm or the edge is steeper than 80 deg.
  */
 export function splineThrough(points: readonly Place[]): Spline {
   refuseUnfit(points);
   const [start_m, end_m] = [points[0][0], points[points.length - 1][0]];
+  const most = Math.min(MOST_PIECES, Math.max(1, points.length - ORDER + 1));
   let best: Spline | null = null;
-  for (let pieces = 1; pieces <= MOST_PIECES && !(best && best.misfit_m <= WANTED_MISFIT_m); pieces++) {
+  for (let pieces = 1; pieces <= most && !(best && best.misfit_m <= WANTED_MISFIT_m); pieces++) {
     const spline = { start_m, end_m, weights_m: weightsOf(points, pieces + ORDER - 1), misfit_m: Infinity };
     spline.misfit_m = points.reduce((most, [s, e]) => Math.max(most, Math.abs(splineValue(spline, s) - e)), 0);
     if (!best || spline.misfit_m < best.misfit_m) best = spline;
   }
   if (!best || !(best.misfit_m <= LARGEST_MISFIT_m)) {
     throw new Error(
-      `a smooth edge of up to ${MOST_PIECES} pieces leaves the points by ${Number((1e3 * (best?.misfit_m ?? NaN)).toPrecision(3))} mm, `
-      + `more than ${1e3 * LARGEST_MISFIT_m} mm: smooth corners and notches out`);
+      `a smooth edge of up to ${most} pieces leaves the points by ${Number((1e3 * (best?.misfit_m ?? NaN)).toPrecision(3))} mm, `
+      + `more than ${1e3 * LARGEST_MISFIT_m} mm: smooth corners, notches and short waves out, or give more points where it bends`);
   }
-  if (steepestOf(best) > STEEPEST) throw new Error("the edge is steeper than 80 deg on the blade: check its points");
+  const falling = { ...best, weights_m: best.weights_m.map((weight) => -weight) };
+  if (Math.max(steepestOf(best), steepestOf(falling)) > STEEPEST) throw new Error("the edge is steeper than 80 deg on the blade: check its points");
   return best;
 }
 
