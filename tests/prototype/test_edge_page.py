@@ -238,7 +238,10 @@ def test_the_torque_of_blades_from_an_svg_file_is_the_models(
 ) -> None:
     """A longer blade: its material is met beyond the fitted tip, and its picture is as long."""
     file = tmp_path / "blade.svg"
-    places = " L".join(f"{20 + s} {30 - e}" for s, e in BENT_MM)
+    bent, _ = edge_through(1e-3 * np.array(BENT_MM))
+    station = np.linspace(0.0, 82.0, 83)
+    curve = np.column_stack([station, np.round(1e3 * bent.offset_at(1e-3 * station), 4)])
+    places = " L".join(f"{20 + s:.4f} {30 - e:.4f}" for s, e in curve)
     file.write_text(
         '<svg xmlns="http://www.w3.org/2000/svg" width="120mm" viewBox="0 0 120 60">'
         '<circle id="pivot" cx="20" cy="30" r="1"/>'
@@ -248,8 +251,8 @@ def test_the_torque_of_blades_from_an_svg_file_is_the_models(
     shown.page.locator(".design select").first.select_option("edge")
     loaded(shown.page, file)
     drawn = shown.run("() => scissorcal.edge.points_mm")
-    assert drawn == BENT_MM
-    edge, _ = edge_through(1e-3 * np.array(BENT_MM))
+    np.testing.assert_allclose(drawn, curve, atol=1.1e-4)
+    edge, _ = edge_through(1e-3 * np.array(drawn))
     assert_torque(shown, edge, built[1])
     fitted_m = shown.package.manifest.mechanics.tip_station_m
     assert fitted_m < 0.08 < edge.length_m
@@ -290,3 +293,66 @@ def test_an_edge_that_leans_back_is_said_and_gives_no_torque(shown: Shown) -> No
     page.locator("canvas.plain").press("ArrowUp")
     expect(told).to_be_hidden()
     expect(note).to_be_hidden()
+
+
+def test_low_blades_begin_in_front_of_the_sheet_and_cut_it(shown: Shown) -> None:
+    """A piece is met from outside alone: blades that lie in it when it is fresh would never cut."""
+    shown.page.get_by_role("button", name="Draw another edge").click()
+    offset = shown.page.get_by_label("Offset, mm")
+    offset.fill("-15")
+    offset.press("Enter")
+    shown.page.get_by_role("button", name="One stroke").click()
+    shown.page.wait_for_function("() => scissorcal.rig.plays")
+    shown.page.wait_for_function("() => !scissorcal.rig.plays", timeout=60_000)
+    assert shown.run("() => scissorcal.rig.crackMost") > 0.005
+
+
+def test_an_outline_is_its_sides_and_a_bevelled_tip_is_no_arc(shown: Shown, tmp_path: Path) -> None:
+    file = tmp_path / "bevel.svg"
+    file.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="120mm" viewBox="0 0 120 60">'
+        '<circle id="pivot" cx="20" cy="20" r="1"/>'
+        '<path d="M0 20 L0 27 L20 28 L85 25 L100 20 L20 12z"/></svg>',
+        encoding="utf-8",
+    )
+    shown.page.locator(".design select").first.select_option("edge")
+    loaded(shown.page, file)
+    assert "smooth corners" in shown.page.locator(".design .warning").inner_text()
+    assert shown.run("() => scissorcal.edge") is None
+
+
+def kept(page: Page, folder: Path) -> str:
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Save recipe.toml").click()
+    download.value.save_as(folder / "saved.toml")
+    return (folder / "saved.toml").read_text(encoding="utf-8")
+
+
+def test_the_box_and_the_blades_follow_steps_back_and_what_was_taken(
+    shown: Shown, tmp_path: Path
+) -> None:
+    page, box = shown.page, shown.page.get_by_label("cut this drawing")
+    file = tmp_path / "recipe.toml"
+    file.write_text(
+        '[rig.edge]\n# by caliper\nfamily = "line"\noffset_mm = -7\ntaper_deg = 2\n'
+        'length_mm = 70\n[scene]\nplate_pose = "estimated"\n',
+        encoding="utf-8",
+    )
+    loaded(page, file)
+    assert not box.is_checked()
+    page.get_by_role("button", name="Undo").click()
+    assert box.is_checked()
+    page.get_by_role("button", name="Redo").click()
+    assert not box.is_checked()
+    assert "# by caliper" in kept(page, tmp_path)
+    page.get_by_role("button", name="As fitted again").click()
+    again = tomllib.loads(kept(page, tmp_path))
+    assert again["rig"]["edge"]["offset_mm"] == pytest.approx(-8.0)
+    assert "plate" not in again
+    assert box.is_checked()
+    page.get_by_label("Left, mm").fill("-50")
+    page.keyboard.press("Enter")
+    box.uncheck()
+    assert shown.run("() => scissorcal.rig.pieces") is None
+    box.check()
+    assert len(shown.run("() => scissorcal.rig.pieces")) == 1

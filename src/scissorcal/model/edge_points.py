@@ -52,9 +52,9 @@ def edge_through(points_m: ArrayLike) -> tuple[Edge, float]:
     edge, misfit = min(found, key=itemgetter(1))
     if not misfit <= LARGEST_MISFIT_M:
         raise ValueError(
-            f"a smooth edge of up to {most} pieces leaves the points by {misfit * 1e3:.3g} mm, more "
-            f"than {LARGEST_MISFIT_M * 1e3:g} mm: smooth corners, notches and short waves out, or "
-            "give more points where it bends"
+            f"a smooth edge of up to {most} pieces leaves the points by {misfit * 1e3:.3g} mm, "
+            f"more than {LARGEST_MISFIT_M * 1e3:g} mm: smooth corners, notches and short waves "
+            "out, or give more points where it bends"
         )
     falling = replace(edge, spline_m=tuple(-weight for weight in edge.spline_m))
     if max(float(edge.steepest), float(falling.steepest)) > STEEPEST:

@@ -46,7 +46,7 @@ export class App {
   private drawn: Drawn | null = null;
   /** Edge of the blades that a person drew; null: as fitted. */
   private edge: Edge | null = null;
-  private readonly bladesNote = html("p", { class: "note", hidden: true }, "The blades are drawn: both curves are the law with these, the shaded interval and the measured lines are of the blades as fitted.");
+  private readonly bladesNote = html("p", { class: "note", hidden: true }, "The blades are drawn: both curves are the law with these, and sliders and draws of the fitted edge do nothing; the shaded interval and the measured lines are of the blades as fitted.");
   /** Timer of the next picture while the blades stand still, else 0. */
   private resting = 0;
   private stirredAt = 0;
@@ -144,7 +144,7 @@ export class App {
     this.frames.charts += 1;
     if (rig.strokeContact !== this.curvesAt) this.showCurves();
     this.torque.draw(rig);
-    this.time.draw(rig.recent, rig.time, this.panel ? this.panel.recent.columns : null);
+    this.time.draw(rig.recent, rig.time, this.panel && rig.isFollowing ? this.panel.recent.columns : null);
   }
 
   private draw(): void {
@@ -220,7 +220,7 @@ export class App {
       html("label", {}, html("input", { type: "checkbox", change: (event) => changed((event.target as HTMLInputElement).checked) }), label);
     return html("div", { class: "row actions", role: "toolbar", "aria-label": "Hands and views" },
       button("One stroke", () => this.stroke()),
-      button("Strokes", () => this.play(madeHand(this.scene))),
+      button("Strokes", () => this.play(madeHand(this.scene, this.rig.start))),
       ...this.scene.hands.map((hand) => button(`Hand of ${hand.name}`, () => this.play(recordedHand(hand)))),
       button("Fresh sheet", () => this.rig.freshSheet()),
       box("3-D", (isOn) => this.show3d(isOn)), this.bladesBox, box("sound", (isOn) => this.ripple.sound(isOn)), box("gamepad rumble", (isOn) => this.ripple.rumble(isOn)));

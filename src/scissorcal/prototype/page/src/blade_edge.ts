@@ -21,10 +21,10 @@ const FEWEST: Record<Family, number> = { line: 2, arc: 3, points: 3 };
  * lengths along the blade, so that a curve drawn with many points in one place is not pulled there.
  */
 export function edgeThrough(points: Outline, family: Family): Edge {
-  if (family !== "points") return plainThrough(points, family);
   if (points.flat().some((value) => Math.abs(value) > FARTHEST_mm)) {
     throw new Error(`points of an edge lie within ${FARTHEST_mm} mm of the pivot`);
   }
+  if (family !== "points") return plainThrough(points, family);
   const spline = splineThrough(points.map(([s, e]) => [1e-3 * s, 1e-3 * e]));
   return { family, points_mm: points, length_mm: points[points.length - 1][0], spline };
 }

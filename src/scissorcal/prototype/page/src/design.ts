@@ -52,6 +52,7 @@ class Designer {
   } });
   private pieces: Piece[] | null = null;
   private refusal = "";
+  private taken: [Piece[], Applied] | null = null;
   private timer = 0;
 
   constructor(container: HTMLElement, private readonly scene: Scene, private readonly apply: Apply) {
@@ -103,13 +104,7 @@ class Designer {
     this.meet();
     this.refresh();
     if (!isDone) return;
-    this.cuts.checked = true;
-    this.told();
-  }
-
-  /** Cut what was calibrated, whatever is drawn. */
-  private uncut(): void {
-    this.cuts.checked = false;
+    this.cuts.checked = !this.design.isUniform;
     this.told();
   }
 
@@ -121,7 +116,10 @@ class Designer {
 
   private told(): void {
     if (!this.cuts.checked) this.apply(null, null);
-    else if (this.pieces) this.apply(this.pieces, { drawn: this.design.drawn, edge: this.design.drawn.edge });
+    else {
+      if (this.pieces) this.taken = [this.pieces, { drawn: this.design.drawn, edge: this.design.drawn.edge }];
+      if (this.taken) this.apply(...this.taken); // of a plate that is refused, the last that was taken
+    }
   }
 
   /** What the blades meet of the drawing, or why the kernel does not take it. */
@@ -203,9 +201,8 @@ class Designer {
       });
       design.part = found.part;
       design.corner = null;
-      design.replace(found.drawn, true, found.base);
+      design.replace(found.drawn, true, found.base, found.isUniform);
       canvas.fit();
-      if (found.isUniform) this.uncut();
       this.say(found.sentence);
     });
   }

@@ -362,7 +362,7 @@ export class DesignCanvas {
     if (this.tool !== "polygon") return;
     const points = this.begun.filter((point, i, all) => i === 0 || point[0] !== all[i - 1][0] || point[1] !== all[i - 1][1]);
     if (points.length >= (this.draws === "edge" ? 2 : 3)) this.add(points);
-    else this.say("A polygon needs three corners.");
+    else this.say(this.draws === "edge" ? "An edge needs two points." : "A polygon needs three corners.");
   }
 
   private isNear(px: Point, mm: Point, reach = NEAR_px): boolean {

@@ -20,6 +20,8 @@ const TOUGHER = 2;
 interface Step {
   drawn: Drawn;
   base: string | null;
+  /** Whether it is that of a recipe without layers, which is about the uniform sheet. */
+  isUniform: boolean;
 }
 
 /** A drawing with its history. Drawings are never changed, only replaced. */
@@ -33,7 +35,7 @@ export class Design {
   private isOpen = false;
 
   constructor(drawn: Drawn, private readonly changed: (isDone: boolean) => void, base: string | null = null) {
-    this.present = { drawn, base };
+    this.present = { drawn, base, isUniform: false };
   }
 
   get drawn(): Drawn {
@@ -43,6 +45,10 @@ export class Design {
   /** Text of the recipe that the drawing goes into; null: the page makes one. */
   get base(): string | null {
     return this.present.base;
+  }
+
+  get isUniform(): boolean {
+    return this.present.isUniform;
   }
 
   get outline(): Outline {
@@ -57,14 +63,14 @@ export class Design {
   }
 
   /** Replace the drawing. Replacements up to one that is done are one step back. */
-  replace(drawn: Drawn, isDone = true, base = this.base): void {
+  replace(drawn: Drawn, isDone = true, base = this.base, isUniform = false): void {
     if (!this.isOpen) {
       this.before.push(this.present);
       if (this.before.length > MOST_STEPS) this.before.shift();
       this.after.length = 0;
     }
     this.isOpen = !isDone;
-    this.present = { drawn, base };
+    this.present = { drawn, base, isUniform };
     this.settle();
     this.changed(isDone);
   }

@@ -5,6 +5,7 @@ import { boundsOf, moved, Outline, Point } from "./outline";
 import { Shape } from "./svg_file";
 
 const MOST_POINTS = 200; // as a recipe takes them
+const SIDE_mm = 1.5; // a piece of a curve is some 5 mm long
 const STEEP = Math.tan((60 * Math.PI) / 180);
 
 /** Points of station and offset in mm, and what was done to get them. */
@@ -31,7 +32,7 @@ export function edgeIn(name: string, shapes: readonly Shape[]): FoundEdge {
   if (!widest || !(widthOf(widest.outline) > 0)) throw new Error(`${name} has no line or outline that could be an edge.`);
   const [dx, dy] = pivot ? middleOf(pivot.outlines.flat()) : [0, 0];
   const placed = moved(widest.outline, -dx, -dy);
-  const whole = rising(widest.isClosed ? trimmed(fromPivotOn(lowerSide(placed))) : placed);
+  const whole = rising(widest.isClosed ? filled(trimmed(fromPivotOn(lowerSide(placed)))) : placed);
   if (whole.length < 2) throw new Error(`${name} has no edge in front of the pivot.`);
   const points = thinned(whole).map(([s, e]): Point => [rounded(s, 4), rounded(e, 4)]);
   return { points, sentence: told(widest.isClosed, pivot !== undefined, points, whole) };
@@ -48,7 +49,7 @@ function told(isClosed: boolean, hasPivot: boolean, points: Outline, whole: Outl
 function left(points: Outline, whole: Outline): string {
   if (points.length === whole.length) return "";
   try {
-    return `, all left by up to ${(1e3 * misfit(whole, edgeThrough(points, "points"))).toPrecision(2)} µm`;
+    return `; the curve through them leaves those left out by up to ${(1e3 * misfit(whole, edgeThrough(points, "points"))).toPrecision(2)} µm`;
   } catch {
     return ""; // the panel says why it is no edge
   }
@@ -103,6 +104,19 @@ function trimmed(points: Outline): Outline {
   while (from < to && isSteep(points[from], points[from + 1])) from++;
   while (to > from && isSteep(points[to - 1], points[to])) to--;
   return points.slice(from, to + 1);
+}
+
+/** With points on long sides: an outline is its sides, and an edge that leaves them is another one. */
+function filled(points: Outline): Outline {
+  const reach = Math.max(SIDE_mm, widthOf(points) / (MOST_POINTS - 20));
+  return points.flatMap((point, i): Outline => {
+    const next = points[i + 1];
+    if (!next) return [point];
+    const parts = Math.max(1, Math.ceil((next[0] - point[0]) / reach));
+    return Array.from({ length: parts }, (_, k): Point => [
+      point[0] + (k / parts) * (next[0] - point[0]), point[1] + (k / parts) * (next[1] - point[1]),
+    ]);
+  });
 }
 
 function rising(points: Outline): Outline {

@@ -83,7 +83,7 @@ export function oneStroke(scene: Scene, from: Pose): Script {
 }
 
 /** Strokes as a lab makes them: close, open, move on by what was cut, over and over. */
-export function madeHand(scene: Scene, strokes = 3): Script {
+export function madeHand(scene: Scene, start: Pose, strokes = 3): Script {
   const [closed, open] = scene.opening_rad;
   const half = durationOf(open - closed, scene);
   const [near, far] = scene.contact_m;
@@ -94,7 +94,7 @@ export function madeHand(scene: Scene, strokes = 3): Script {
     const within = time - number * (2 * half + 0.3);
     const share = within < half ? within / half : Math.max(0, 2 - within / half);
     const moving = Math.min(Math.max((within - 2 * half) / 0.3, 0), 1);
-    return { opening: open - (open - closed) * eased(Math.min(share, 1)), advance: -near - 0.2 * (far - near) + step * (number + moving) };
+    return { opening: open - (open - closed) * eased(Math.min(share, 1)), advance: Math.min(-near - 0.2 * (far - near), start.advance) + step * (number + moving) };
   };
 }
 

@@ -19,6 +19,7 @@ export interface Parts {
 
 const LEVELS = 9; // as scissorcal.package.average has them
 const EVEN = 1e-6;
+const PLACES = 400; // on the edge
 
 export function asFitted(scene: Scene): Law {
   const tables: Tables = {};
@@ -97,6 +98,20 @@ export class Average {
       return each[below][i] + (place - below) * (each[below + 1][i] - each[below][i]);
     });
   }
+}
+
+/** Nearest place (m from the pivot) beyond which open blades stand above the sheet; the tip's where they do nowhere. */
+export function freeFrom(scene: Scene, law: Law): number {
+  const beta = scene.opening_rad[1] / scene.moving_blades;
+  const [sine, cosine, length] = [Math.sin(beta), Math.cos(beta), bladeLength(law)];
+  let free = length * cosine;
+  for (let i = PLACES; i >= 0; i--) {
+    const s = (length * i) / PLACES;
+    const e = heldValue(law.tables.edge, s);
+    if (s * sine + e * cosine < scene.upper_face_m) break;
+    free = s * cosine - e * sine;
+  }
+  return free;
 }
 
 /** Length of the blades, m. */

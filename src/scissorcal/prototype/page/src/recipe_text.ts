@@ -2,6 +2,7 @@
 
 import { parse } from "smol-toml";
 import { edgeOfTable } from "./blade_edge";
+import { plainSheet } from "./design_state";
 import { AT } from "./kernel";
 import { tableOf } from "./law";
 import { areaOf, Outline } from "./outline";
@@ -36,19 +37,42 @@ export function recipeText(drawn: Drawn, scene: Scene, base: string | null): str
   refuseUnfit(drawn);
   let text = base ?? recipeOf(scene, drawn.edge);
   if (drawn.edge_refused) throw new Error(`The points of the blades are no edge yet, so no recipe can hold them: ${drawn.edge_refused.sentence}.`);
-  if (base !== null && drawn.edge) text = withTable(text, "rig.edge", edgeText(drawn.edge, edgeIn(parsed(text))));
+  if (base !== null) text = withEdge(text, drawn.edge ?? (base === scene.recipe ? null : fittedEdge(scene)));
   text = withoutTables(text, (name) => name === "plate.layers" || name.startsWith("plate.layers."));
   const known = parsed(text);
   const plate = (known.plate ?? {}) as Toml;
   const line = drawn.layers.length ? drawn.cut_line_mm : 0;
   if (line !== Number(plate.cut_line_mm ?? 0)) text = withCutLine(text, line);
-  const layers = drawn.layers.map(layerText).join("\n");
+  const isPlain = base !== null && plate.layers === undefined && isPlainSheet(drawn, scene);
+  const layers = isPlain ? "" : drawn.layers.map(layerText).join("\n");
+  if (layers && (known.scene as Toml | undefined)?.plate_pose === "estimated") {
+    throw new Error('This recipe estimates where the plate stands (scene.plate_pose = "estimated"), which does not go together with a drawn plate: set it to "known" in a copy of it, and load that.');
+  }
   const whole = layers ? `${text.trimEnd()}\n\n${layers}` : text;
   if (known.plate && (known.plate as Toml).layers !== undefined) {
     throw new Error("This recipe has its plate on one line (inline tables), which cannot be replaced: write [plate] and [[plate.layers]].");
   }
   drawnFromRecipe(whole); // what is saved can be loaded
   return whole;
+}
+
+/** The recipe with another edge; as it stands where it has that edge already. */
+function withEdge(text: string, edge: Edge | null): string {
+  const before = edgeIn(parsed(text));
+  if (!edge || (before && JSON.stringify(edgeOf(before)) === JSON.stringify(edge))) return text;
+  if (before && !/^\s*\[rig\.edge\]/m.test(text)) {
+    throw new Error("This recipe has the blade's edge on one line (an inline table), which cannot be replaced: write [rig.edge].");
+  }
+  return withTable(text, "rig.edge", edgeText(edge, before));
+}
+
+function fittedEdge(scene: Scene): Edge {
+  return edgeOfTable(tableOf(unpack(scene.tables.edge)), scene.blade_length_m);
+}
+
+/** Whether nothing is drawn: a plain sheet is what a recipe without layers has. */
+function isPlainSheet({ layers }: Drawn, scene: Scene): boolean {
+  return JSON.stringify(layers) === JSON.stringify(plainSheet(calibratedOf(scene), scene.blade_length_m).layers);
 }
 
 /** The drawing of a recipe; an Error with a sentence where it is none, or has outlines in files. */
@@ -107,7 +131,7 @@ function layerText(layer: Layer): string {
 /** A recipe of the page's scene: what plan asks for, all else by default. */
 function recipeOf(scene: Scene, edge: Edge | null): string {
   const { thickness_m, fracture_energy_J_per_m } = calibratedOf(scene);
-  const own = (): Edge => edgeOfTable(tableOf(unpack(scene.tables.edge)), scene.blade_length_m);
+  const own = (): Edge => fittedEdge(scene);
   const range = (values: readonly number[], factor: number): string => `[${values.map((value) => shown(factor * value)).join(", ")}]`;
   const toughness = Math.max(fracture_energy_J_per_m, 1e-6) / thickness_m;
   const name = (scene.name.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^[^A-Za-z0-9]+/, "") || "scene").slice(0, 54);

@@ -2,7 +2,7 @@
 
 import { AT, Kernel, Step } from "./kernel";
 import { Coupling, Pose, Script } from "./hand";
-import { bladeLength, Law } from "./law";
+import { asFitted, bladeLength, freeFrom, Law } from "./law";
 import { Piece } from "./pieces";
 import { Scene } from "./scene";
 import { RigSamples } from "./socket";
@@ -27,6 +27,7 @@ export interface Sample {
 }
 
 const MOST_STEPS = 100; // a frame, so that a page that slept does not catch up
+const FREE_m = 0.001; // from the blades to the sheet in front of them
 const KEPT_s = 8;
 const EVERY = 4; // ticks from one kept sample to the next
 const STILL_m = 1e-9; // in a tick
@@ -65,9 +66,12 @@ export class Rig {
   private coupling: Coupling | null = null;
   private followed = { recording: "", time: 0, quiet_s: Infinity };
 
+  /** Where the blades are over a fresh sheet: open, and free of it. */
+  start: Pose;
+
   constructor(readonly scene: Scene, module: WebAssembly.Module) {
     this.kernels = { fitted: new Kernel(module), whatIf: new Kernel(module) };
-    this.pose = this.wanted = startOf(scene);
+    this.start = this.pose = this.wanted = startOf(scene, asFitted(scene));
     this.bladeLength_m = scene.blade_length_m;
     this.turnedAt = this.pose.opening;
     this.strokeContact = -this.pose.advance;
@@ -84,6 +88,7 @@ export class Rig {
     kernel.putCracks(cracks);
     this.sound[which] = isSound;
     this.bladeLength_m = bladeLength(law);
+    if (which === this.active) this.start = startOf(this.scene, law);
     if (which === this.active && isSound) {
       this.coupling = new Coupling(this.scene, law, largestTorque);
       this.rest();
@@ -110,7 +115,7 @@ export class Rig {
     this.script = null;
     this.kernels.fitted.reset();
     this.kernels.whatIf.reset();
-    if (!this.isFollowing) this.pose = this.wanted = startOf(this.scene);
+    if (!this.isFollowing) this.pose = this.wanted = this.start;
     this.recent = [];
     this.rest();
     this.beginStroke();
@@ -266,8 +271,8 @@ function none(): Energy {
   return { hand: 0, stored: 0, fracture: 0, arrest: 0, friction: 0 };
 }
 
-/** Open, with the material's edge a quarter into the range of contacts. */
-function startOf(scene: Scene): Pose {
+/** Open, with the material's edge a quarter into the range of contacts, or farther where the blades are free of it. */
+function startOf(scene: Scene, law: Law): Pose {
   const [near, far] = scene.contact_m;
-  return { opening: scene.opening_rad[1], advance: -(near + 0.25 * (far - near)) };
+  return { opening: scene.opening_rad[1], advance: -Math.max(near + 0.25 * (far - near), freeFrom(scene, law) + FREE_m) };
 }

@@ -20,6 +20,7 @@ export class RigPanel {
       connected: (isConnected, sentence) => {
         if (isConnected) return;
         this.state.textContent = sentence;
+        this.following.textContent = "";
         refilled(this.buttons);
       },
       state: (state) => this.show(state),
