@@ -34,6 +34,28 @@ def test_a_field_of_another_kind_is_refused_by_name(name: str, value: object) ->
         return
     stated, kind = getattr(found, name), Identity.__annotations__[name]
     assert type(stated) is kind or (kind is float and math.isfinite(stated))
+    assert kind is not int or stated >= 0
+
+
+HUGE = 10**400
+HASHES = ("", "0", "B09FB42A7F073F64", "0x9fb42a7f073f64", "b09f_b42a_7f073f", " 9fb42a7f073f64 ",
+          "-b09fb42a7f073f6", "b09fb42a7f073f6", "b09fb42a7f073f640", "b09fb42a7f073f64\n",
+          "\u0661" * 16, 0, 12724852165138669412)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [(name, sign * HUGE) for name in sorted(FACTS) for sign in (1, -1)]
+    + [(name, -1) for name in sorted(FACTS) if Identity.__annotations__[name] is int]
+    + [("schema_hash", value) for value in HASHES]
+    + [("torque_limit", math.nan), ("torque_limit", -math.inf), ("torque_limit", True)],
+    ids=lambda one: repr(one)[:24],
+)
+def test_what_no_rig_states_is_refused(name: str, value: object) -> None:
+    """JSON's integers may be of any length, and its hash any text that Python takes as a number."""
+    read = json.loads(json.dumps({**FACTS, name: value}))
+    with pytest.raises(InputError, match=f"^a.mcap is damaged.* no {name} "):
+        identity_of(read, "a.mcap")
 
 
 def outcome(facts: dict[str, object]) -> Identity | str:

@@ -1,6 +1,7 @@
 """What a recording holds of its rig: the identity that it stated, its motor's sign, its probe."""
 
-import math
+import re
+import sys
 from collections.abc import Mapping
 from typing import Any, get_type_hints
 
@@ -37,8 +38,8 @@ def identity_of(facts: Mapping[str, Any], source: str) -> Identity:
     found: dict[str, Any] = {"nonce_echo": 0}
     for name, kind in get_type_hints(Identity).items():
         value = facts.get(name)
-        if name == "schema_hash" and isinstance(value, str):
-            value = _hexadecimal(value)
+        if name == "schema_hash":
+            value = _hash(value)
         if name not in found and not _is(value, kind):
             raise InputError(
                 f"{source or 'The recording'} is damaged: what it holds of its rig has no {name} "
@@ -50,13 +51,15 @@ def identity_of(facts: Mapping[str, Any], source: str) -> Identity:
 
 
 def _is(value: Any, kind: type) -> bool:
-    if kind is float and not isinstance(value, bool):
-        return isinstance(value, int | float) and math.isfinite(value)
+    """Whether a value is one that the wire bears; JSON's integers may be of any length."""
+    if kind is float:
+        return type(value) in (int, float) and abs(value) <= sys.float_info.max
+    if kind is int:
+        return type(value) is int and 0 <= value < 1 << 64
     return type(value) is kind
 
 
-def _hexadecimal(text: str) -> int | None:
-    try:
-        return int(text, 16)
-    except ValueError:
-        return None
+def _hash(value: Any) -> int | None:
+    """A hash of 64 bits as `identity_facts` writes it; None for any other text or value."""
+    written = isinstance(value, str) and re.fullmatch("[0-9a-f]{16}", value)
+    return int(value, 16) if written else None
