@@ -14,6 +14,14 @@ if TYPE_CHECKING:
 
 ID, PART, TITLE = "scene-edge", "scene", "The edge of the recipe"
 STATIONS = 301
+CAPTIONS = {
+    "recipe": "The points of the recipe, and the curve that model, fits and package use.",
+    "photographs": (
+        "The points of the recipe, and the curve that plans the captures; model, fits and package "
+        "use the edge of the photographs."
+    ),
+}
+"""By the source of the edge."""
 
 
 def stated_edge_panel(recipe: Recipe) -> Panel:
@@ -43,6 +51,6 @@ def stated_edge_panel(recipe: Recipe) -> Panel:
             curve("edge", 1e3 * station, 1e3 * edge.offset_at(station), "blue"),
             points("points of the recipe", given[:, 0], given[:, 1], "ink"),
         ),
-        "The points of the recipe, and the curve that model, fits and package use.",
+        CAPTIONS[recipe.rig.edge.source],
     )
     return Panel(ID, PART, TITLE, edge_sentence(recipe), (row,), (chart,))
