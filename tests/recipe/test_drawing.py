@@ -120,6 +120,10 @@ def test_a_contour_within_another_is_a_hole(tmp_path: Path) -> None:
         (f'{HEAD}<rect width="1" height="1" transform="{"scale(1)" * 200}"/></svg>', "1600 char"),
         (f'{HEAD}<defs><rect width="1" height="1"/></defs></svg>', "no closed shape"),
         (f'{HEAD}<rect width="1" height="1" style="display: none"/></svg>', "no closed shape"),
+        (f'{HEAD[:-1]} display="none"><rect width="1" height="1"/></svg>', "no closed shape"),
+        (f'{HEAD[:-1]} style="display:none"><g/></svg>', "no closed shape"),
+        (f"{HEAD}<style>a{{color:red;visibility:hidden}}</style></svg>", "that hides something"),
+        (f"{HEAD}<style>DISPLAY : none</style></svg>", "that hides something"),
         (f'{HEAD}<path d="M0 0L nan 5L5 nan z"/></svg>', "no closed shape"),
         (f'{HEAD}<rect width="1e300" height="1e300"/></svg>', "no places"),
         (f'{HEAD}<rect width="1" height="1" transform="scale(1e400)"/></svg>', "no places"),
@@ -197,6 +201,38 @@ def test_what_only_looks_like_a_shape_is_passed_over(tmp_path: Path) -> None:
     moved = '<rect id="a" width="2" height="1" style="fill:red; transform: translate(3px,4px)"/>'
     (contour,) = drawn(tmp_path, other + clip + moved).contours
     assert contour.min(axis=0) * 1e3 == pytest.approx([3.0, 4.0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "style",
+    [
+        "/* x */display:none",
+        "display:/* x */none",
+        "fill:red;/* ; */display : none",
+        "display:none/* not closed ; display:inline",
+        "/* a */visibility:hidden/* b */",
+    ],
+)
+def test_a_comment_in_the_style_of_a_shape_is_none_of_it(tmp_path: Path, style: str) -> None:
+    hidden = f'<rect id="a" width="9" height="9" style="{style}"/>'
+    shown = '<rect id="a" width="2" height="1" style="/* display:none; */fill:red"/>'
+    (contour,) = drawn(tmp_path, hidden + shown).contours
+    assert np.ptp(contour, axis=0) * 1e3 == pytest.approx([2.0, 1.0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "backface-visibility: hidden",
+        "content-visibility:hidden",
+        "--display: none",
+        "-x-display:none",
+        "display: inline",
+    ],
+)
+def test_a_style_of_another_property_is_taken(tmp_path: Path, said: str) -> None:
+    style = f"<style>rect {{ {said} }}</style>"
+    assert drawn(tmp_path, f'{style}<rect id="a" width="2" height="1"/>').contours
 
 
 def test_page_and_recipe_read_as_much_of_a_drawing() -> None:

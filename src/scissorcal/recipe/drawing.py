@@ -38,7 +38,9 @@ _SIZES = ("x", "y", "width", "height", "r", "rx", "ry", "cx", "cy", "viewBox")
 _PLACES = (*_POINTS, *_SIZES, "id", "transform", "preserveAspectRatio")
 _NOT_SHOWN = ("defs", "symbol", "clipPath", "mask", "pattern", "marker", "metadata")
 _HIDDEN = ("hidden", "collapse")
-_HIDES = re.compile(r"\bdisplay\s*:\s*none\b|\bvisibility\s*:\s*(hidden|collapse)\b", re.IGNORECASE)
+_HIDES = re.compile(
+    r"(?<![\w-])(display\s*:\s*none|visibility\s*:\s*(hidden|collapse))\b", re.IGNORECASE
+)
 _COMMENT = re.compile(r"/\*.*?(\*/|$)", re.DOTALL)
 _NUMBERS = {"h": 1, "v": 1, "c": 6, "s": 4, "q": 4, "a": 7}
 """That a segment of a path takes; any other takes 2."""
@@ -48,6 +50,7 @@ _TOO_MANY = (
     f"it has an outline of more than {MOST_POINTS:,} points, or {MOST_POINTS_OF_FILE:,} in all: "
     "draw it simpler"
 )
+_NO_SHAPE = "it has no closed shape: draw path, rect, circle, ellipse or polygon"
 _NO_PLACES = "it has numbers that are no places on a plate"
 _STYLE_HIDES = (
     "it has a <style> that hides something: remove what is hidden, or hide it by the attribute "
@@ -118,6 +121,8 @@ def parse_drawing(data: bytes) -> list[list[Any]]:
     from svgelements import SVG, Length, Path, Shape
 
     data = _plain(data)
+    if not data:  # its root is hidden
+        raise ValueError(_NO_SHAPE)
     millimetre = float(Length("1mm").value(ppi=96.0))  # in 1/96 inch, as svgelements rounds it
     parsed = SVG.parse(io.BytesIO(data), reify=False, ppi=96.0)
     found: list[list[Any]] = []
@@ -135,7 +140,7 @@ def parse_drawing(data: bytes) -> list[list[Any]]:
             if len(contour) >= 3:
                 found.append([index, name, contour])
     if not found:
-        raise ValueError("it has no closed shape: draw path, rect, circle, ellipse or polygon")
+        raise ValueError(_NO_SHAPE)
     return found
 
 
@@ -259,7 +264,8 @@ def _property(attributes: dict[str, str], key: str) -> str:
 
 
 def _style(attributes: dict[str, str]) -> dict[str, str]:
-    said = (one.partition(":") for one in attributes.get("style", "").split(";"))
+    text = _COMMENT.sub(" ", attributes.get("style", ""))
+    said = (one.partition(":") for one in text.split(";"))
     return {key.strip().lower(): value.strip() for key, _, value in said}
 
 
