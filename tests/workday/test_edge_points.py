@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scissorcal.device.capture import capture_cut, capture_friction, open_writer
 from scissorcal.device.crossing import Blade
 from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.sim.blade import BladeOnSheet
+from scissorcal.device.sim.blade import blade_on
 from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.material import Sheet
 from scissorcal.device.sim.specimen import Specimen
@@ -135,7 +135,7 @@ def errors(package: ModelPackage) -> tuple[float, float]:
     opening = np.linspace(high, low, count)
     quiet = replace(package.tables, render_friction=False)
     step = Kernel(quiet).step_many(opening, np.full(count, -0.3), np.full(count, -nearest))
-    cut = Cut(BladeOnSheet(rig), Sheet(rig.material, None))
+    cut = Cut(blade_on(rig), Sheet(rig.material, None))
     touches = [cut.move_to(float(theta), -nearest) for theta in opening]
     torque = np.array([touch.torque for touch in touches])
     force = np.array([-touch.drive for touch in touches])
@@ -159,7 +159,7 @@ def test_plan_says_what_the_points_are(workspace: Workspace) -> None:
 def test_strokes_are_planned_along_the_curve(workspace: Workspace) -> None:
     """Deepest and widest openings are those at which the curve meets the ends of the scene."""
     recipe = workspace.recipe()
-    blade, rig = Blade.of(recipe), BladeOnSheet(truth())
+    blade, rig = Blade.of(recipe), blade_on(truth())
     for opening in np.radians([12.0, 20.0, 30.0, 45.0]):
         assert blade.crossing(opening) == pytest.approx(rig.crossing(float(opening)), abs=1.5e-4)
 

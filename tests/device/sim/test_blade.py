@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.device.sim.blade import APART, BladeOnSheet
+from scissorcal.device.sim.blade import APART, blade_on
 from tests.device.sim.build import specimen
 
 EDGES = {
@@ -20,7 +20,7 @@ EDGES = {
 @pytest.mark.parametrize("edge", EDGES.values(), ids=EDGES.keys())
 @pytest.mark.parametrize("response", ["power", "exponential"])
 def test_forces_are_the_gradient_of_the_stored_energy(edge: dict, response: str) -> None:
-    blade = BladeOnSheet(specimen(blade=edge, material={"response": response}))
+    blade = blade_on(specimen(blade=edge, material={"response": response}))
     step = 1e-7
     for opening in (0.2, 0.5, 0.8):
         for deeper in (1e-4, 4e-4):
@@ -33,7 +33,7 @@ def test_forces_are_the_gradient_of_the_stored_energy(edge: dict, response: str)
 
 
 def test_the_gradient_holds_while_the_tip_lets_go() -> None:
-    blade = BladeOnSheet(specimen(blade={"tip_fade_mm": 2.0}))
+    blade = blade_on(specimen(blade={"tip_fade_mm": 2.0}))
     step, opening = 1e-8, 0.1396
     for beyond in (-1e-4, 3e-4, 1e-3, 1.7e-3):
         beta = opening / 2
@@ -58,7 +58,7 @@ def test_the_gradient_holds_while_the_tip_lets_go() -> None:
 def test_the_edge_is_found_where_the_turned_blade_puts_it(
     station: float, opening: float, curvature: float, taper: float
 ) -> None:
-    blade = BladeOnSheet(
+    blade = blade_on(
         specimen(blade={"family": "arc", "curvature_per_m": curvature, "taper_deg": taper})
     )
     beta = opening / 2
@@ -70,19 +70,19 @@ def test_the_edge_is_found_where_the_turned_blade_puts_it(
 
 @given(opening=st.floats(0.14, 0.95), curvature=st.floats(-0.5, 3.0))
 def test_at_the_crossing_the_edge_just_touches(opening: float, curvature: float) -> None:
-    blade = BladeOnSheet(specimen(blade={"family": "arc", "curvature_per_m": curvature}))
+    blade = blade_on(specimen(blade={"family": "arc", "curvature_per_m": curvature}))
     assert blade.indentation(opening, blade.crossing(opening)) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_an_edge_that_never_comes_up_has_no_crossing() -> None:
-    blade = BladeOnSheet(specimen(blade={"family": "arc", "curvature_per_m": -4.0}))
+    blade = blade_on(specimen(blade={"family": "arc", "curvature_per_m": -4.0}))
     assert blade.crossing(0.15) == math.inf
-    parallel = BladeOnSheet(specimen(blade={"taper_deg": -10.0}))
+    parallel = blade_on(specimen(blade={"taper_deg": -10.0}))
     assert parallel.crossing(0.15) == math.inf
 
 
 def test_edges_that_open_towards_the_tip_do_not_advance_the_crack() -> None:
-    blade = BladeOnSheet(specimen(blade={"taper_deg": -10.0}))
+    blade = blade_on(specimen(blade={"taper_deg": -10.0}))
     assert blade.touch(0.15, 0.03).drive < 0.0
 
 
@@ -107,7 +107,7 @@ def test_forces_are_finite_everywhere(
     thickness: float,
     response: str,
 ) -> None:
-    blade = BladeOnSheet(
+    blade = blade_on(
         specimen(
             blade={"offset_mm": offset, "taper_deg": taper},
             mechanism={"opening_range_deg": (0.1, 85.0)},

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.device.sim.blade import BladeOnSheet
+from scissorcal.device.sim.blade import blade_on
 from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.hand import Phase
 from scissorcal.device.sim.material import Sheet
@@ -218,7 +218,7 @@ def test_a_moving_cut_has_the_mean_torque_of_the_reference() -> None:
 @pytest.mark.parametrize("kappa", [1.0, 0.9, 0.5])
 def test_each_run_of_the_crack_ends_exactly_at_its_arrest(kappa: float) -> None:
     truth = specimen(material={"kappa": kappa, "toughness_variation": 0.1})
-    blade = BladeOnSheet(truth)
+    blade = blade_on(truth)
     cut = Cut(blade, Sheet(truth.material, np.random.default_rng(2)))
     runs = 0
     for opening in np.radians(np.linspace(45.0, 12.0, 3_000)).tolist():

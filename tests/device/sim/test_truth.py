@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from scissorcal.device.sim.blade import BladeOnSheet
+from scissorcal.device.sim.blade import blade_on
 from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.material import Sheet
 from scissorcal.device.sim.specimen import Specimen, load_specimen
@@ -22,7 +22,7 @@ THROUGH_PIVOT = {"offset_mm": 0.0, "taper_deg": 0.0, "length_mm": 200.0}
 
 def torque_of_stroke(truth: Specimen, opening: np.ndarray) -> np.ndarray:
     """Torque (N m) along a slow stroke on a fresh sheet of mean toughness, ripple included."""
-    cut = Cut(BladeOnSheet(truth), Sheet(truth.material, None))
+    cut = Cut(blade_on(truth), Sheet(truth.material, None))
     return np.array([cut.move_to(float(theta), -0.01).torque for theta in opening])
 
 
@@ -43,7 +43,7 @@ def test_a_smooth_cut_with_an_edge_through_the_pivot(
             "response_force_N": force,
         },
     )
-    blade = BladeOnSheet(truth)
+    blade = blade_on(truth)
     for opening in (0.3, 0.6, 0.9):
         contact = tip_at_drive(blade, opening, 0.5)
         if moving == "both":
@@ -57,7 +57,7 @@ def test_a_smooth_cut_with_an_edge_through_the_pivot(
 
 def test_beyond_the_settled_place_the_torque_is_the_responses_own() -> None:
     truth = specimen()
-    blade = BladeOnSheet(truth)
+    blade = blade_on(truth)
     inner = tip_at_drive(blade, 0.4, 0.5)
     outer = tip_at_drive(blade, 0.4, 0.5 * 0.75)
     just_touching = outer + 0.9 * (blade.crossing(0.4) - outer)

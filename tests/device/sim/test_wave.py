@@ -1,6 +1,8 @@
 """A simulated edge with a wave on it: its curve, its own solver, and one energy for all forces."""
 
+import copy
 import math
+import pickle
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.interpolate import CubicSpline
 
-from scissorcal.device.sim.blade import APART, BladeOnSheet, WavyBladeOnSheet
+from scissorcal.device.sim.blade import APART, BladeOnSheet, WavyBladeOnSheet, blade_on
 from scissorcal.device.sim.plate import PlateContact
 from scissorcal.device.sim.rig import VirtualRig
 from scissorcal.device.sim.specimen import Blade, TouchedPlate
@@ -64,7 +66,7 @@ def test_the_edge_is_found_where_the_turned_blade_puts_it(
     made: tuple[float, list[tuple[float, float]]], share: float, opening: float, moving: str
 ) -> None:
     length, points = made
-    blade = BladeOnSheet(specimen(blade={"wave_mm": points, "length_mm": length, "moving": moving}))
+    blade = blade_on(specimen(blade={"wave_mm": points, "length_mm": length, "moving": moving}))
     assert isinstance(blade, WavyBladeOnSheet)
     beta, station = opening / blade.moving, 1e-3 * length * share
     edge = blade.offset + station * blade.taper + blade.wave.at(station)[0]
@@ -76,7 +78,7 @@ def test_the_edge_is_found_where_the_turned_blade_puts_it(
 @pytest.mark.parametrize("response", ["power", "exponential"])
 @pytest.mark.parametrize("moving", ["both", "upper"])
 def test_forces_are_the_gradient_of_the_stored_energy(response: str, moving: str) -> None:
-    blade = BladeOnSheet(specimen(blade=WAVY | {"moving": moving}, material={"response": response}))
+    blade = blade_on(specimen(blade=WAVY | {"moving": moving}, material={"response": response}))
     step = 1e-7
     for opening in (0.2, 0.5, 0.8):
         for deeper in (1e-4, 4e-4):
@@ -89,7 +91,7 @@ def test_forces_are_the_gradient_of_the_stored_energy(response: str, moving: str
 
 
 def test_the_gradient_holds_while_the_tip_lets_go() -> None:
-    blade = BladeOnSheet(specimen(blade=WAVY | {"tip_fade_mm": 2.0}))
+    blade = blade_on(specimen(blade=WAVY | {"tip_fade_mm": 2.0}))
     assert isinstance(blade, WavyBladeOnSheet)
     step, opening = 1e-8, 0.1396
     for beyond in (-1e-4, 3e-4, 1e-3, 1.7e-3):
@@ -106,8 +108,8 @@ def test_the_gradient_holds_while_the_tip_lets_go() -> None:
 
 
 def test_a_wave_of_nothing_changes_nothing() -> None:
-    flat = BladeOnSheet(specimen(blade={"wave_mm": [(0, 0), (40, 0), (75, 0)]}))
-    line = BladeOnSheet(specimen())
+    flat = blade_on(specimen(blade={"wave_mm": [(0, 0), (40, 0), (75, 0)]}))
+    line = blade_on(specimen())
     assert isinstance(flat, WavyBladeOnSheet)
     assert not isinstance(line, WavyBladeOnSheet)
     for opening in (0.15, 0.4, 0.9):
@@ -123,7 +125,7 @@ def test_beyond_its_crossing_the_edge_is_above_the_sheet(
 ) -> None:
     length, points = made
     offset = -0.1 * length
-    blade = BladeOnSheet(
+    blade = blade_on(
         specimen(blade={"wave_mm": points, "length_mm": length, "offset_mm": max(offset, -50.0)})
     )
     crossing = blade.crossing(opening)
@@ -136,8 +138,8 @@ def test_beyond_its_crossing_the_edge_is_above_the_sheet(
 
 def test_waves_that_come_up_twice_are_crossed_nearest_the_tip() -> None:
     heights = [(s, 4.0 * math.exp(-(((s - 30.0) / 6.0) ** 2))) for s in range(0, 76, 3)]
-    blade = BladeOnSheet(specimen(blade={"wave_mm": heights, "taper_deg": 0.0}))
-    line = BladeOnSheet(specimen(blade={"taper_deg": 0.0}))
+    blade = blade_on(specimen(blade={"wave_mm": heights, "taper_deg": 0.0}))
+    line = blade_on(specimen(blade={"taper_deg": 0.0}))
     assert blade.crossing(0.35) == pytest.approx(line.crossing(0.35), abs=1e-3)
     assert blade.indentation(0.35, blade.crossing(0.35)) == pytest.approx(0.0, abs=1e-12)
     assert blade.indentation(0.35, 0.030) < 0.0 < blade.indentation(0.35, 0.040)
@@ -184,7 +186,7 @@ def test_an_elastic_pad_returns_its_energy() -> None:
 
 def test_the_mean_torque_is_that_of_the_settled_tip() -> None:
     truth = specimen(blade=WAVY, material={"kappa": 1.0})
-    blade = BladeOnSheet(truth)
+    blade = blade_on(truth)
     for opening in (0.3, 0.6, 0.9):
         contact = tip_at_drive(blade, opening, 0.5)
         touch = blade.touch(opening, contact)
@@ -211,3 +213,19 @@ def test_the_tip_that_touches_a_plate_is_on_the_wave() -> None:
 def test_what_is_no_wave_is_refused(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ValidationError, match=words):
         specimen(blade=changes)
+
+
+@pytest.mark.parametrize("edge", [{}, WAVY], ids=["line", "wave"])
+def test_a_blade_is_copied_and_pickled(edge: dict[str, Any]) -> None:
+    blade = blade_on(specimen(blade=edge))
+    for twin in (copy.copy(blade), copy.deepcopy(blade), pickle.loads(pickle.dumps(blade))):
+        assert type(twin) is type(blade)
+        assert twin.touch(0.5, 0.03) == blade.touch(0.5, 0.03)
+        assert twin.crossing(0.5) == blade.crossing(0.5)
+
+
+def test_a_blade_is_of_the_class_of_its_edge() -> None:
+    with pytest.raises(ValueError, match="has a wave"):
+        BladeOnSheet(specimen(blade=WAVY))
+    with pytest.raises(ValueError, match="has no wave"):
+        WavyBladeOnSheet(specimen())

@@ -39,7 +39,7 @@ APART = Touch(0.0, 0.0, 0.0, 0.0, 0.0)
 class BladeOnSheet:
     """The exact contact law of one specimen. Angles in rad, lengths in m, forces in N.
 
-    Of a specimen whose blade has a wave it makes a :class:`WavyBladeOnSheet`.
+    Made by :func:`blade_on`, as a blade with a wave is a :class:`WavyBladeOnSheet`.
     """
 
     __slots__ = (
@@ -53,12 +53,10 @@ class BladeOnSheet:
         "upper_face",
     )
 
-    def __new__(cls, specimen: Specimen) -> "BladeOnSheet":
-        wavy = cls is BladeOnSheet and specimen.blade.wave_mm
-        return super().__new__(WavyBladeOnSheet if wavy else cls)
-
     def __init__(self, specimen: Specimen) -> None:
         blade = specimen.blade
+        if blade.wave_mm is not None and type(self) is BladeOnSheet:
+            raise ValueError("this blade has a wave: make it with blade_on")
         self.moving = float(blade.moving_blades)
         self.offset = blade.offset_mm * 1e-3
         self.taper = math.tan(math.radians(blade.taper_deg))
@@ -173,7 +171,7 @@ class WavyBladeOnSheet(BladeOnSheet):
         super().__init__(specimen)
         wave = specimen.blade.wave
         if wave is None:
-            raise ValueError("this blade has no wave: make a BladeOnSheet of it")
+            raise ValueError("this blade has no wave: make it with blade_on")
         self.wave: Wave = wave
 
     def crossing(self, opening: float) -> float:
@@ -239,6 +237,11 @@ class WavyBladeOnSheet(BladeOnSheet):
         middle = reach / run
         off = abs(away(middle)[0]) / (run - wave.largest[1] * sine) + CLOSE_M
         return _root(away, middle - off, middle + off)
+
+
+def blade_on(specimen: Specimen) -> BladeOnSheet:
+    """The contact law of a specimen, whether or not its blade has a wave."""
+    return (BladeOnSheet if specimen.blade.wave_mm is None else WavyBladeOnSheet)(specimen)
 
 
 def _root(law: Callable[[float], tuple[float, float]], low: float, high: float) -> float:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.device.sim.axis import Axis
-from scissorcal.device.sim.blade import BladeOnSheet
+from scissorcal.device.sim.blade import blade_on
 from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.friction import DryFriction
 from scissorcal.device.sim.hand import VirtualHand
@@ -71,7 +71,7 @@ class VirtualRig:
         self.specimen = specimen
         sensor_rng, hand_rng, self._sheet_rng = rng.spawn(3)
         mechanism = specimen.mechanism
-        self.blade = BladeOnSheet(specimen)
+        self.blade = blade_on(specimen)
         self.hand = VirtualHand(specimen, self.blade, TICK_S, hand_rng)
         self.sensors = SensorSet(specimen.sensors, TICK_S, sensor_rng)
         step = TICK_S / SUBSTEPS

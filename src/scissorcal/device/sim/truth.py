@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scissorcal.device.sim.blade import BladeOnSheet
+from scissorcal.device.sim.blade import BladeOnSheet, blade_on
 from scissorcal.device.sim.friction import DryFriction
 from scissorcal.device.sim.specimen import Specimen
 
@@ -62,7 +62,7 @@ def true_parameters(
     }
     material = specimen.material
     reference = reference_indentation_m or material.reference_m
-    truth["response_force"] = BladeOnSheet(specimen).response.force(reference)
+    truth["response_force"] = blade_on(specimen).response.force(reference)
     truth["response_exponent"] = material.response_exponent
     if material.response == "exponential":
         truth["response_exponent"] *= reference / material.reference_m
@@ -87,7 +87,7 @@ def average_torque(
     and a stop of the crack. With ``friction`` the friction at ``opening`` (rad) and ``rate``
     (rad/s) is added, which resists the motion.
     """
-    blade = BladeOnSheet(specimen)
+    blade = blade_on(specimen)
     joint = DryFriction.of_joint(specimen.mechanism.friction)
     energy, kappa = specimen.material.fracture_energy, specimen.material.kappa
 
