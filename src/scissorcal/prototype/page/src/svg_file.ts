@@ -20,7 +20,7 @@ const NAMESPACE = "http://www.w3.org/2000/svg";
 const DRAWN = new Set(["path", "rect", "circle", "ellipse", "polygon", "polyline"]);
 const KINDS = new Set(["cut", "edge", "outline", "hole", "region"]);
 /** What these hold is not itself in the picture. */
-const HIDES = /\bdisplay\s*:\s*none\b|\bvisibility\s*:\s*(hidden|collapse)\b/i;
+const HIDES = /(?<![\w-])(display\s*:\s*none|visibility\s*:\s*(hidden|collapse))\b/i;
 const COMMENT = /\/\*[\s\S]*?(\*\/|$)/g;
 const NOT_SHOWN = "defs, symbol, clipPath, mask, pattern, marker, metadata, foreignObject";
 
@@ -227,7 +227,7 @@ function isHidden(element: Element): boolean {
 
 /** A property of an element, in its style or else as an attribute; "" where it is inherited. */
 function propertyOf(element: Element, name: string): string {
-  const said = (element.getAttribute("style") ?? "").split(";").map((one) => one.split(":"));
+  const said = (element.getAttribute("style") ?? "").replace(COMMENT, " ").split(";").map((one) => one.split(":"));
   const own = said.filter(([key]) => key.trim().toLowerCase() === name).pop();
   const value = (own ? own[1] ?? "" : element.getAttribute(name) ?? "").split("!")[0].trim().toLowerCase();
   return value === "inherit" ? "" : value;
