@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 STROKES, PLACES = 24, 160
 TURN_RAD, MOVE_M = 4e-4, 2e-5
 BAD = int(StepFlag.ADVANCED | StepFlag.INVALID | StepFlag.BEYOND_TIP)
-OUTSIDE = int(StepFlag.OUT_OF_RANGE | StepFlag.INVALID | StepFlag.BEYOND_TIP)
+OUTSIDE = int(StepFlag.INVALID | StepFlag.BEYOND_TIP)
 
 
 @dataclass(frozen=True)
@@ -103,6 +103,7 @@ def _stroke(case: Case, place: float) -> Array:
     opening[1::5] += TURN_RAD
     advance = np.full(len(opening), place)
     advance[3::5] -= MOVE_M
+    behind = _presses_behind(case, place, opening, advance).reshape(-1, 5)
     step = model.step_many(opening, 0.0, advance)
     opening, advance = (one.astype(np.float32).astype(np.float64) for one in (opening, advance))
     torque, force = (step[name].astype(np.float64).reshape(-1, 5) for name in ("torque", "force"))
@@ -110,7 +111,7 @@ def _stroke(case: Case, place: float) -> Array:
     turn = np.diff(opening.reshape(-1, 5), axis=1)[:, 0]
     move = -np.diff(advance.reshape(-1, 5), axis=1)[:, 2]
     counts = (flags[:, 0] & OUTSIDE == 0) & np.all(flags[:, 1:] & BAD == 0, axis=1)
-    counts &= torque.max(axis=1) <= case.limit
+    counts &= (torque.max(axis=1) <= case.limit) & ~behind.any(axis=1)
     rows = (
         np.abs(torque[:, 0] - torque[:, 1]) / turn,
         np.maximum(
@@ -124,6 +125,18 @@ def _stroke(case: Case, place: float) -> Array:
     rise = np.diff(torque[:, 0]) / -np.diff(closing)
     best.append(float(np.max(rise[both], initial=0.0)) if smooth else 0.0)
     return np.array(best)
+
+
+def _presses_behind(case: Case, place: float, opening: Array, advance: Array) -> NDArray[np.bool_]:
+    """Where a piece is pressed before the scene's nearest contact; beyond its farthest counts."""
+    behind = np.zeros(len(opening), dtype=np.bool_)
+    for piece in case.pieces:
+        model = PiecesModel(case.tables, (piece,))
+        model.step_many(np.full(200, 1.4), 0.0, np.linspace(place - 0.1, place, 200))
+        step = model.step_many(opening, 0.0, advance)
+        touches = step["flags"] & int(StepFlag.TOUCHING) != 0
+        behind |= touches & (step["contact"] < case.tables.contact_min)
+    return behind
 
 
 def _edge(rng: np.random.Generator) -> Table:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.kernel import Kernel, ModelTables, Piece, Strip, Table
+from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel, StepFlag, Strip, Table
 from scissorcal.package.plate_slopes import PlateSlopes
 from tests.kernel.zoo import arc_edge, line_edge, make_tables, power_response
 from tests.package.random_plates import Steepest, random_case, steepest
@@ -104,6 +104,7 @@ def test_a_straight_pad_has_its_closed_form() -> None:
         fracture_energy=0.0,
         upper_face=face,
         opening_min=0.02,
+        tip_station=0.0601,
     )
     places = np.linspace(tables.contact_min, tables.contact_max, 4000)
     best = 0.0
@@ -170,3 +171,39 @@ def test_nothing_that_touches_has_no_slope() -> None:
     low = Piece(0.0, 1e-6, 1.0, (Strip(0.1, 0.6),))
     above = replace(tables, edge=line_edge(0.01, 0.0))
     assert PlateSlopes(above, LIMIT, [low]).bound("opening").value == 0.0
+
+
+def largest_in_a_stroke(tables: ModelTables, pieces: list[Piece], place: float) -> float:
+    """The largest slope in one stroke through a fresh plate, at any contact."""
+    model = PiecesModel(tables, pieces)
+    model.step_many(np.full(200, 1.4), 0.0, np.linspace(place - 0.1, place, 200))
+    opening = np.repeat(np.linspace(tables.opening_max - 4e-4, tables.opening_min, 300), 2)
+    opening[1::2] += 4e-4
+    step = model.step_many(opening, 0.0, place)
+    turn = np.diff(opening.astype(np.float32).astype(np.float64).reshape(-1, 2), axis=1)[:, 0]
+    torque = step["torque"].astype(np.float64).reshape(-1, 2)
+    lost = (step["flags"] & int(StepFlag.INVALID | StepFlag.BEYOND_TIP) != 0).reshape(-1, 2)
+    counts = ~lost.any(axis=1) & (torque.max(axis=1) <= 20.0)
+    return float(np.max(((torque[:, 0] - torque[:, 1]) / turn)[counts]))
+
+
+@pytest.mark.parametrize(
+    ("kappa", "strips", "layer"),
+    [
+        (1.0, (Strip(0.04, 0.1), Strip(0.3, 3.0)), None),
+        (1.0, (Strip(0.04, 0.1), Strip(0.3, 0.0)), None),
+        (0.5, (Strip(0.3, 0.6),), None),
+        (1.0, (Strip(0.3, 0.6),), Strip(0.3, 100.0)),
+    ],
+)
+def test_strokes_that_end_beyond_the_scene_are_within_the_bound(
+    kappa: float, strips: tuple[Strip, ...], layer: Strip | None
+) -> None:
+    """Cracks held at a border, ripples, and a layer that begins beyond the farthest contact."""
+    changes = {"kappa": kappa, "contact_max": 0.04, "opening_min": 0.15, "tip_station": 0.075}
+    tables = make_tables(response=power_response(exponent=1.0), **changes)
+    pieces = [Piece(0.0, FACE, 1.0, strips)]
+    if layer is not None:
+        pieces.append(Piece(0.026, 2.0 * FACE, 1.0, (layer,)))
+    found = max(largest_in_a_stroke(tables, pieces, -at) for at in np.linspace(0.016, 0.039, 8))
+    assert found <= ROUNDED * PlateSlopes(tables, 20.0, pieces).bound("opening").value

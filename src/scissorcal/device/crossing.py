@@ -57,7 +57,7 @@ class Blade:
         """Opening (rad) within ``openings`` at which the edge crosses at ``contact`` (m), or None.
 
         The inverse of :meth:`crossing`, which falls as the blades open, by interpolation on a
-        fine grid.
+        fine grid. None, too, in a gap of it, where the edge rises through the face twice.
         """
         grid = np.linspace(*openings, GRID)
         reach = self.crossing(grid, above)
@@ -65,7 +65,8 @@ class Blade:
         grid, reach = grid[known], reach[known]
         if len(grid) < 2 or np.any(np.diff(reach) >= 0) or not reach[-1] <= contact <= reach[0]:
             return None
-        return float(np.interp(contact, reach[::-1], grid[::-1]))
+        found = float(np.interp(contact, reach[::-1], grid[::-1]))
+        return found if np.isfinite(self.crossing(found, above)) else None
 
     def cutting_range(
         self, openings: tuple[float, float], contacts: tuple[float, float]

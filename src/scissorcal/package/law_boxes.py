@@ -18,6 +18,10 @@ Indices = NDArray[np.int64]
 
 STEEPEST = 0.05
 """Least run of the edge per length, as in the kernel: below, an edge stands upright."""
+COARSER = 1.05
+"""Ratio of neighbouring stations well beyond the scene, ..."""
+LEAST_M = 1e-3
+"""... from here on at the nearest."""
 PARTS = 16
 """Cells of the response's slope between two knots."""
 
@@ -220,7 +224,9 @@ def first_boxes(tables: ModelTables, edge: EdgeOver, ends: Array, stations: int)
     if not np.isfinite(high):
         high = max(float(knots[-1]), tables.contact_max) + 1.0
     fine = np.linspace(tables.contact_min, 1.2 * tables.contact_max, stations)
-    places = np.concatenate([knots, fine])
+    away = max(1.2 * tables.contact_max, LEAST_M)
+    coarse = away * COARSER ** np.arange(max(np.log(high / away) / np.log(COARSER), 0.0))
+    places = np.concatenate([knots, fine, coarse])
     places = places[(places > low) & (places < high)]
     places = np.unique(np.concatenate([[min(low, high)], places, [high]]))
     count, bins = len(places) - 1, len(ends) - 1

@@ -83,9 +83,11 @@ class _Sheet:
 class PlateSlopes:
     """Bounds of the slopes of a model on a plate of pieces.
 
-    Over the openings of the tables, for cracks at contacts of the tables' range or where they
-    come to rest from there. ``torque_limit`` (N m): places where the torque is above it do not
-    count, as it is held there.
+    Over the openings of the tables, for cracks at any contact from ``contact_min`` to the blade's
+    tip: strokes that begin within the scene press beyond ``contact_max``, too, at any release up to
+    J. A crack that ran through a weak strip is held at the border of a tougher one, a ripple stops
+    at kappa J, the release falls again as blades open, and a layer may begin there.
+    ``torque_limit`` (N m): places where the torque is above it do not count, as it is held there.
     """
 
     def __init__(self, tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) -> None:
@@ -187,17 +189,13 @@ class PlateSlopes:
         force = Span(self.response.at(depth.low), self.response.at(depth.high))
         kept = stand.stands & (depth.high > 0.0) & (stand.x.high >= tables.contact_min)
         most = force.high
-        inside = stand.x.low <= tables.contact_max
         if energy > 0.0:
             releases = stand.slope.low > PARALLEL
             cap = np.where(
                 releases, energy / (self.blades * np.maximum(stand.slope.low, PARALLEL)), np.inf
             )
-            rests = self.blades * most * np.maximum(stand.slope.high, 0.0) >= energy
-            kept &= (force.low <= cap) & (inside | rests)
+            kept &= force.low <= cap
             most = np.minimum(most, cap)
-        else:
-            kept &= inside
         arm = self._arm(stand).low
         cap = np.where(arm > 0.0, limit / np.where(arm > 0.0, arm, 1.0), np.inf)
         kept &= force.low <= cap

@@ -83,9 +83,11 @@ def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) 
 
     ``stiffness`` and ``damper`` are the proved bounds of `package.plate_slopes` over all pieces
     that can be pressed at once, ``found`` the largest slope in the strokes that cut the plate
-    (`felt_cost.plate_strokes`). ``drop_Nm`` is found at 48 openings: within a strip, at the border
-    of one that a running crack goes on into, and where a piece is cut through, added up over
-    pieces that can be pressed at once. What is pressed beyond the blade's tip is not in it.
+    (`felt_cost.plate_strokes`). Were that the larger, by float32 or where a piece is pressed before
+    the scene's nearest contact, ``stiffness`` is it, too. ``drop_Nm`` is found at 48 openings:
+    within a strip, at the border of one that a running crack goes on into, and where a piece is cut
+    through, added up over pieces that can be pressed at once. What is pressed beyond the blade's
+    tip is not in it.
     """
     if not pieces:
         return needs_of(tables, torque_limit)
@@ -93,14 +95,15 @@ def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) 
     slopes = PlateSlopes(tables, torque_limit + friction, pieces)
     steepest = slopes.bound("opening")
     damper = slopes.bound("rate").value if tables.rate_damping > 0.0 else 0.0
+    found = _found_on(tables, torque_limit, pieces)
     return Needs(
-        stiffness=steepest.value,
+        stiffness=max(steepest.value, found),
         opening=steepest.opening,
         contact=steepest.contact,
         drop_Nm=largest_drop(tables, torque_limit, pieces),
         damper=damper,
         friction_Nm=friction,
-        found=_found_on(tables, torque_limit, pieces),
+        found=found,
     )
 
 
@@ -108,7 +111,8 @@ def stiffness_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piec
     """The stiffness of `needs_on` alone."""
     if not pieces:
         return needs_of(tables, torque_limit).stiffness
-    return PlateSlopes(tables, torque_limit + _friction(tables), pieces).bound("opening").value
+    slopes = PlateSlopes(tables, torque_limit + _friction(tables), pieces)
+    return max(slopes.bound("opening").value, _found_on(tables, torque_limit, pieces))
 
 
 def _found_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) -> float:
