@@ -18,7 +18,8 @@ from scissorcal.device.trajectory import (
     usable_opening,
 )
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.recipe.edge import Edge
+from scissorcal.model.edge_points import edge_through
+from scissorcal.recipe.edge import Edge, StatedCurve
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.pace import TURN_ACCELERATION
 from tests.device.conftest import IDENTITY
@@ -208,6 +209,18 @@ def test_the_crossing_is_the_root_of_the_edge() -> None:
         height = station * np.sin(opening) + offset * np.cos(opening)
         assert np.interp(x, along, height) == pytest.approx(blade.upper_face, abs=1e-9)
         assert blade.opening_at(x, (0.1, 0.9)) == pytest.approx(opening, abs=1e-6)
+
+
+def test_no_opening_is_planned_in_a_gap_of_the_crossing() -> None:
+    """A wavy edge rises through the face twice at some openings: there it crosses at no place."""
+    station = np.linspace(0.0, 75.0, 60)
+    offset = -8.0 + 0.035 * station + 2.0 * np.sin(2 * np.pi * station / 40.0 + 1.5)
+    curve = StatedCurve(*edge_through(np.column_stack([station, offset]) * 1e-3))
+    blade, openings = Blade(2, curve, 5e-5), (float(np.radians(4.0)), float(np.radians(50.0)))
+    planned = [blade.opening_at(x, openings) for x in np.linspace(0.012, 0.062, 80)]
+    known = np.array([one for one in planned if one is not None])
+    assert 0 < len(known) < len(planned)
+    assert np.isfinite(blade.crossing(known)).all()
 
 
 def points_edge(lift_mm: float = 0.0) -> dict[str, object]:

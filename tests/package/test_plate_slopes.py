@@ -44,7 +44,7 @@ def test_no_slope_of_a_random_plate_is_above_its_bound(seed: int) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=2000, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_no_slope_of_many_random_plates_is_above_its_bound(seed: int) -> None:
     compare(seed)
@@ -188,20 +188,29 @@ def largest_in_a_stroke(tables: ModelTables, pieces: list[Piece], place: float) 
 
 
 @pytest.mark.parametrize(
-    ("kappa", "strips", "layer"),
+    ("kappa", "law", "least", "strips", "layer"),
     [
-        (1.0, (Strip(0.04, 0.1), Strip(0.3, 3.0)), None),
-        (1.0, (Strip(0.04, 0.1), Strip(0.3, 0.0)), None),
-        (0.5, (Strip(0.3, 0.6),), None),
-        (1.0, (Strip(0.3, 0.6),), Strip(0.3, 100.0)),
+        (1.0, (1.6, 1.45), 0.136, (Strip(0.0325, 0.43), Strip(0.3, 38.0)), None),
+        (1.0, (2.85, 1.27), 0.125, (Strip(0.0574, 0.0335), Strip(0.3, 0.0)), None),
+        (0.5, (2.0, 1.0), 0.15, (Strip(0.3, 0.6),), None),
+        (1.0, (2.0, 1.0), 0.15, (Strip(0.3, 0.6),), Strip(0.3, 100.0)),
     ],
+    ids=["held at a tougher strip", "held at an uncut one", "ripples", "a layer begins beyond"],
 )
 def test_strokes_that_end_beyond_the_scene_are_within_the_bound(
-    kappa: float, strips: tuple[Strip, ...], layer: Strip | None
+    kappa: float,
+    law: tuple[float, float],
+    least: float,
+    strips: tuple[Strip, ...],
+    layer: Strip | None,
 ) -> None:
-    """Cracks held at a border, ripples, and a layer that begins beyond the farthest contact."""
-    changes = {"kappa": kappa, "contact_max": 0.04, "opening_min": 0.15, "tip_station": 0.075}
-    tables = make_tables(response=power_response(exponent=1.0), **changes)
+    tables = make_tables(
+        response=power_response(*law, 1e-2, 30),
+        kappa=kappa,
+        opening_min=least,
+        contact_max=0.04,
+        tip_station=0.075,
+    )
     pieces = [Piece(0.0, FACE, 1.0, strips)]
     if layer is not None:
         pieces.append(Piece(0.026, 2.0 * FACE, 1.0, (layer,)))
