@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel, StepFlag, Strip, Table
 from scissorcal.package.plate_slopes import PlateSlopes
+from scissorcal.render import derating
 from tests.kernel.zoo import arc_edge, line_edge, make_tables, power_response
 from tests.package.random_plates import Steepest, random_case, steepest
 
@@ -216,3 +217,12 @@ def test_strokes_that_end_beyond_the_scene_are_within_the_bound(
         pieces.append(Piece(0.026, 2.0 * FACE, 1.0, (layer,)))
     found = max(largest_in_a_stroke(tables, pieces, -at) for at in np.linspace(0.016, 0.039, 8))
     assert found <= ROUNDED * PlateSlopes(tables, 20.0, pieces).bound("opening").value
+
+
+def test_what_is_needed_is_never_below_what_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = make_tables()
+    assert derating.needs_on(tables, LIMIT, [whole(tables)]).found > 0.0
+    monkeypatch.setattr(derating, "_found_on", lambda *_: 100.0)
+    needs = derating.needs_on(tables, LIMIT, [whole(tables)])
+    assert needs.stiffness == needs.found == 100.0
+    assert derating.stiffness_on(tables, LIMIT, [whole(tables)]) == 100.0
