@@ -8,12 +8,16 @@ from hypothesis import strategies as st
 from scissorcal.model import Edge
 from scissorcal.model.edge_points import LARGEST_MISFIT_M, MOST_POINTS, edge_through
 
+MANY = 60
 BETA = np.radians(np.linspace(3.0, 40.0, 60))
 
 
 @st.composite
 def points(draw: st.DrawFn) -> np.ndarray:
-    """Points of a smooth edge, 10 to 500 mm long, few or many, evenly spread or clustered."""
+    """Points of a smooth edge, 10 to 500 mm long, few or many, evenly spread or clustered.
+
+    Few points state a parabola: they do not show a wave, and the rule refuses what they leave open.
+    """
     length = draw(st.floats(0.01, 0.5))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     count = draw(st.sampled_from([3, 4, 12, 60, MOST_POINTS]))
@@ -22,9 +26,12 @@ def points(draw: st.DrawFn) -> np.ndarray:
     first = -draw(st.sampled_from([0.0, 0.05, 0.3]))
     share = np.unique(np.concatenate([[first], inner[inner > 1e-7], [1.0]]))
     waves = draw(st.floats(0.1, 1.5))
-    size = draw(st.floats(-1.0, 1.0)) * 0.02 / waves
+    size = draw(st.floats(-1.0, 1.0)) * 0.02 / waves if count >= MANY else 0.0
+    bend = draw(st.floats(-0.05, 0.05))
     station = length * share
-    offset = length * (-0.1 + 0.03 * share + size * np.sin(2 * np.pi * waves * share))
+    offset = length * (
+        -0.1 + 0.03 * share + bend * share**2 + size * np.sin(2 * np.pi * waves * share)
+    )
     return np.stack([station, offset], axis=1)
 
 

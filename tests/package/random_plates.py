@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 STROKES, PLACES = 24, 160
 TURN_RAD, MOVE_M = 4e-4, 2e-5
 BAD = int(StepFlag.ADVANCED | StepFlag.INVALID | StepFlag.BEYOND_TIP)
+SAME = 1e-3
+"""Share of the torque by which it may differ when the blades are back at a place."""
 OUTSIDE = int(StepFlag.INVALID | StepFlag.BEYOND_TIP)
 
 
@@ -112,6 +114,9 @@ def _stroke(case: Case, place: float) -> Array:
     move = -np.diff(advance.reshape(-1, 5), axis=1)[:, 2]
     counts = (flags[:, 0] & OUTSIDE == 0) & np.all(flags[:, 1:] & BAD == 0, axis=1)
     counts &= (torque.max(axis=1) <= case.limit) & ~behind.any(axis=1)
+    # a piece that let go on the way to and fro, at the tip or its far edge, is a drop and no slope
+    kept = np.abs(torque[:, 2::2] - torque[:, :1]).max(axis=1)
+    counts &= kept <= SAME * np.abs(torque[:, 0])
     rows = (
         np.abs(torque[:, 0] - torque[:, 1]) / turn,
         np.maximum(
