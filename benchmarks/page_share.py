@@ -14,7 +14,6 @@ The rig is the workspace's newest rendering, written anew into a recording as it
 """
 
 import argparse
-import asyncio
 import json
 import statistics
 import tempfile
@@ -28,6 +27,7 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Browser, CDPSession, Page
 from tests.browser import open_browser
+from tests.prototype.made import running
 
 from scissorcal.prototype.document import page_of, policy_of
 from scissorcal.prototype.server import PrototypeServer
@@ -186,23 +186,8 @@ def served(workspace: Workspace, captures: Path) -> Iterator[str]:
         captures,
         captures.parent,
     )
-    ready, over = threading.Event(), asyncio.Event()
-    loops: list[asyncio.AbstractEventLoop] = []
-
-    async def run() -> None:
-        async with server:
-            loops.append(asyncio.get_running_loop())
-            ready.set()
-            await server.run(over)
-
-    thread = threading.Thread(target=lambda: asyncio.run(run()))
-    thread.start()
-    try:
-        ready.wait()
+    with running(server):
         yield server.url
-    finally:
-        loops[0].call_soon_threadsafe(over.set)
-        thread.join()
 
 
 @contextmanager

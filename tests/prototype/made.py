@@ -2,8 +2,9 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,28 @@ async def a_browser(
         session.ws_connect(url, headers=headers, **how) as socket,
     ):
         yield socket
+
+
+@contextmanager
+def running(server: PrototypeServer) -> Iterator[PrototypeServer]:
+    """A server in a thread, for a browser that is driven from this one."""
+    ready, over = threading.Event(), asyncio.Event()
+    loops: list[asyncio.AbstractEventLoop] = []
+
+    async def run() -> None:
+        async with server:
+            loops.append(asyncio.get_running_loop())
+            ready.set()
+            await server.run(over)
+
+    thread = threading.Thread(target=lambda: asyncio.run(run()))
+    thread.start()
+    try:
+        assert ready.wait(BOUND_s)
+        yield server
+    finally:
+        loops[0].call_soon_threadsafe(over.set)
+        thread.join(BOUND_s)
 
 
 async def heard(

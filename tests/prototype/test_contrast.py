@@ -8,9 +8,9 @@ from playwright.sync_api import Browser
 
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import Scene
-from tests.prototype.test_page_hand import WIDE, browser, open_page, package, scene
+from tests.prototype.test_page_hand import WIDE, open_page, package, scene
 
-__all__ = ["browser", "package", "scene"]
+__all__ = ["package", "scene"]
 
 LEAST = 4.5
 SHOW_ALL = """() => {

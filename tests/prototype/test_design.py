@@ -13,7 +13,6 @@ from playwright.sync_api import Browser
 
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import parse_recipe
-from tests.browser import open_browser
 from tests.prototype.design_bed import EDGE, ENERGY_J_PER_M, THICKNESS_MM, Bed, open_bed
 
 SHEET = [[0, -30], [80, -30], [80, 30], [0, 30]]
@@ -30,12 +29,6 @@ def drawn(*layers: dict[str, Any], cut: float = 0.0, **more: Any) -> dict[str, A
 
 def box(x0: float, y0: float, x1: float, y1: float) -> list[list[float]]:
     return [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

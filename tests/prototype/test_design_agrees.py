@@ -13,18 +13,11 @@ from scissorcal.errors import InputError
 from scissorcal.recipe.drawing import read_drawing
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.plate_layers import plate_pieces
-from tests.browser import open_browser
 from tests.model.drawn import assert_pieces, golden_cases, golden_files, numbers, pieces_of
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design import SHEET, box, drawn, layer
 
 RANDOM = 300
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

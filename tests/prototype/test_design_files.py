@@ -1,6 +1,5 @@
 """Files of the designer: recipes with and without a plate, steps back, plates in SVG files."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.plate_layers import plate_pieces
 from scissorcal.workday.runs.prototype import workspace_plate
 from scissorcal.workday.workspace import create_workspace
-from tests.browser import open_browser
 from tests.model.drawn import numbers
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design_page import HOLED, spans
@@ -24,19 +22,6 @@ format = "scissorcal-recipe/1"
 name = "a-sheet"
 description = "A uniform sheet."
 """
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
-
-
-@pytest.fixture
-def bed(browser: Browser, tmp_path: Path) -> Iterator[Bed]:
-    with open_bed(browser, tmp_path) as found:
-        found.mount()
-        yield found
 
 
 def load(bed: Bed, folder: Path, text: str) -> None:

@@ -1,30 +1,15 @@
 """The designer as a person uses it: by pointer, touch, keys and tables; files and steps back."""
 
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, expect
 
-from tests.browser import open_browser
 from tests.prototype.design_bed import Bed, open_bed
 
 SVG = """<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm" viewBox="0 0 90 60">
 <rect id="plate" x="5" y="4" width="80" height="50"/><circle cx="45" cy="29" r="6"/></svg>"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
-
-
-@pytest.fixture
-def bed(browser: Browser, tmp_path: Path) -> Iterator[Bed]:
-    with open_bed(browser, tmp_path) as found:
-        found.mount()
-        yield found
 
 
 def spans(bed: Bed) -> list[tuple[float, float]]:

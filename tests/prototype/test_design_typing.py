@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from tests.browser import open_browser
 from tests.prototype.design_bed import Bed, open_bed
 
 HOLD = """() => {
@@ -20,12 +19,6 @@ HOLD = """() => {
     for (const f of all) f();
   };
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
 
 
 @pytest.fixture

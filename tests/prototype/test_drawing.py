@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from tests.prototype.test_page_hand import browser, close, file, open_page, package, scene
+from tests.prototype.test_page_hand import close, file, open_page, package, scene
 
-__all__ = ["browser", "file", "package", "scene"]
+__all__ = ["file", "package", "scene"]
 
 NOTE = """() => {
   window.noted = { texts: {}, lens: null };

@@ -16,7 +16,6 @@ from scissorcal.model.edge_points import edge_through
 from scissorcal.package.tables import hermite
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import parse_recipe
-from tests.browser import open_browser
 from tests.model.golden_edges import golden
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design import SHEET, box, drawn, layer, recipe_of
@@ -31,12 +30,6 @@ TABLE = """(points) => { const edge = edgeThrough(points, 'points');
   const t = edgeTable(edge, Float32Array.from([0, 0.1]));
   return { x: [...t.x], y: [...t.y], slope: [...t.slope] }; }"""
 WAVE_MM = [[s, -8.0 + 0.03 * s + 0.3 * float(np.sin(s / 9.0))] for s in np.linspace(0, 75, 20)]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

@@ -20,28 +20,15 @@ from scissorcal.package.exact import FitDraws, central_model
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import scene_of
-from tests.browser import open_browser, open_file
+from tests.browser import open_file
 from tests.package.fits import cut_fit, friction_fit, recipe
-from tests.prototype.design_bed import EDGE, Bed, open_bed
+from tests.prototype.design_bed import EDGE, Bed
 
 Array = NDArray[np.float64]
 ROUNDED = 2e-5
 """Of the torque: five roundings of a height of 8 mm, 0.9 nm each, of 0.2 mm of indentation."""
 DENSE = 250
 BENT_MM = [[0.0, -8.0], [15.0, -7.9], [30.0, -6.8], [45.0, -6.3], [60.0, -5.6], [82.0, -5.0]]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
-
-
-@pytest.fixture
-def bed(browser: Browser, tmp_path: Path) -> Iterator[Bed]:
-    with open_bed(browser, tmp_path) as found:
-        found.mount()
-        yield found
 
 
 def applied(bed: Bed) -> Any:

@@ -16,7 +16,7 @@ from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.variations import central_values, variations
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import scene_of
-from tests.browser import Seen, open_browser, open_file
+from tests.browser import Seen, open_file
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.prototype.test_scene import unpacked as read
 
@@ -63,12 +63,6 @@ class Shown:
     def torque(self, opening: Any, rate: float, contact: float) -> Any:
         script = "([openings, rate, contact]) => scissorcal.torqueAt(openings, rate, contact)"
         return np.array(self.run(script, [list(opening), rate, contact]))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

@@ -9,14 +9,13 @@ from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import Scene
 from tests.prototype.test_page_hand import (
     Open,
-    browser,
     file,
     opened,
     package,
     scene,
 )
 
-__all__ = ["browser", "file", "opened", "package", "scene"]
+__all__ = ["file", "opened", "package", "scene"]
 
 AXES = """() => { const { y, N } = scissorcal.time.chart.scales;
   return [[y.min, y.max], [N.min, N.max]]; }"""

@@ -12,17 +12,11 @@ from playwright.sync_api import Browser, Page
 from scissorcal.package import ModelPackage, build_package, open_package
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import Scene, scene_of
-from tests.browser import Seen, open_browser, open_file
+from tests.browser import Seen, open_file
 from tests.package.fits import cut_fit, friction_fit, recipe
 
 WIDE = {"width": 1400, "height": 1000}
 PHONE = {"width": 390, "height": 844}
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

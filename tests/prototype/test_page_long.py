@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from tests.prototype.test_page_hand import Open, browser, file, opened, package, scene
+from tests.prototype.test_page_hand import Open, file, opened, package, scene
 
-__all__ = ["browser", "file", "opened", "package", "scene"]
+__all__ = ["file", "opened", "package", "scene"]
 
 MINUTE = """() => {
   const { rig } = scissorcal, end = rig.time + 60;

@@ -1,6 +1,5 @@
 """In a browser: the page's line to its server, and a page of another site that gets nothing."""
 
-import asyncio
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,9 +12,9 @@ from playwright.sync_api import Browser, Page
 
 from scissorcal.prototype.rig_commands import RigCommand
 from scissorcal.prototype.server import MOST_PAGES, PrototypeServer
-from tests.browser import bundled, open_browser, watch
+from tests.browser import bundled, watch
 
-from .made import a_writer, samples_of
+from .made import a_writer, running, samples_of
 
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; connect-src 'self'"
 REQUEST = "Take everything out."
@@ -65,12 +64,6 @@ window.tried = (async () => {
 </script><body></body>"""
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
-
-
 def until(page: Page, expression: str) -> None:
     """Wait until it is true; the page's policy lets no text be evaluated within the page."""
     for _ in range(1200):
@@ -82,31 +75,15 @@ def until(page: Page, expression: str) -> None:
 
 @contextmanager
 def served(folder: Path, page: str) -> Iterator[PrototypeServer]:
-    """A server in a thread, since the browser is driven from this one."""
-    ready, over = threading.Event(), asyncio.Event()
-    loops: list[asyncio.AbstractEventLoop] = []
+    """A page in which ``SERVER`` stands for the socket, served in a thread."""
     command = RigCommand("render", ("render",), REQUEST)
 
     def page_of(socket: str) -> tuple[str, str]:
         told = f'<script type="application/json" id="server">{{"socket": "{socket}"}}</script>'
         return page.replace("SERVER", told), POLICY
 
-    server = PrototypeServer(page_of, folder / "captures", folder, [command])
-
-    async def run() -> None:
-        async with server:
-            loops.append(asyncio.get_running_loop())
-            ready.set()
-            await server.run(over)
-
-    thread = threading.Thread(target=lambda: asyncio.run(run()))
-    thread.start()
-    try:
-        assert ready.wait(30.0)
+    with running(PrototypeServer(page_of, folder / "captures", folder, [command])) as server:
         yield server
-    finally:
-        loops[0].call_soon_threadsafe(over.set)
-        thread.join(30.0)
 
 
 @contextmanager

@@ -11,19 +11,12 @@ from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Browser
 
-from tests.browser import open_browser
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design import SHEET, box, drawn, layer
 
 Picture = NDArray[np.float64]
 STILL = "() => { window.frames_asked = 0; const ask = requestAnimationFrame;"
 COUNT = f"{STILL} window.requestAnimationFrame = (f) => (frames_asked++, ask(f)); }}"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with open_browser() as found:
-        yield found
 
 
 @pytest.fixture(scope="module")

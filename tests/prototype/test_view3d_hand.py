@@ -10,7 +10,6 @@ from playwright.sync_api import Browser
 from tests.prototype.test_page_hand import (
     WIDE,
     Open,
-    browser,
     close,
     file,
     open_page,
@@ -18,7 +17,7 @@ from tests.prototype.test_page_hand import (
     scene,
 )
 
-__all__ = ["browser", "file", "package", "scene"]
+__all__ = ["file", "package", "scene"]
 
 CAMERA = "() => scissorcal.view3d.orbit.camera.position.toArray()"
 WANTED = "() => scissorcal.rig.wanted"

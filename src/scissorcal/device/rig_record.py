@@ -35,19 +35,15 @@ def identity_of(facts: Mapping[str, Any], source: str) -> Identity:
 
     Raises InputError, which names ``source`` and the field, where one is missing or no number.
     """
-    found: dict[str, Any] = {"nonce_echo": 0}
+    known = {**facts, "nonce_echo": 0, "schema_hash": _hash(facts.get("schema_hash"))}
     for name, kind in get_type_hints(Identity).items():
-        value = facts.get(name)
-        if name == "schema_hash":
-            value = _hash(value)
-        if name not in found and not _is(value, kind):
+        if not _is(known.get(name), kind):
             raise InputError(
                 f"{source or 'The recording'} is damaged: what it holds of its rig has no {name} "
                 "that is a number or text as a rig states it. Capture again, or restore it from a "
                 "backup."
             )
-        found.setdefault(name, value)
-    return Identity(**found)
+    return Identity(**{name: known[name] for name in Identity._fields})
 
 
 def _is(value: Any, kind: type) -> bool:

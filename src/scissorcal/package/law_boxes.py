@@ -19,9 +19,9 @@ Indices = NDArray[np.int64]
 STEEPEST = 0.05
 """Least run of the edge per length, as in the kernel: below, an edge stands upright."""
 COARSER = 1.05
-"""Ratio of neighbouring stations well beyond the scene, ..."""
+"""Ratio of neighbouring stations beyond 1.2 times the farthest contact: boxes may be longer."""
 LEAST_M = 1e-3
-"""... from here on at the nearest."""
+"""The nearest station from which that ratio counts."""
 PARTS = 16
 """Cells of the response's slope between two knots."""
 

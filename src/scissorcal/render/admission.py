@@ -274,7 +274,7 @@ def _reasons(
     place = f"{math.degrees(needs.opening):.0f} deg, contact {needs.contact * 1e3:.0f} mm"
     known = f"at {place}"
     if is_drawn:
-        known += f"; a bound for any motion, {needs.found:.3g} N m/rad are found in strokes"
+        known += f"; a bound over the scene's openings, {needs.found:.3g} are found in strokes"
     return (
         f"The package needs up to {needs.stiffness:.3g} N m/rad ({known}); this rig renders "
         f"{allowed[0]:.2g} N m/rad stably alone and {allowed[1]:.2g} N m/rad in a hand, at "

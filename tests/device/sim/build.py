@@ -1,5 +1,6 @@
 """Specimens for tests: one plain base, and the changes that a test is about."""
 
+import math
 from typing import Any
 
 from scissorcal.device.sim.specimen import Specimen
@@ -51,6 +52,12 @@ QUIET = {
     "force_white_N": 0.0,
     "force_slow_N": 0.0,
 }
+
+
+WAVY: dict[str, Any] = {
+    "wave_mm": [(5.0 * k, 0.4 * math.sin(2 * math.pi * 5.0 * k / 40.0)) for k in range(16)]
+}
+"""A blade of a line with a wave of 0.4 mm, 40 mm long."""
 
 
 def specimen(**changes: Any) -> Specimen:

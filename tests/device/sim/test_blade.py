@@ -7,13 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scissorcal.device.sim.blade import APART, blade_on
-from tests.device.sim.build import specimen
+from tests.device.sim.build import WAVY, specimen
 
 EDGES = {
     "line": {},
     "arc": {"family": "arc", "curvature_per_m": 1.5},
     "hollow arc": {"family": "arc", "curvature_per_m": -0.8},
     "one blade": {"moving": "upper"},
+    "wave": WAVY,
+    "wave, one blade": WAVY | {"moving": "upper"},
 }
 
 

@@ -14,14 +14,10 @@ from scipy.interpolate import CubicSpline
 
 from scissorcal.device.sim.blade import APART, BladeOnSheet, WavyBladeOnSheet, blade_on
 from scissorcal.device.sim.plate import PlateContact
-from scissorcal.device.sim.rig import VirtualRig
 from scissorcal.device.sim.specimen import Blade, TouchedPlate
 from scissorcal.device.sim.truth import average_torque, tip_at_drive
 from scissorcal.device.sim.wave import Wave
-from tests.device.sim.build import NO_FRICTION, specimen
-
-STATIONS = [5.0 * index for index in range(16)]
-WAVY: dict[str, Any] = {"wave_mm": [(s, 0.4 * math.sin(2 * math.pi * s / 40.0)) for s in STATIONS]}
+from tests.device.sim.build import WAVY, specimen
 
 
 @st.composite
@@ -73,21 +69,6 @@ def test_the_edge_is_found_where_the_turned_blade_puts_it(
     x = station * math.cos(beta) - edge * math.sin(beta)
     y = station * math.sin(beta) + edge * math.cos(beta)
     assert blade.indentation(opening, x) == pytest.approx(blade.upper_face - y, abs=1e-13)
-
-
-@pytest.mark.parametrize("response", ["power", "exponential"])
-@pytest.mark.parametrize("moving", ["both", "upper"])
-def test_forces_are_the_gradient_of_the_stored_energy(response: str, moving: str) -> None:
-    blade = blade_on(specimen(blade=WAVY | {"moving": moving}, material={"response": response}))
-    step = 1e-7
-    for opening in (0.2, 0.5, 0.8):
-        for deeper in (1e-4, 4e-4):
-            place = blade.crossing(opening) - deeper / 0.2
-            touch = blade.touch(opening, place)
-            by_opening = blade.energy(opening + step, place) - blade.energy(opening - step, place)
-            by_place = blade.energy(opening, place + step) - blade.energy(opening, place - step)
-            assert touch.torque == pytest.approx(-by_opening / (2 * step), rel=1e-5)
-            assert touch.drive == pytest.approx(-by_place / (2 * step), rel=1e-5)
 
 
 def test_the_gradient_holds_while_the_tip_lets_go() -> None:
@@ -143,45 +124,6 @@ def test_waves_that_come_up_twice_are_crossed_nearest_the_tip() -> None:
     assert blade.crossing(0.35) == pytest.approx(line.crossing(0.35), abs=1e-3)
     assert blade.indentation(0.35, blade.crossing(0.35)) == pytest.approx(0.0, abs=1e-12)
     assert blade.indentation(0.35, 0.030) < 0.0 < blade.indentation(0.35, 0.040)
-
-
-def test_the_energies_balance() -> None:
-    rig = VirtualRig(specimen(blade=WAVY), np.random.default_rng(1))
-    assert rig.load_sheet()
-    rig.hand.strokes = 2
-    rig.hand.start(0.5, rig.opening, rig.advance)
-    for tick in range(9_000):
-        rig.tick(0.01 * math.sin(0.01 * tick), 0.0)
-        if tick % 500:
-            continue
-        book = rig.energy
-        given_to_it = book.motor + book.hand + book.offset + book.blades
-        lost = book.friction + book.damping + book.stops
-        assert rig.kinetic_energy == pytest.approx(given_to_it - lost, abs=1e-12)
-        in_sheet = rig.stored_energy + book.fracture + book.arrest
-        assert -book.blades == pytest.approx(in_sheet, abs=2e-3 * abs(book.blades) + 1e-5)
-        assert min(book.fracture, book.arrest, book.damping, book.friction) >= 0.0
-    assert rig.crack > 0.05
-
-
-def test_an_elastic_pad_returns_its_energy() -> None:
-    truth = specimen(
-        blade=WAVY,
-        mechanism={"friction": NO_FRICTION, "advance": {"coulomb_N": 1e3}},
-        motor={"cogging_Nm": 0.0},
-        material={"toughness_J_per_m2": None, "response": "exponential"},
-    )
-    rig = VirtualRig(truth, np.random.default_rng(1))
-    rig.joint.place, rig.sledge.place = 0.75, -0.03
-    assert rig.load_sheet()
-    rig.joint.rate = -3.0
-    before = rig.kinetic_energy
-    for _ in range(200):
-        rig.tick(0.0, 0.0)
-        assert rig.kinetic_energy + rig.stored_energy == pytest.approx(before, rel=0.01)
-        if rig.rate > 0.0 and rig.stored_energy == 0.0:
-            break
-    assert rig.rate == pytest.approx(3.0, rel=5e-3)
 
 
 def test_the_mean_torque_is_that_of_the_settled_tip() -> None:
