@@ -37,7 +37,7 @@ export function recipeText(drawn: Drawn, scene: Scene, base: string | null): str
   refuseUnfit(drawn);
   let text = base ?? recipeOf(scene, drawn.edge);
   if (drawn.edge_refused) throw new Error(`The points of the blades are no edge yet, so no recipe can hold them: ${drawn.edge_refused.sentence}.`);
-  if (base !== null) text = withEdge(text, drawn.edge ?? (base === scene.recipe ? null : fittedEdge(scene)));
+  if (base !== null) text = withEdgeTable(text, drawn.edge ?? (base === scene.recipe ? null : fittedEdge(scene)));
   text = withoutTables(text, (name) => name === "plate.layers" || name.startsWith("plate.layers."));
   const known = parsed(text);
   const plate = (known.plate ?? {}) as Toml;
@@ -57,7 +57,7 @@ export function recipeText(drawn: Drawn, scene: Scene, base: string | null): str
 }
 
 /** The recipe with another edge; as it stands where it has that edge already. */
-function withEdge(text: string, edge: Edge | null): string {
+function withEdgeTable(text: string, edge: Edge | null): string {
   const before = edgeIn(parsed(text));
   if (!edge || (before && JSON.stringify(edgeOf(before)) === JSON.stringify(edge))) return text;
   if (before && !/^\s*\[rig\.edge\]/m.test(text)) {
@@ -131,7 +131,6 @@ function layerText(layer: Layer): string {
 /** A recipe of the page's scene: what plan asks for, all else by default. */
 function recipeOf(scene: Scene, edge: Edge | null): string {
   const { thickness_m, fracture_energy_J_per_m } = calibratedOf(scene);
-  const own = (): Edge => fittedEdge(scene);
   const range = (values: readonly number[], factor: number): string => `[${values.map((value) => shown(factor * value)).join(", ")}]`;
   const toughness = Math.max(fracture_energy_J_per_m, 1e-6) / thickness_m;
   const name = (scene.name.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^[^A-Za-z0-9]+/, "") || "scene").slice(0, 54);
@@ -145,7 +144,7 @@ description = ${quoted(`Plate drawn on the page of ${oneLine(scene.name)}.`)}
 moving = ${quoted(scene.moving_blades === 2 ? "both" : "upper")}
 handle_radius_mm = ${shown(1e3 * scene.handle_radius_m)}
 
-${edgeText(edge ?? own())}
+${edgeText(edge ?? fittedEdge(scene))}
 [material]                         # what is calibrated; layers are stated against it
 name = ${quoted(oneLine(scene.name))}
 thickness_mm = ${shown(1e3 * thickness_m)}
