@@ -24,13 +24,13 @@ def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path],
     root = _of_the_run(factory) / "made-once"
     root.mkdir(exist_ok=True)
     folder = root / re.sub(r"[^\w.,=-]+", "-", name)
+    whole = folder.with_name(f"{folder.name}.whole")
     with FileLock(f"{folder}.lock"):
-        if not folder.exists():
-            part = folder.with_name(f"{folder.name}.part")
-            shutil.rmtree(part, ignore_errors=True)  # of a set-up that failed
-            part.mkdir()
-            make(part)
-            part.rename(folder)
+        if not whole.exists():
+            shutil.rmtree(folder, ignore_errors=True)  # of a set-up that failed
+            folder.mkdir()
+            make(folder)  # at its last place: a workspace may know its own path
+            whole.touch()
     return folder
 
 
