@@ -62,8 +62,8 @@ api-check: $(STAMP)
 
 # Strict, and again under the address and undefined-behaviour sanitizers; then the fuzzers' inputs.
 c-tests:
-	$(MAKE) --no-print-directory -C tests/c check BUILD=$(CURDIR)/build/c-tests
-	$(MAKE) --no-print-directory -C tests/c/fuzz corpus BUILD=$(CURDIR)/build/fuzz
+	$(MAKE) --no-print-directory --jobs=$$(getconf _NPROCESSORS_ONLN) -C tests/c check BUILD=$(CURDIR)/build/c-tests
+	$(MAKE) --no-print-directory --jobs=$$(getconf _NPROCESSORS_ONLN) -C tests/c/fuzz corpus BUILD=$(CURDIR)/build/fuzz
 
 # libFuzzer, MINUTES for each harness; then the lines of the C core that its inputs reach. Needs clang.
 MINUTES ?= 1

@@ -65,6 +65,7 @@ class Plant:
         self.state = [*self.place, *[0.0] * 7]  # q, qd, motors, bristles, sensed force
         self.waiting: deque[tuple[float, tuple[float, float]]] = deque()
         self.effort = (0.0, 0.0)
+        self.pressed = 0.0
         self.peak = 0.0
 
     def measured(self) -> tuple[float, float]:
@@ -100,61 +101,73 @@ class Plant:
     def tick(self) -> None:
         """Advance by a tick."""
         dt = self.tick_s / SUBSTEPS
+        half = 0.5 * dt
         for _ in range(SUBSTEPS):
             while self.waiting and self.waiting[0][0] <= self.time + 1e-9:
                 self.effort = self.waiting.popleft()[1]
-            slope = self._slope(self.state)
+            a, b, c, d, e, f, g, h, i = self.state
+            da, db, dc, dd, de, df, dg, dh, di = self._slope(self.state)
+            self.peak = max(self.peak, self.pressed)
             middle = [
-                value + 0.5 * dt * rise for value, rise in zip(self.state, slope, strict=True)
+                *(a + half * da, b + half * db, c + half * dc, d + half * dd, e + half * de),
+                *(f + half * df, g + half * dg, h + half * dh, i + half * di),
             ]
-            self.time += 0.5 * dt
-            slope = self._slope(middle)
-            self.state = [value + dt * rise for value, rise in zip(self.state, slope, strict=True)]
-            self.time += 0.5 * dt
-            self.peak = max(self.peak, self.force())
+            self.time += half
+            da, db, dc, dd, de, df, dg, dh, di = self._slope(middle)
+            self.state = [
+                *(a + dt * da, b + dt * db, c + dt * dc, d + dt * dd, e + dt * de),
+                *(f + dt * df, g + dt * dg, h + dt * dh, i + dt * di),
+            ]
+            self.time += half
 
     def _contact(self, state: list[float]) -> tuple[float, float, float, float]:
         """Pressing force, the force on the point (x, y), and the gap."""
         opening, advance, turning, moving = state[:4]
         length, disc = self.blade.length, self.disc
-        raised, rising = disc.raised(self.time)
-        x = advance + length * math.cos(opening) - disc.centre[0]
-        y = length * math.sin(opening) - disc.centre[1] - raised
+        raised, rising = disc.raised(self.time) if disc.swing_m else (0.0, 0.0)
+        sine, cosine = length * math.sin(opening), length * math.cos(opening)
+        x = advance + cosine - disc.centre[0]
+        y = sine - disc.centre[1] - raised
         away = math.hypot(x, y)
         gap = away - disc.radius
         if gap >= 0.0:
             return 0.0, 0.0, 0.0, gap
         nx, ny = x / away, y / away
-        vx = moving - length * math.sin(opening) * turning
-        vy = length * math.cos(opening) * turning - rising
-        closing = -(vx * nx + vy * ny)
-        force = max(0.0, -disc.stiffness * gap + disc.damping * closing)
-        slip = -vx * ny + vy * nx
-        rub = -disc.friction * force * math.tanh(slip / 5e-4)
+        vx = moving - sine * turning
+        vy = cosine * turning - rising
+        force = -disc.stiffness * gap - disc.damping * (vx * nx + vy * ny)
+        if force < 0.0:
+            force = 0.0
+        if not disc.friction:
+            return force, force * nx, force * ny, gap
+        rub = -disc.friction * force * math.tanh((vy * nx - vx * ny) / 5e-4)
         return force, force * nx - rub * ny, force * ny + rub * nx, gap
 
-    def _slope(self, state: list[float]) -> list[float]:
-        opening, _, turning, moving = state[:4]
+    def _slope(self, state: list[float]) -> tuple[float, ...]:
+        """Rates of the state, written out: it is what the tests of this folder spend."""
+        opening, _, turning, moving, motor, drive, bent, pulled, seen = state
         blade = self.blade
         sine, cosine = math.sin(opening), math.cos(opening)
         force, fx, fy, _ = self._contact(state)
-        bristles = state[6:8]
-        motors = state[4:6] if blade.lag_s else self.effort
-        torque = motors[0] - blade.viscous[0] * turning - blade.dry[0] * bristles[0]
-        push = motors[1] - blade.viscous[1] * moving - blade.dry[1] * bristles[1]
+        self.pressed = force
+        wanted, wanted_drive = self.effort
+        lag = blade.lag_s
+        if not lag:
+            motor, drive = wanted, wanted_drive
+        torque = motor - blade.viscous[0] * turning - blade.dry[0] * bent
+        push = drive - blade.viscous[1] * moving - blade.dry[1] * pulled
         torque += blade.length * (cosine * fy - sine * fx)
         push += fx + blade.coupling * cosine * turning * turning
         off = -blade.coupling * sine
         determinant = blade.inertia * blade.mass - off * off
-        turned = (blade.mass * torque - off * push) / determinant
-        moved = (blade.inertia * push - off * torque) / determinant
-        built = [
-            (rate - abs(rate) * bristle) / length
-            for rate, bristle, length in zip(state[2:4], bristles, blade.bristle, strict=True)
-        ]
-        lagged = [
-            (wanted - motor) / blade.lag_s if blade.lag_s else 0.0
-            for wanted, motor in zip(self.effort, state[4:6], strict=True)
-        ]
-        seen = (force - state[8]) / blade.force_lag_s if blade.force_lag_s else 0.0
-        return [turning, moving, turned, moved, *lagged, *built, seen]
+        return (
+            turning,
+            moving,
+            (blade.mass * torque - off * push) / determinant,
+            (blade.inertia * push - off * torque) / determinant,
+            (wanted - motor) / lag if lag else 0.0,
+            (wanted_drive - drive) / lag if lag else 0.0,
+            (turning - abs(turning) * bent) / blade.bristle[0],
+            (moving - abs(moving) * pulled) / blade.bristle[1],
+            (force - seen) / blade.force_lag_s if blade.force_lag_s else 0.0,
+        )

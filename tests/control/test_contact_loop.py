@@ -145,11 +145,16 @@ FELT = {
     "part of a tick, slow sensor": (100.0, 0.1),
 }
 """Cutoff (Hz) of a surface's rate that is felt, and force_kp."""
+QUICK = [("late, slow filter", (0.0, 0.0)), ("part of a tick, slow sensor", (100.0, 0.1))]
+"""What the default suite tries: between them they have each kind of delay and of feeling."""
 
 
 @pytest.mark.parametrize(
     ("title", "felt"),
-    [*((title, (0.0, 0.0)) for title in CASES), *FELT.items()],
+    [
+        pytest.param(title, felt, marks=() if (title, felt) in QUICK else pytest.mark.slow)
+        for title, felt in [*((title, (0.0, 0.0)) for title in CASES), *FELT.items()]
+    ],
 )
 def test_the_c_law_becomes_unstable_where_the_poles_say(
     title: str, felt: tuple[float, float]

@@ -23,8 +23,8 @@ from tests.control.virtual import go, points, posed, prepare, rms, seen, specime
 @pytest.mark.parametrize(
     ("plate", "surface", "x_mm"),
     [
-        ({}, Plane(), (20.0, 50.0)),
         ({"pitch_deg": 5.0}, Plane(), (20.0, 50.0, 30.0)),
+        pytest.param({}, Plane(), (20.0, 50.0), marks=pytest.mark.slow),
         ({"surface": "cylinder", "radius_mm": 40.0, "place_mm": (40.0, 14.0, 0.0)},
          Cylinder(0.04, math.pi / 2), (1.0, 14.0, 1.0)),
         ({"surface": "sphere", "radius_mm": 60.0, "place_mm": (40.0, 14.0, 6.0)},
@@ -55,7 +55,7 @@ def test_force_and_path_are_kept(
     assert run.link.rig.plate is None
 
 
-@pytest.mark.parametrize("force", [1.0, 4.0])
+@pytest.mark.parametrize("force", [pytest.param(1.0, marks=pytest.mark.slow), 4.0])
 def test_a_touch_peaks_near_what_mass_and_stiffness_give(
     force: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -67,9 +67,14 @@ PATHS = {
     "friction and mass off": (LATE, SOFT, Known(dry=(1.3, 0.7), inertia=1.1), 0.5, 2.0),
     "coarse encoders": (replace(LATE, step=(3.1e-4, 5e-6)), SOFT, Known(), 0.5, 2.0),
 }
+QUICK = ("fast", "hard, without delay", "moving disc", "coarse encoders")
+"""What the default suite tries; a wrong disc or friction is tried by the other tests, too."""
 
 
-@pytest.mark.parametrize("title", PATHS)
+@pytest.mark.parametrize(
+    "title",
+    [pytest.param(one, marks=() if one in QUICK else pytest.mark.slow) for one in PATHS],
+)
 def test_the_force_holds_along_a_curved_path(title: str) -> None:
     """0.6 rad to either side of the top of a disc of 20 mm; measured: 0.015 to 0.022 N rms."""
     blade, disc, known, hertz, force = PATHS[title]
@@ -92,6 +97,7 @@ def test_a_surface_that_moves_untold_is_felt() -> None:
     assert rms[1] < 0.75 * rms[0]
 
 
+@pytest.mark.slow
 def test_feeling_a_surface_does_not_excite_friction_where_the_compliance_is_wrong() -> None:
     """At rest, compliance stated 1.5 times too high; the gains allow for as much."""
     soft = Disc(stiffness=1e3)
@@ -133,6 +139,7 @@ def test_friction_on_the_surface_is_compensated_where_it_is_known() -> None:
     assert rms[1] < 0.12 < 2.0 * rms[1] < rms[0]
 
 
+@pytest.mark.slow
 def test_the_curvature_of_the_surface_is_needed_on_fast_paths() -> None:
     """Without it the point leaves along the tangent: m v^2 / R, 1.2 m/s^2 at the top."""
     swing = swinging(0.6, 2.0)
@@ -174,6 +181,7 @@ def swing_at_rest(share: float, width: float) -> tuple[float, float, float]:
     return tuple(float(run[name].std()) for name in ("torque", "push", "force"))
 
 
+@pytest.mark.slow
 def test_all_of_the_friction_compensated_chatters_and_70_percent_does_not() -> None:
     """In half the band at which damping is left; in that band neither does."""
     some, every = swing_at_rest(0.7, 0.5), swing_at_rest(1.0, 0.5)

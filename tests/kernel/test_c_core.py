@@ -1,5 +1,6 @@
 """The C tests, strict and under the sanitizers, and a step on a Cortex-M4F where tools are here."""
 
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -7,7 +8,8 @@ from pathlib import Path
 import pytest
 
 C_TESTS = Path(__file__).parent.parent / "c"
-
+BUILD = Path(__file__).parents[2] / "build" / "c-tests"
+"""That of `make c-tests`: what is compiled there is not compiled again."""
 
 MOST_INSTRUCTIONS = 6000
 """Of any step at 64 knots on a Cortex-M4F, where the release falls along the blade."""
@@ -24,7 +26,15 @@ MOST_TIMES_BY_HAND = 3.0
 
 def make(target: str, build: Path) -> str:
     ran = subprocess.run(
-        ["make", "--no-print-directory", "-C", str(C_TESTS), f"BUILD={build}", target],
+        [
+            "make",
+            "--no-print-directory",
+            f"--jobs={os.cpu_count()}",
+            "-C",
+            str(C_TESTS),
+            f"BUILD={build}",
+            target,
+        ],
         capture_output=True,
         text=True,
         check=False,
@@ -40,11 +50,12 @@ needs_compiler = pytest.mark.skipif(
 
 
 @needs_compiler
-@pytest.mark.parametrize("kind", ["strict", "sanitized"])
-def test_c_core(kind: str, tmp_path: Path) -> None:
-    assert make(kind, tmp_path).count(" 0 failed") == len(list(C_TESTS.glob("test_*.c")))
+@pytest.mark.parametrize("kind", ["strict", pytest.param("sanitized", marks=pytest.mark.slow)])
+def test_c_core(kind: str) -> None:
+    assert make(kind, BUILD).count(" 0 failed") == len(list(C_TESTS.glob("test_*.c")))
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_what_two_threads_share(tmp_path: Path) -> None:
     """Ring and mailbox under the thread sanitizer, where compiler and kernel can run it."""
@@ -57,7 +68,7 @@ def test_what_two_threads_share(tmp_path: Path) -> None:
     )
     if built.returncode or subprocess.run([tmp_path / "probe"], check=False).returncode:
         pytest.skip("no thread sanitizer here")
-    assert " 0 failed" in make("threads", tmp_path)
+    assert " 0 failed" in make("threads", BUILD)
 
 
 @needs_compiler
@@ -87,10 +98,10 @@ def test_a_step_on_a_cortex_m4f(tmp_path: Path) -> None:
 @pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("seed", [2, 3])
-def test_the_servo_over_ten_million_disturbed_states(seed: int, tmp_path: Path) -> None:
+def test_the_servo_over_ten_million_disturbed_states(seed: int) -> None:
     """The figures stand on stdout: pytest -s shows them."""
-    program = tmp_path / "strict" / "test_disturbed"
-    make(str(program), tmp_path)
+    program = BUILD / "strict" / "test_disturbed"
+    make(str(program), BUILD)
     words = [program, C_TESTS.parent / "golden", "10000000", str(seed)]
     ran = subprocess.run(words, capture_output=True, text=True, check=False)
     print(ran.stdout)

@@ -82,8 +82,17 @@ def test_steps_against_the_reference(case: dict[str, Any]) -> None:
     assert np.all(got["arrest_J"] >= 0.0)
 
 
-@pytest.mark.parametrize("kappa", [1.0, 0.7])
-@pytest.mark.parametrize("pieces", [HOLE, LAYER, STRIPS], ids=["hole", "layer", "strips"])
+@pytest.mark.parametrize(
+    ("pieces", "kappa"),
+    [
+        pytest.param(HOLE, 1.0, id="hole, smooth"),
+        pytest.param(STRIPS, 0.7, id="strips, rippled"),
+        pytest.param(LAYER, 1.0, id="layer, smooth", marks=pytest.mark.slow),
+        pytest.param(STRIPS, 1.0, id="strips, smooth", marks=pytest.mark.slow),
+        pytest.param(HOLE, 0.7, id="hole, rippled", marks=pytest.mark.slow),
+        pytest.param(LAYER, 0.7, id="layer, rippled", marks=pytest.mark.slow),
+    ],
+)
 def test_finer_steps_come_closer_to_the_reference(pieces: tuple[Piece, ...], kappa: float) -> None:
     """The core books a step where it ends, an error that falls with the step."""
     tables = make_tables(response=power_response(knots=25), kappa=kappa)

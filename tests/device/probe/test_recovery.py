@@ -28,6 +28,7 @@ def holds(estimate: Estimate | None, truth: float, widths: float = 2.0) -> bool:
     return abs(estimate.mean - truth) <= widths * 1.645 * estimate.sd
 
 
+@pytest.mark.slow
 def test_zeros_lie_in_their_intervals() -> None:
     rng = np.random.default_rng(41)
     inside = []

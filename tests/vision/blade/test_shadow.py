@@ -115,6 +115,7 @@ def test_one_plane_holds_both_blades_and_a_tilt_is_part_of_their_covariance():
     assert "tilt" not in known.measured[0].mode_names
 
 
+@pytest.mark.slow
 def test_the_lengths_of_both_blades_tell_the_tilt_between_their_tips():
     """A camera that leans by 20 deg makes one blade shorter; what is found corrects the most."""
     worst = 0.0
@@ -136,6 +137,7 @@ def test_a_plain_view_maps_there_and_back_and_keeps_lines_straight():
     assert np.abs(off).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_where_the_shadow_falls_is_told_from_between_the_tips():
     seen = []
     for _, found in distinct(159, 7, tilt_deg=1.0, lamp_deg=60.0):
