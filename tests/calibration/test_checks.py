@@ -17,7 +17,7 @@ from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.workday.runs.fit import FitOutcome
 from scissorcal.workday.states import StepState
 from tests.calibration.test_comparison import line
-from tests.calibration.truth import Truth, friction_recording, make_recording, sweep
+from tests.calibration.truth import QUICK, Truth, friction_recording, make_recording, sweep
 
 STROKES, BINS = 8, 50
 SPEEDS = (0.1, 0.3, 0.6, 1.0)
@@ -200,6 +200,8 @@ def test_a_rejected_fit_is_not_printed_as_a_calibration(tmp_path):
     assert second.startswith("  ")
     assert said.index("strokes: Strokes do not differ") < said.index("inertia")
     assert "which are not to be used" in said
-    good = fit_friction((friction_recording(Truth(), rng),), settings, effort="draft", rng=rng)
+    good = fit_friction(
+        (friction_recording(Truth(), rng, QUICK),), settings, effort="draft", rng=rng
+    )
     assert good.rejected == ()
     assert "not a calibration" not in text(FitOutcome("friction", good, tmp_path, (), False, state))

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from scissorcal.calibration import fit_friction
 from scissorcal.calibration.candidates import is_positive
 from scissorcal.calibration.comparison import candidate_rows, choose, comparison_text
 from scissorcal.calibration.fit_candidate import (
@@ -17,9 +16,7 @@ from scissorcal.calibration.fit_candidate import (
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.model.transforms import IDENTITY
-from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint
-from tests.calibration.truth import Truth, friction_recording
 
 STROKES, BINS = 12, 40
 
@@ -121,6 +118,7 @@ def test_a_difference_too_small_to_feel_leaves_candidates_equivalent():
     assert choose(fitted, signal_rms=1e3).equivalent == ("line", "parabola")
 
 
+@pytest.mark.slow
 def test_the_simple_truth_is_seldom_rejected():
     """The test's own level is 5 % and it wants 3 nats besides: at most 2 of 20 (99 %)."""
     rejected = sum(choose(fitted_pair(0.0, seed)).name != "line" for seed in range(20))
@@ -156,24 +154,6 @@ def test_a_stroke_that_alone_decides_a_parameter_is_called_unreliable():
     outcome = 1.0 + 3.0 * only + 0.5 * rng.standard_normal(len(strokes))
     found = fit_candidate(line(outcome, columns, "one stroke's", strokes), strokes, strokes)
     assert np.flatnonzero(~found.left_out.reliable).tolist() == [5]
-
-
-def test_a_fit_names_equivalent_candidates_and_what_would_distinguish_them():
-    recording = friction_recording(Truth(), np.random.default_rng(1))
-    ladder = FitFriction(critic=False)
-    found = fit_friction((recording,), ladder, effort="standard", rng=np.random.default_rng(3))
-    alike = [row["name"] for row in found.rungs if row["equivalent"]]
-    assert found.rung in alike
-    assert len(alike) > 1
-    for name in alike:
-        assert name in found.selection
-    assert "is used" in found.selection
-    assert "would distinguish them" in found.selection
-    assert "rad/s" in found.selection
-    named = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
-    alone = fit_friction((recording,), named, effort="draft", rng=np.random.default_rng(3))
-    said = "coulomb + viscous, asymmetric was compared with no other candidate."
-    assert alone.selection == said
 
 
 def test_segments_of_a_path_are_counted_and_not_timed():

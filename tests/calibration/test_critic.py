@@ -22,7 +22,7 @@ from scissorcal.model.terms import Motion
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.friction.test_fit import emps
-from tests.calibration.truth import Truth, friction_recording
+from tests.calibration.truth import QUICK, Truth, friction_recording
 
 SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
 SEEDS = range(10)
@@ -57,10 +57,8 @@ def critique(recording: Recording, seed: int, template):
     return criticise("friction", chosen, motion, recording.joint, rng)
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["rate^2", *(pytest.param(name, marks=pytest.mark.slow) for name in list(MISSING)[1:])],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MISSING)
 def test_a_missing_term_is_recovered_in_nine_of_ten_recordings(name, template):
     recovered = 0
     for seed in SEEDS:
@@ -70,6 +68,7 @@ def test_a_missing_term_is_recovered_in_nine_of_ten_recordings(name, template):
     assert recovered >= 9
 
 
+@pytest.mark.slow
 def test_nothing_is_proposed_where_nothing_is_missing_in_nine_of_ten_recordings(template):
     proposed = sum(
         bool(
@@ -119,7 +118,7 @@ def test_every_proposable_term_is_of_the_shared_library(template):
 
 
 def test_the_critic_is_asked_at_standard_effort_only_and_can_be_told_to_keep_quiet():
-    recording = friction_recording(Truth(), np.random.default_rng(7))
+    recording = friction_recording(Truth(), np.random.default_rng(7), QUICK)
     spoken = {}
     for effort, critic in (("draft", True), ("standard", False), ("standard", True)):
         settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=critic)

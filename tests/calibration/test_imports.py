@@ -13,8 +13,8 @@ import numpy as np
 from pathlib import Path
 from scissorcal.calibration import fit_friction, load_fit, save
 from scissorcal.recipe.schema import FitFriction
-from tests.calibration.truth import Truth, friction_recording
-recording = friction_recording(Truth(), np.random.default_rng(1))
+from tests.calibration.truth import QUICK, Truth, friction_recording
+recording = friction_recording(Truth(), np.random.default_rng(1), QUICK)
 settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
 path = Path(sys.argv[1])
 for effort in ("draft", "standard"):

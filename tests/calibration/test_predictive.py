@@ -11,7 +11,14 @@ from scissorcal.calibration import FitResult, fit_friction, load_fit, save
 from scissorcal.calibration.predictive import REPLICATES, _rounded
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
-from tests.calibration.truth import RATE_HZ, Truth, friction_recording, make_recording, sweep
+from tests.calibration.truth import (
+    QUICK,
+    RATE_HZ,
+    Truth,
+    friction_recording,
+    make_recording,
+    sweep,
+)
 
 arviz: Any = pytest.importorskip("arviz")
 matplotlib: Any = pytest.importorskip("matplotlib")
@@ -126,7 +133,7 @@ def test_compare_by_arviz_orders_the_candidates_as_the_fit_does(
 def test_draft_effort_has_replicates_and_no_log_likelihood(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     wanted = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
-    recording = friction_recording(Truth(), rng)
+    recording = friction_recording(Truth(), rng, QUICK)
     save(fit_friction((recording,), wanted, effort="draft", rng=rng), tmp_path / "friction.nc")
     found = load_fit(tmp_path / "friction.nc").predictive
     assert found is not None

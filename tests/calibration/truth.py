@@ -34,15 +34,15 @@ class Truth:
 
     def height(self, x: float, beta: float) -> tuple[float, float]:
         low, high = -0.05, 0.3
+        sine, cosine = math.sin(beta), math.cos(beta)
+        offset, rise = self.edge_offset, math.tan(self.taper)
         for _ in range(60):
             s = 0.5 * (low + high)
-            e = self.edge_offset + s * math.tan(self.taper)
-            if s * math.cos(beta) - e * math.sin(beta) < x:
+            if s * cosine - (offset + s * rise) * sine < x:
                 low = s
             else:
                 high = s
-        e = self.edge_offset + s * math.tan(self.taper)
-        return s * math.sin(beta) + e * math.cos(beta), math.tan(beta + self.taper)
+        return s * sine + (offset + s * rise) * cosine, math.tan(beta + self.taper)
 
     def response(self, delta: float) -> float:
         return self.force * (delta / self.reference) ** self.exponent if delta > 0 else 0.0
@@ -172,15 +172,16 @@ def _cut_torque(theta, x_n, sheets, truth: Truth) -> np.ndarray:
     for i, (angle, advance) in enumerate(zip(theta.tolist(), x_n.tolist(), strict=True)):
         if sheets[i] != sheet:
             sheet, crack = sheets[i], 0.0
-        while truth.cut(angle, crack - advance)[1] > truth.fracture_energy:
+        torque[i], driven = truth.cut(angle, crack - advance)
+        while driven > truth.fracture_energy:
             there = angle
             if truth.kappa < 1:
                 there = truth.opening_at_drive(before, angle, crack - advance)
             crack = advance + truth.contact_at_arrest(there, crack - advance)
             before = there
+            torque[i], driven = truth.cut(angle, crack - advance)
             if truth.kappa >= 1:
                 break
-        torque[i] = truth.cut(angle, crack - advance)[0]
         if truth.damping > 0.0 and torque[i] > 0.0:
             torque[i] *= truth.damped(angle, crack - advance, float(rate[i]))
         before = angle
@@ -199,10 +200,17 @@ def _bisect(reached, high: float) -> float:
     return high
 
 
-def friction_recording(truth: Truth, rng: np.random.Generator) -> Recording:
+SPEEDS = (0.05, 0.12, 0.3, 0.7, 1.5)
+QUICK = SPEEDS[1:]
+"""Without the slowest sweeps, which take 60 % of the time: where no law of low speeds is told."""
+
+
+def friction_recording(
+    truth: Truth, rng: np.random.Generator, speeds: tuple[float, ...] = SPEEDS
+) -> Recording:
     low, high = 0.2, 0.85
     opening, strokes = [], []
-    for speed in (0.05, 0.12, 0.3, 0.7, 1.5) * 2:
+    for speed in speeds * 2:
         for a, b, kind in ((high, low, "closing"), (low, high, "opening")):
             strokes.append(Stroke(len(strokes), kind, speed))
             opening.append(sweep(a, b, speed))

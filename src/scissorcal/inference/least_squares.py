@@ -34,9 +34,12 @@ def least_squares(
     def at(x: Array) -> tuple[Array, Array, bool]:
         if not last or last[0][0] != x.tobytes():
             with np.errstate(all="ignore"):
-                both = evaluate(x)
-                known = all(bool(np.all(np.abs(a) < WORST)) for a in both)
-                rows, slopes = (np.clip(np.nan_to_num(a), -WORST, WORST) for a in both)
+                rows, slopes = evaluate(x)
+                known = all(bool(np.all(np.abs(a) < WORST)) for a in (rows, slopes))
+                if not known:
+                    rows, slopes = (
+                        np.clip(np.nan_to_num(a), -WORST, WORST) for a in (rows, slopes)
+                    )
             last[:] = [(x.tobytes(), rows, slopes, known)]
         return last[0][1:]
 
@@ -61,3 +64,8 @@ def least_squares(
         max_nfev=MOST_EVALUATIONS,
     )
     return np.asarray(found.x), bool(found.success) and at(found.x)[2]
+
+
+def _bounded(values: Array) -> Array:
+    """Values without what is not finite, within ``WORST``."""
+    return np.asarray(np.clip(np.nan_to_num(values), -WORST, WORST))

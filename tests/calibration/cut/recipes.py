@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.calibration import FitResult, fit_friction
 from scissorcal.recipe.schema import Recipe
-from tests.calibration.truth import Truth, friction_recording
+from tests.calibration.truth import SPEEDS, Truth, friction_recording
 
 RECIPES = Path(__file__).resolve().parents[3] / "recipes"
 
@@ -27,7 +27,9 @@ def pressing(**cut) -> Recipe:
     return Recipe.model_validate(facts)
 
 
-def friction_of(truth: Truth, rng: np.random.Generator) -> FitResult:
+def friction_of(
+    truth: Truth, rng: np.random.Generator, speeds: tuple[float, ...] = SPEEDS
+) -> FitResult:
     """Friction from empty sweeps of a truth."""
-    settings = paper().fit.friction
-    return fit_friction((friction_recording(truth, rng),), settings, effort="draft", rng=rng)
+    settings, recording = paper().fit.friction, friction_recording(truth, rng, speeds)
+    return fit_friction((recording,), settings, effort="draft", rng=rng)

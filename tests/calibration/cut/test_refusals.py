@@ -10,14 +10,14 @@ from scissorcal.calibration.cut.laws import allowed_laws
 from scissorcal.errors import InputError
 from tests.calibration.cut.made_cuts import HIGH, LOW, cut, way
 from tests.calibration.cut.recipes import friction_of, paper, pressing
-from tests.calibration.truth import Truth, cut_recording, friction_recording
+from tests.calibration.truth import QUICK, Truth, cut_recording, friction_recording
 
 TRUTH = Truth()
 
 
 @pytest.fixture(scope="module")
 def friction():
-    return friction_of(TRUTH, np.random.default_rng(10))
+    return friction_of(TRUTH, np.random.default_rng(10), QUICK)
 
 
 def test_cutting_air_is_refused(friction):

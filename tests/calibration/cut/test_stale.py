@@ -12,7 +12,7 @@ from scissorcal.recording.recording import Stroke
 from tests.calibration.cut.made_cuts import FRICTION, HIGH, LOW, cut, way
 from tests.calibration.cut.path.made import INERTIA
 from tests.calibration.cut.recipes import friction_of, paper
-from tests.calibration.truth import Truth, make_recording, sweep
+from tests.calibration.truth import QUICK, Truth, make_recording, sweep
 
 PLACES = (-0.018, 0.012, 0.042)
 SPEEDS = (0.4, 0.2, 0.4)
@@ -61,7 +61,7 @@ def day(rng):
     """Three sheets of which the second was never put in: its strokes go through the first."""
     openings, advances, strokes, planned = [], [], [], []
     for sheet in range(3):
-        for place, speed in zip(PLACES, (0.25, 0.6, 0.4), strict=True):
+        for place, speed in zip(PLACES, (0.5, 0.9, 0.7), strict=True):
             for a, b, kind, v in ((0.85, 0.22, "closing", speed), (0.22, 0.85, "opening", 1.0)):
                 there = 0 if sheet == 1 else sheet
                 strokes.append(Stroke(len(strokes), kind, v, there))
@@ -74,7 +74,7 @@ def day(rng):
 
 def test_a_capture_with_a_missing_sheet_fails():
     rng = np.random.default_rng(4)
-    friction = friction_of(Truth(), rng)
+    friction = friction_of(Truth(), rng, QUICK)
     recipe = paper(response="power", fracture="smooth")
     found = fit_cut((day(rng),), recipe, friction, effort="draft", rng=rng)
     verdict = {one.check: one for one in found.verdicts}["stale sheets"]

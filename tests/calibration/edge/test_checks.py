@@ -38,6 +38,7 @@ def test_a_fit_that_leaves_its_own_points_fails_with_the_figures(fit):
     assert "-0.8" in found.why or "-0.9" in found.why
 
 
+@pytest.mark.slow
 def test_sound_edges_fail_no_more_often_than_stated():
     """At most 1 % by construction: of 20 sound fits, 3 or more fail with probability 1e-3."""
     failed = 0

@@ -12,7 +12,7 @@ from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.model.transforms import LOG
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
-from tests.calibration.truth import Truth, friction_recording
+from tests.calibration.truth import QUICK, Truth, friction_recording
 
 
 def with_friction(recording: Recording, term) -> Recording:
@@ -29,18 +29,20 @@ def verdicts(recording: Recording, rung: str, symmetry: str = "asymmetric"):
     return {verdict.check: verdict for verdict in fit.verdicts}
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))]
+)
 @pytest.mark.parametrize("rung", ["coulomb+viscous", "stribeck"])
 def test_a_joint_as_joints_are_passes(seed, rung):
     """Three standard deviations on at most six levels: false alarm below 1 % a fit."""
     truth = Truth(viscous=0.002)
-    found = verdicts(friction_recording(truth, np.random.default_rng(seed)), rung)
+    found = verdicts(friction_recording(truth, np.random.default_rng(seed), QUICK), rung)
     assert found["physical"].status == "pass"
     assert found["start"].status == "pass"
 
 
 def test_friction_that_falls_with_the_speed_is_named():
-    recording = friction_recording(Truth(viscous=-0.001), np.random.default_rng(1))
+    recording = friction_recording(Truth(viscous=-0.001), np.random.default_rng(1), QUICK)
     found = verdicts(recording, "coulomb+viscous")["physical"]
     assert found.status == "fail"
     assert "viscous_pos = -0.00" in found.why
@@ -48,9 +50,9 @@ def test_friction_that_falls_with_the_speed_is_named():
 
 
 def test_a_law_without_viscous_friction_is_offered_it():
-    recording = friction_recording(Truth(viscous=-0.001), np.random.default_rng(2))
+    recording = friction_recording(Truth(viscous=-0.001), np.random.default_rng(2), QUICK)
     assert verdicts(recording, "coulomb")["physical"].status == "fail"
-    honest = friction_recording(Truth(viscous=0.001), np.random.default_rng(2))
+    honest = friction_recording(Truth(viscous=0.001), np.random.default_rng(2), QUICK)
     assert verdicts(honest, "coulomb")["physical"].status == "pass"
 
 
@@ -66,10 +68,10 @@ def test_static_below_coulomb_friction_is_named():
 
 
 def test_a_torque_of_the_wrong_sign_is_named():
-    samples = friction_recording(Truth(), np.random.default_rng(4)).samples.copy()
+    samples = friction_recording(Truth(), np.random.default_rng(4), QUICK).samples.copy()
     samples["motor_torque"] *= -1
     wrong = dataclasses.replace(
-        friction_recording(Truth(), np.random.default_rng(4)), samples=samples
+        friction_recording(Truth(), np.random.default_rng(4), QUICK), samples=samples
     )
     found = verdicts(wrong, "coulomb+viscous")
     assert found["physical"].status == "fail"
@@ -102,7 +104,7 @@ def test_a_nuisance_that_moves_with_the_cutoff_fails_nothing():
 
 def test_windows_too_short_for_the_encoder_are_lengthened():
     """At 180 Hz the encoder's steps would draw the inertia towards zero."""
-    recording = friction_recording(Truth(), np.random.default_rng(6))
+    recording = friction_recording(Truth(), np.random.default_rng(6), QUICK)
     rough = dataclasses.replace(recording, samples=recording.samples.copy())
     rough.samples["opening"] = np.round(rough.samples["opening"] / 1e-4) * 1e-4
     for cutoff_Hz in (75.0, 180.0):

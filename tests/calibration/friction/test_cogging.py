@@ -34,7 +34,9 @@ def searched(recording: Recording):
     return find_cogging(plain.moments)
 
 
-@pytest.mark.parametrize("seed", range(15))
+@pytest.mark.parametrize(
+    "seed", [*range(3), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 15))]
+)
 def test_none_is_found_where_there_is_none(seed):
     """Noise with memory, turns at equal places, counts that beat with the ticks; false alarm 1e-4
     for each by the noise."""
@@ -42,7 +44,9 @@ def test_none_is_found_where_there_is_none(seed):
     assert not searched(friction_recording(Truth(), np.random.default_rng(seed))).found
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))]
+)
 @pytest.mark.parametrize("periods", [60.0, 137.0, 300.0])
 def test_a_ripple_is_found_at_its_period(seed, periods):
     clean = friction_recording(Truth(), np.random.default_rng(seed))

@@ -10,7 +10,7 @@ from scissorcal.calibration import fit_friction, load_fit, save
 from scissorcal.errors import InputError
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording
-from tests.calibration.truth import Truth, friction_recording
+from tests.calibration.truth import QUICK, Truth, friction_recording
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 EMPS = SHARED / "emps" / "DATA_EMPS.mat"
@@ -20,7 +20,7 @@ SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
 
 @pytest.fixture(scope="module")
 def recording() -> Recording:
-    return friction_recording(Truth(), np.random.default_rng(1))
+    return friction_recording(Truth(), np.random.default_rng(1), QUICK)
 
 
 @pytest.fixture(scope="module")
@@ -46,13 +46,29 @@ def test_every_parameter_is_recovered_within_four_standard_deviations(fitted):
     assert unknown == {"sensor zeros"}, "the made recording has no idle second"
 
 
-def test_the_ladder_does_not_climb_higher_than_the_data(recording):
+@pytest.fixture(scope="module")
+def ladder(recording):
+    """The fit of every law."""
     settings = FitFriction(critic=False)
-    found = fit_friction((recording,), settings, effort="standard", rng=np.random.default_rng(3))
-    assert found.rung.startswith("coulomb + viscous")
-    assert [row["name"] for row in found.rungs if row["chosen"]] == [found.rung]
-    assert len(found.rungs) == 10
-    assert found.diagnostics["evaluations"] > 10 * 50
+    return fit_friction((recording,), settings, effort="standard", rng=np.random.default_rng(3))
+
+
+def test_the_ladder_does_not_climb_higher_than_the_data(ladder):
+    assert ladder.rung.startswith("coulomb + viscous")
+    assert [row["name"] for row in ladder.rungs if row["chosen"]] == [ladder.rung]
+    assert len(ladder.rungs) == 10
+    assert ladder.diagnostics["evaluations"] > 10 * 50
+
+
+def test_a_fit_names_equivalent_candidates_and_what_would_distinguish_them(ladder):
+    alike = [row["name"] for row in ladder.rungs if row["equivalent"]]
+    assert ladder.rung in alike
+    assert len(alike) > 1
+    for name in alike:
+        assert name in ladder.selection
+    assert "is used" in ladder.selection
+    assert "would distinguish them" in ladder.selection
+    assert "rad/s" in ladder.selection
 
 
 def test_draft_fits_the_law_that_was_chosen_last(recording):
@@ -78,6 +94,8 @@ def test_draft_says_that_its_intervals_are_unchecked(recording):
     found = fit_friction((recording,), SIMPLE, effort="draft", rng=np.random.default_rng(4))
     status = {verdict.check: verdict.status for verdict in found.verdicts}
     assert status["k-hat"] == "not_evaluated"
+    said = "coulomb + viscous, asymmetric was compared with no other candidate."
+    assert found.selection == said
 
 
 def test_equal_seeds_give_equal_fits(recording, fitted):
@@ -182,6 +200,7 @@ def test_emps_agrees_with_its_published_values(symmetry):
     assert found.parameter("inertia").sd > 0.05, "no tighter than its autocorrelated noise allows"
 
 
+@pytest.mark.slow
 def test_emps_prefers_the_asymmetric_law():
     found = fit_friction(
         (emps(),), FitFriction(critic=False), effort="standard", rng=np.random.default_rng(0)
@@ -192,7 +211,7 @@ def test_emps_prefers_the_asymmetric_law():
 
 def test_an_adopted_term_is_fitted_recovered_and_kept(tmp_path):
     """Four standard deviations: false alarm 6e-5."""
-    recording = friction_recording(Truth(), np.random.default_rng(21))
+    recording = friction_recording(Truth(), np.random.default_rng(21), QUICK)
     rate = np.gradient(recording.samples["opening"]) * 1000.0
     samples = recording.samples.copy()
     samples["motor_torque"] += 8e-4 * np.convolve(rate, np.full(5, 0.2), "same") ** 2

@@ -8,14 +8,14 @@ import pytest
 from scissorcal.calibration import fit_friction, friction_experiment
 from scissorcal.inference import find_optimum, fit_ar
 from scissorcal.recipe.schema import FitFriction
-from tests.calibration.truth import Truth, friction_recording
+from tests.calibration.truth import QUICK, Truth, friction_recording
 
 SETTINGS = FitFriction(rung="stribeck", symmetry="asymmetric")
 
 
 @pytest.fixture(scope="module")
 def fitted():
-    recording = friction_recording(Truth(), np.random.default_rng(1))
+    recording = friction_recording(Truth(), np.random.default_rng(1), QUICK)
     fit = fit_friction((recording,), SETTINGS, effort="draft", rng=np.random.default_rng(2))
     return fit, friction_experiment((recording,), SETTINGS, fit)
 

@@ -19,8 +19,8 @@ from scissorcal.errors import InputError
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.friction.test_fit import emps
-from tests.calibration.friction.test_transmission import CUTOFF_HZ, splits
-from tests.calibration.truth import Truth, friction_recording
+from tests.calibration.friction.test_transmission import CUTOFF_HZ, each_split, split_of
+from tests.calibration.truth import QUICK, Truth, friction_recording
 
 SETTINGS = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
 
@@ -66,10 +66,10 @@ def test_half_of_emps_predicts_the_other_half(first: int) -> None:
 
 
 def test_fresh_recordings_of_the_same_system_lie_within() -> None:
-    """21 strokes held out: no assumption but that strokes are alike."""
+    """17 strokes held out: no assumption but that strokes are alike."""
     rng = np.random.default_rng(7)
     band, found = predicted(
-        (friction_recording(Truth(), rng),), (friction_recording(Truth(), rng),)
+        (friction_recording(Truth(), rng, QUICK),), (friction_recording(Truth(), rng, QUICK),)
     )
     assert band.conformal
     assert 0.87 < found.share_inside < 0.99
@@ -100,27 +100,28 @@ def test_a_new_recording_of_a_rig_whose_friction_scatters_lies_within() -> None:
     assert np.mean(shares) > 0.74
 
 
-def test_real_loads_lie_within_where_the_parameters_band_held_few() -> None:
+@each_split
+def test_real_loads_lie_within_where_the_parameters_band_held_few(split: str) -> None:
     """Fitted to files, or their first halves; predicted on what was not seen."""
-    for split in splits():
-        settings = FitFriction(
-            rung="coulomb+viscous+load+presliding",
-            symmetry="symmetric",
-            cutoff_Hz=CUTOFF_HZ,
-            critic=False,
-        )
-        fit = fit_friction(split.train, settings, effort="draft", rng=np.random.default_rng(0))
-        design = friction_experiment(split.train, settings, fit)
-        band = load_band(design, fit, split.train, CUTOFF_HZ)
-        found = predict_far_load(fit, band, split.test, CUTOFF_HZ)
-        unseen = found.time_s >= split.unseen_from_s
-        inside = (found.measured >= found.low) & (found.measured <= found.high)
-        assert np.mean(inside[unseen]) > 0.9, split.name
-        assert band.count == len(split.train)
+    made = split_of(split)
+    settings = FitFriction(
+        rung="coulomb+viscous+load+presliding",
+        symmetry="symmetric",
+        cutoff_Hz=CUTOFF_HZ,
+        critic=False,
+    )
+    fit = fit_friction(made.train, settings, effort="draft", rng=np.random.default_rng(0))
+    design = friction_experiment(made.train, settings, fit)
+    band = load_band(design, fit, made.train, CUTOFF_HZ)
+    found = predict_far_load(fit, band, made.test, CUTOFF_HZ)
+    unseen = found.time_s >= made.unseen_from_s
+    inside = (found.measured >= found.low) & (found.measured <= found.high)
+    assert np.mean(inside[unseen]) > 0.9
+    assert band.count == len(made.train)
 
 
 def test_one_stroke_sets_no_band() -> None:
-    recording = friction_recording(Truth(), np.random.default_rng(9))
+    recording = friction_recording(Truth(), np.random.default_rng(9), QUICK)
     fit = fit_friction((recording,), SETTINGS, effort="draft", rng=np.random.default_rng(0))
     design = friction_experiment((recording,), SETTINGS, fit)
     alone = dataclasses.replace(design, strokes=np.zeros_like(design.strokes))

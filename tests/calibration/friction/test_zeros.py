@@ -35,11 +35,24 @@ def fitted(recording: Recording) -> FitResult:
     return fit_friction((recording,), SETTINGS, effort="draft", rng=rng)
 
 
+@pytest.fixture(scope="module")
+def plain() -> FitResult:
+    """The fit of the rig whose sensors have no zero."""
+    return fitted(recorded(0.0, 0.0)[0])
+
+
 @pytest.mark.parametrize(
-    ("torque_Nm", "force_N"), [(0.0, 0.05), (0.0, 0.2), (5e-3, 0.0), (-4e-3, -0.1)]
+    ("torque_Nm", "force_N"),
+    [
+        (-4e-3, -0.1),
+        *(
+            pytest.param(*zeros, marks=pytest.mark.slow)
+            for zeros in ((0.0, 0.05), (0.0, 0.2), (5e-3, 0.0))
+        ),
+    ],
 )
-def test_zeros_do_not_change_the_levels(torque_Nm: float, force_N: float) -> None:
-    plain, shifted = fitted(recorded(0.0, 0.0)[0]), fitted(recorded(torque_Nm, force_N)[0])
+def test_zeros_do_not_change_the_levels(plain: FitResult, torque_Nm: float, force_N: float) -> None:
+    shifted = fitted(recorded(torque_Nm, force_N)[0])
     for name in ("inertia", "viscous_pos", "viscous_neg", *LEVELS):
         one, other = plain.parameter(name), shifted.parameter(name)
         assert other.mean == pytest.approx(one.mean, abs=0.02 * one.sd)
@@ -66,11 +79,10 @@ def test_without_idle_seconds_the_intervals_are_wider_and_a_verdict_names_the_re
     assert "one second at idle" in verdict.why
 
 
-def test_a_cut_knows_friction_no_better_than_both_zeros() -> None:
-    fit = fitted(recorded(0.0, 0.0)[0])
-    before = DriveZero.from_dict(fit.diagnostics)
+def test_a_cut_knows_friction_no_better_than_both_zeros(plain: FitResult) -> None:
+    before = DriveZero.from_dict(plain.diagnostics)
     assert before is not None
-    known = KnownFriction.of(fit)
+    known = KnownFriction.of(plain)
     own = replace(before, sd=1e-3)
     again = known.with_zero(own, before)
     assert again.closing_sd == pytest.approx(np.hypot(known.closing_sd, np.hypot(1e-3, before.sd)))

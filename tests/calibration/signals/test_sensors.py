@@ -11,14 +11,14 @@ from scissorcal.calibration.signals.sensors import channels_of, inspect_sensors
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 from scissorcal.recording.resolution import resolution_of
-from tests.calibration.truth import Truth, friction_recording
+from tests.calibration.truth import QUICK, Truth, friction_recording
 
 SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
 
 
 @pytest.fixture(scope="module")
 def clean() -> Recording:
-    return friction_recording(Truth(), np.random.default_rng(1))
+    return friction_recording(Truth(), np.random.default_rng(1), QUICK)
 
 
 def changed(recording: Recording, change) -> Recording:

@@ -9,7 +9,7 @@ from scissorcal.calibration.signals.torque_noise import TorqueNoise, torque_nois
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.inference.ar_noise import ArNoise
 from scissorcal.recipe.schema import FitFriction
-from tests.calibration.truth import Truth, friction_recording
+from tests.calibration.truth import QUICK, Truth, friction_recording
 
 TICK_S = 1e-3
 
@@ -87,7 +87,7 @@ def test_differing_strokes_are_detected_and_equal_ones_are_not():
 
 def test_a_friction_fit_stores_its_noise():
     settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
-    recording = friction_recording(Truth(), np.random.default_rng(1))
+    recording = friction_recording(Truth(), np.random.default_rng(1), QUICK)
     fit = fit_friction((recording,), settings, effort="draft", rng=np.random.default_rng(2))
     truth = Truth()
     slow_time = -TICK_S / np.log(truth.rho)

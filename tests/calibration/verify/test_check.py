@@ -55,9 +55,9 @@ def status(result: VerifyResult) -> dict[str, str]:
 
 def test_intervals_with_the_right_noise_pass_and_others_fail():
     """Noise of rho 0.8 makes naive intervals too narrow by 3."""
-    _, right = checked(made(0.8), ("sbc",), 40)
+    _, right = checked(made(0.8), ("sbc",), 24)
     assert status(right) == {"calibration": "pass", "refits": "pass"}
-    _, naive = checked(made(0.8, naive=True), ("sbc",), 40)
+    _, naive = checked(made(0.8, naive=True), ("sbc",), 24)
     assert status(naive)["calibration"] == "fail"
     assert naive.calibration is not None
     (offset, *_) = naive.calibration.quantities

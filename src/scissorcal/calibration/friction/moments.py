@@ -160,16 +160,21 @@ class ReducedLaw:
 
     def slopes(self, u: Array, cell: Cell) -> Array:
         """Derivatives of the factors by each parameter but the noise, (q, p - 1)."""
+        return self.factors_and_slopes(u, cell)[1]
+
+    def factors_and_slopes(self, u: Array, cell: Cell) -> tuple[Array, Array]:
+        """Factors (q,) at ``u`` (p,) and their derivatives (q, p - 1), worked out at once."""
         reach = STEP * np.eye(len(u))[:-1]
-        above, below = self.factors(u + reach, cell), self.factors(u - reach, cell)
-        return np.asarray((above - below).T / (2.0 * STEP))
+        every = self.factors(np.concatenate([u[None, :], u + reach, u - reach]), cell)
+        above, below = np.split(every[1:], 2)
+        return every[0], np.asarray((above - below).T / (2.0 * STEP))
 
     def slope(self, u: Array) -> Array:
         """Derivative of the log-likelihood at ``u`` (p,), shape (p,)."""
         cell = self.cell_at(u)
-        factors, weight = self.factors(u, cell), np.exp(-2.0 * u[-1])
+        (factors, slopes), weight = self.factors_and_slopes(u, cell), np.exp(-2.0 * u[-1])
         products = self.summed(cell) @ factors
-        by_mean = -weight * self.slopes(u, cell).T @ products
+        by_mean = -weight * slopes.T @ products
         return np.append(by_mean, weight * float(factors @ products) - self.counted)
 
     def information(self, u: Array) -> Array:

@@ -116,8 +116,9 @@ def _least_squares(problem: CandidateProblem, point: Array) -> tuple[Array, int]
         inside = np.clip(coefficients, problem.lower[:-1], problem.upper[:-1])
         u = np.append(inside, point[-1])
         cell = law.cell_at(u)
-        slopes = np.where(inside == coefficients, law.slopes(u, cell), 0.0)
-        columns = np.column_stack([slopes, law.factors(u, cell)]) * np.exp(-point[-1])
+        factors, slopes = law.factors_and_slopes(u, cell)
+        slopes = np.where(inside == coefficients, slopes, 0.0)
+        columns = np.column_stack([slopes, factors]) * np.exp(-point[-1])
         away = np.column_stack([np.eye(len(mean)), coefficients - mean])
         products = columns.T @ law.summed(cell) @ columns + away.T @ precision @ away
         size = np.sqrt(np.maximum(np.diag(products), TINY))

@@ -16,7 +16,7 @@ from scissorcal.calibration.verify.simulation import (
     simulate_friction,
 )
 from scissorcal.model import FrictionLaw
-from tests.calibration.truth import Truth, friction_recording
+from tests.calibration.truth import QUICK, Truth, friction_recording
 
 SILENT = TorqueNoise(0.0, 0.0, 0.01)
 LAW = FrictionLaw({"coulomb_pos": 0.013, "coulomb_neg": 0.016, "viscous": 0.002})
@@ -25,7 +25,7 @@ INERTIA = 2e-4
 
 @pytest.fixture(scope="module")
 def recording():
-    return friction_recording(Truth(), np.random.default_rng(1))
+    return friction_recording(Truth(), np.random.default_rng(1), QUICK)
 
 
 @pytest.fixture(scope="module")
