@@ -185,6 +185,7 @@ def test_white_noise_gives_the_textbook_posterior():
     assert found.null == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rho", [0.0, 0.9])
 def test_intervals_cover_although_noise_is_coloured(rho):
     """90 % intervals, 2 parameters x 100 fits: 90 +- 2.1 % (1 sd), so 82 % is 4 sd low."""

@@ -64,21 +64,32 @@ def sweeps(n: int) -> Array:
     return np.stack([np.sign(speed), speed, np.gradient(speed) + 0.3 * np.sin(t / 7.0)], axis=1)
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.9])
-def test_intervals_keep_their_coverage_under_noise_with_memory(rho):
-    """120 fits of 3 slopes: coverage of 90 % within 0.83 and 0.96 (3.5 sd of a binomial)."""
+@pytest.mark.parametrize(
+    ("rho", "fits", "least", "most"),
+    [
+        (0.9, 15, 0.74, 1.0),
+        pytest.param(0.0, 120, 0.83, 0.96, marks=pytest.mark.slow),
+        pytest.param(0.9, 120, 0.83, 0.96, marks=pytest.mark.slow),
+    ],
+)
+def test_intervals_keep_their_coverage_under_noise_with_memory(rho, fits, least, most):
+    """Fits of 3 slopes: coverage of 90 % within 3.5 standard deviations of a binomial.
+
+    Of 120 fits that is 0.83 to 0.96, of 15 it is 0.74 and more. Intervals that leave out the memory
+    are too narrow by 3 or more, and cover 40 %.
+    """
     design, series = sweeps(3000), np.zeros(3000, dtype=np.int64)
     noise = ArNoise(1, (rho,), 1.0) if rho else ArNoise(0, (), 1.0)
     truth = np.array([1.0, -0.5, 2.0])
     inside = []
-    for seed in range(120):
+    for seed in range(fits):
         rng = np.random.default_rng(seed)
         measured = design @ truth + noise.draw(series, rng)
         found = infer(regression(design, measured, series), "draft", rng, count=1000)
         low, high = np.quantile(found.draws[:, :3], [0.05, 0.95], axis=0)
         inside.append((low < truth) & (truth < high))
         assert found.noise_orders[0] >= (1 if rho else 0)
-    assert 0.83 < float(np.mean(inside)) < 0.96
+    assert least < float(np.mean(inside)) <= most
 
 
 def test_what_strokes_have_in_common_widens_the_intervals():

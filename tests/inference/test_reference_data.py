@@ -82,7 +82,7 @@ def test_a_plateau_is_not_taken_for_an_answer(name: str, start: int) -> None:
     [
         ("sblri", "standard"),
         ("kidiq", "standard"),
-        ("kidiq", "thorough"),
+        pytest.param("kidiq", "thorough", marks=pytest.mark.slow),
         pytest.param("sblri", "thorough", marks=pytest.mark.slow),
     ],
 )

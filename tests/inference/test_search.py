@@ -83,7 +83,7 @@ def test_all_evaluations_are_counted(effort: str, vectorised: bool) -> None:
     problem, counter = decay(), Counter()
     if vectorised:
         problem = replace(problem, log_posterior_many=at_once(problem))
-    found = infer(counter.over(problem), effort, np.random.default_rng(0))
+    found = infer(counter.over(problem), effort, np.random.default_rng(0), budget=20_000)
     assert found.evaluations == counter.calls
 
 
