@@ -38,12 +38,6 @@ def compare(seed: int) -> Steepest:
     return found
 
 
-@settings(max_examples=25, deadline=None)
-@given(st.integers(0, 2**32 - 1))
-def test_no_slope_of_a_random_plate_is_above_its_bound(seed: int) -> None:
-    compare(seed)
-
-
 @pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.integers(0, 2**32 - 1))
@@ -51,8 +45,8 @@ def test_no_slope_of_many_random_plates_is_above_its_bound(seed: int) -> None:
     compare(seed)
 
 
-def test_random_plates_are_felt() -> None:
-    """What is compared above is not nothing: on half of the plates slopes are found."""
+def test_no_slope_of_a_dozen_random_plates_is_above_its_bound() -> None:
+    """What is compared is not nothing: on half of the plates slopes are found."""
     found = [compare(seed) for seed in range(12)]
     assert np.mean([one.opening > 0.0 for one in found]) > 0.4
     assert any(one.closing > 0.0 for one in found)

@@ -97,7 +97,7 @@ def test_the_closure_that_saves_nothing_is_not_taken() -> None:
     assert closure.tried[0].cost.worst_share < 0.035
 
 
-@pytest.mark.parametrize("tolerance", [1.0, 7.0, 25.0])
+@pytest.mark.parametrize("tolerance", [1.0, pytest.param(7.0, marks=pytest.mark.slow), 25.0])
 def test_all_omissions_together_keep_the_share_of_the_tolerance(tolerance: float) -> None:
     """Judged again on other places: the torque itself, draw by draw, from what the package has."""
     chosen = simplifying(tolerance_percent=tolerance, opening_rate_rad_per_s=(0.15, 1.0))

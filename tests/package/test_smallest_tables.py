@@ -58,7 +58,7 @@ def test_they_fit_it_of_the_torque_at_each_place(title: str) -> None:
     small, scene = smallest_tables(model, chosen), scene_ranges(chosen)
     limit = chosen.limits.torque_Nm
     friction = small.mechanics.friction
-    points = spread_points(scene, 7_001, friction.rate_eps_rad_per_s if friction else 0.0)
+    points = spread_points(scene, 3_001, friction.rate_eps_rad_per_s if friction else 0.0)
     largest = float(np.max(np.abs(ExactTorque.at(model, points, limit).torque)))
     exact = ExactTorque.at(model, points, limit, largest)
     away = exact.deviation(AverageTorque(small.mechanics, scene, small.arrays))
