@@ -95,7 +95,7 @@ def test_cuts_of_the_beginning(whole: Whole) -> None:
 
 def test_cuts_anywhere_keep_all_complete_chunks(whole: Whole) -> None:
     rng = random.Random(3)
-    sizes = {rng.randrange(1, len(whole.data)) for _ in range(300)}
+    sizes = {rng.randrange(1, len(whole.data)) for _ in range(100)}
     sizes |= {end + by for end in whole.chunk_ends for by in (-1, 0, 1)}
     lost = [check_cut(whole, size) for size in sorted(sizes)]
     # One chunk at most, which is an eighth of a second and a batch of 20 ms.
@@ -125,9 +125,9 @@ def test_a_flipped_bit_never_changes_a_sample(whole: Whole, at: float, bit: int)
 
 def test_a_wrong_length_costs_no_chunk_but_its_own(whole: Whole) -> None:
     """A length that runs past the following chunks hides none of them."""
-    heads = [8, *whole.chunk_starts[:4]]
+    heads = [8, *whole.chunk_starts[:2]]
     for place, bit in (
-        (head + byte, bit) for head in heads for byte in range(1, 9) for bit in range(8)
+        (head + byte, bit) for head in heads for byte in range(1, 9) for bit in (0, 3, 7)
     ):
         path = whole.with_bytes(place, bytes([whole.data[place] ^ (1 << bit)]))
         found = read_recording(path)

@@ -28,7 +28,9 @@ def measured(scenario: Scenario, seed: int, late_s: float) -> DelayFit:
     return measure_delay(Plane(), settings_for(scenario), pictures, contacts)
 
 
-@pytest.mark.parametrize(("seed", "late_s"), [(8, 0.0), (12, 0.03)])
+@pytest.mark.parametrize(
+    ("seed", "late_s"), [pytest.param(8, 0.0, marks=pytest.mark.slow), (12, 0.03)]
+)
 def test_a_moving_plate_that_is_touched_shows_the_delay(seed: int, late_s: float) -> None:
     found = measured(Scenario("moving", moving=True, seconds=8.0), seed, late_s)
     assert found.known

@@ -1,6 +1,7 @@
 """Camera and rig, each by its own clock, into one filter: as the clocks were one."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -91,10 +92,17 @@ def test_exposures_are_put_at_the_rigs_time() -> None:
     assert follower.rig.fit.drift_ppm == pytest.approx(-300.0, abs=5.0)
 
 
-def test_tracks_are_consistent_on_drifting_clocks() -> None:
-    """Mean NEES over 12 moving plates below 6 x 2; with the delay left out it is above."""
+@pytest.mark.parametrize(
+    ("plates", "limit"), [((4, 5), 16.5), pytest.param(range(12), 12.0, marks=pytest.mark.slow)]
+)
+def test_tracks_are_consistent_on_drifting_clocks(plates: Iterable[int], limit: float) -> None:
+    """Mean NEES over moving plates below a limit; with the delay left out it is above.
+
+    The limit of 12 plates is 6 x 2. That of 2, which show the delay plainly, has a chance of 1e-3:
+    so often a chi-square of 12 degrees of freedom exceeds 32.9.
+    """
     good, crippled = [], []
-    for seed in range(12):
+    for seed in plates:
         world = a_world(seed)
         for delay_s, scores in ((SHORTEST_S, good), (0.0, crippled)):
             follower = followed(world, delay_s=delay_s, seed=seed)
@@ -102,7 +110,7 @@ def test_tracks_are_consistent_on_drifting_clocks() -> None:
             assert found is not None
             error = pose_error(found.rotation, found.place_m, world.rotation[-2], world.place_m[-2])
             scores.append(nees(error, found.covariance))
-    assert np.mean(good) < 12.0 < np.mean(crippled)
+    assert np.mean(good) < limit < np.mean(crippled)
 
 
 def test_rows_tell_what_the_pose_rests_on() -> None:

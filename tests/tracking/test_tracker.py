@@ -146,10 +146,11 @@ def test_numbers_that_are_not_finite_are_refused(bad: float) -> None:
         tracker.picture(pose_at(0.0, np.eye(3), np.array([bad, 0.0, 0.0])))
 
 
-def test_hours_of_pictures_keep_a_rotation_and_a_covariance() -> None:
-    """A spinning plate over 20,000 rows: the matrix stays a rotation, the covariance positive."""
+@pytest.mark.parametrize("rows", [2_000, pytest.param(20_000, marks=pytest.mark.slow)])
+def test_minutes_of_pictures_keep_a_rotation_and_a_covariance(rows: int) -> None:
+    """A spinning plate over many rows: the matrix stays a rotation, the covariance positive."""
     tracker = PoseTracker(Plane(), settings_for(MOVING))
-    for step in range(20_000):
+    for step in range(rows):
         turn = Rotation.from_rotvec([0.0, 0.0, 0.003 * step]).as_matrix()
         tracker.picture(pose_at(0.03 * step, turn, np.zeros(3)))
     found = tracker.estimate()
