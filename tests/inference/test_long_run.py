@@ -76,7 +76,7 @@ def test_intervals_keep_their_coverage_under_noise_with_memory(rho, fits, least,
     """Fits of 3 slopes: coverage of 90 % within 3.5 standard deviations of a binomial.
 
     Of 120 fits that is 0.83 to 0.96, of 15 it is 0.74 and more. Intervals that leave out the memory
-    are too narrow by 3 or more, and cover 40 %.
+    are too narrow by up to 4.4, the square root of (1 + rho) / (1 - rho).
     """
     design, series = sweeps(3000), np.zeros(3000, dtype=np.int64)
     noise = ArNoise(1, (rho,), 1.0) if rho else ArNoise(0, (), 1.0)
