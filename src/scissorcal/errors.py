@@ -48,6 +48,19 @@ class MissingError(ScissorcalError):
     exit_code = 5
 
 
+def needs_extra(what: str, package: str, extra: str, otherwise: str = "") -> InputError:
+    """The refusal of what takes a package that a plain install does not bring.
+
+    ``what`` begins the sentence, ``otherwise`` says how to go without.
+
+    >>> print(needs_extra("Parquet", "pyarrow", "parquet", "use CSV"))
+    Parquet needs pyarrow, which is not installed: pip install 'scissorcal[parquet]', or use CSV.
+    """
+    command = f"pip install 'scissorcal[{extra}]'"
+    way_out = f", or {otherwise}" if otherwise else ""
+    return InputError(f"{what} needs {package}, which is not installed: {command}{way_out}.")
+
+
 _ELSEWHERE = "choose a folder that you may write to"
 _FILE_ERRORS = {
     errno.ENOSPC: f"The disk is full: {{}} could not be written. Free some space, or {_ELSEWHERE}.",

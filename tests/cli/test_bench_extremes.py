@@ -1,6 +1,8 @@
 """scissorcal bench extremes: what it writes, refuses, and how it ends."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import jsonschema
@@ -55,6 +57,17 @@ def test_a_wrong_answer_ends_with_exit_code_3(few, cli: Cli, tmp_path: Path):
 def test_a_budget_that_is_no_time_is_refused(cli: Cli, tmp_path: Path):
     said = cli("bench", "extremes", "-o", tmp_path, "--budget", "soon")
     assert said.code == 2
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_mpmath_the_extra_is_named(tmp_path: Path):
+    """In a process of its own: here the reference's modules hold mpmath already."""
+    program = "import sys\nsys.modules['mpmath'] = None\nfrom scissorcal.cli import main\nmain()\n"
+    command = [sys.executable, "-c", program, "bench", "extremes", "-o", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "bench extremes needs mpmath, which is not installed" in done.stderr
+    assert "pip install 'scissorcal[bench]'." in done.stderr
     assert not list(tmp_path.iterdir())
 
 

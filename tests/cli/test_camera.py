@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import cv2
@@ -108,6 +109,25 @@ def test_a_camera_from_photographs_to_files(cli: Cli, workspace: Path, album: Pa
     said = cli("fit", "camera")
     assert "8 photographs" in said.out
     assert len(list((workspace / "fits" / "camera").glob("*.png"))) == 5
+
+
+def test_a_camera_is_fitted_without_matplotlib(
+    cli: Cli, workspace: Path, album: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert cli("capture", "camera", "--image", *boards(album)).code == 0
+    said = cli("fit", "camera")
+    assert said.code in (0, 3)
+    (note,) = (line for line in said.out.splitlines() if "matplotlib" in line)
+    assert note.startswith("residuals.png and uncertainty.png were not drawn")
+    assert note.endswith("pip install 'scissorcal[plots]', then 'scissorcal fit camera --force'.")
+    drawn = sorted(path.name for path in (workspace / "fits" / "camera").iterdir())
+    assert [name[:8] for name in drawn] == ["worst-1-", "worst-2-", "worst-3-"]
+    monkeypatch.undo()
+    monkeypatch.chdir(workspace)
+    said = cli("fit", "camera", "--force", "--json")
+    assert not [note for note in said.envelope["result"]["notes"] if "matplotlib" in note]
+    assert len(list((workspace / "fits" / "camera").iterdir())) == 5
 
 
 def test_a_camera_file_becomes_the_workspaces_camera(cli: Cli, workspace: Path) -> None:

@@ -1,5 +1,6 @@
 """scissorcal predict: numbers, files, and what it refuses."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -60,6 +61,17 @@ def test_a_table_of_motion_alone_is_enough(
     assert "no effort to compare with" in said.out
     by_motion = cli("predict", "friction", bare, "-w", fitted.root, "--json").envelope["result"]
     assert by_motion["share_inside"] is None
+
+
+def test_a_plot_without_matplotlib_is_refused_before_anything_is_read(
+    workspace: Path, cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing was captured or fitted here, which would be said first, with exit code 5."""
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    said = cli("predict", "friction", tmp_path / "none.mcap", "--plot", tmp_path / "plot.svg")
+    assert said.code == 2
+    assert "--plot needs matplotlib, which is not installed" in said.err
+    assert "pip install 'scissorcal[plots]', or give --table FILE.csv." in said.err
 
 
 def test_wrong_files_and_laws_are_refused_with_the_mend(

@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -183,6 +184,26 @@ def test_a_key_shows_who_signed(day: Workspace, cli: Cli, tmp_path: Path) -> Non
     forged = cli("package", "check")
     assert forged.code == 3
     assert "forged review" in forged.out
+
+
+@needs_ssh_keygen
+def test_without_cryptography_no_key_signs_and_none_is_taken_for_checked(
+    day: Workspace, cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = tmp_path / "lab"
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(lab)], check=True)
+    assert cli(*SIGN, "--key", lab).code == 0
+    assert cli("package", "build").code == 0
+    assert cli("package", "check").code == 0
+    monkeypatch.setitem(sys.modules, "cryptography", None)
+    for words in ((*SIGN, "--key", lab), ("package", "check", "--trusted-key", f"{lab}.pub")):
+        said = cli(*words)
+        assert said.code == 2
+        assert "needs cryptography, which is not installed" in said.err
+        assert "pip install 'scissorcal[keys]'." in said.err
+    said = cli("package", "check")
+    assert said.code == 3
+    assert "is not checked, because cryptography is not installed" in said.out
 
 
 @needs_ssh_keygen

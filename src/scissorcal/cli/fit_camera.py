@@ -62,7 +62,7 @@ def text(outcome: "FitOutcome") -> str:
         for view in worst
     ]
     lines.append(table(rows, right=range(1, 5)))
-    lines += fit.notes
+    lines += [*fit.notes, *outcome.notes]
     return "\n".join(lines)
 
 
@@ -82,7 +82,7 @@ def facts(outcome: "FitOutcome") -> dict[str, object]:
         "stretch": fit.stretch,
         "bulge_mm": fit.bulge_mm,
         "region_share": fit.region_share,
-        "notes": fit.notes,
+        "notes": [*fit.notes, *outcome.notes],
         "two_halves": fit.cross,
         "inputs_hash": fit.inputs_hash,
         "pictures": outcome.pictures,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scissorcal.errors import MissingError
+from scissorcal.kernel.browser_file import browser_file
 from scissorcal.kernel.tables import ModelTables
 
 MODEL_NUMBERS = (
@@ -21,16 +21,9 @@ CLOSURES = ("work", "eq4")
 def web_module() -> bytes:
     """The module's bytes: a reactor without imports, see ``web/sc_web.c``.
 
-    Raises MissingError where this installation was built without it.
+    Raises MissingError where it was not built and cannot be, see `browser_file`.
     """
-    path = Path(__file__).parent / "web" / "sc_web.wasm"
-    try:
-        return path.read_bytes()
-    except FileNotFoundError as error:
-        raise MissingError(
-            f"{path} is missing: this installation was built without the WebAssembly of the C "
-            "core. Install scissorcal again, from its wheel or with the package ziglang present."
-        ) from error
+    return browser_file(Path(__file__).parent / "web" / "sc_web.wasm")
 
 
 def web_numbers(tables: ModelTables) -> tuple[float, ...]:

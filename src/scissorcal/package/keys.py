@@ -1,17 +1,18 @@
 """Ed25519 keys, as OpenSSH keeps them: sign a review's digest, and check such a signature.
 
 'ssh-keygen -t ed25519 -f lab-key' makes a pair. Signing and checking are those of the package
-cryptography (RFC 8032).
+cryptography (RFC 8032), which the extra ``keys`` brings.
 """
 
 import base64
 import os
 import stat
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, needs_extra
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import KEY
 from scissorcal.package.review import KeySignature
@@ -28,14 +29,20 @@ def sign_digest(path: Path, digest: str, passphrase: Callable[[], str]) -> KeySi
     """Sign a review's digest by the private key in a file.
 
     ``passphrase`` is asked for where the key is encrypted. Raises InputError where
-    it is no such key, is not there, or where others may read it.
+    it is no such key, is not there, where others may read it, or without cryptography.
     """
+    _refuse_without_cryptography("Signing with a key")
     from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 
     private = _private_key(path, passphrase)
     public = private.public_key().public_bytes(Encoding.OpenSSH, PublicFormat.OpenSSH).decode()
     signed = private.sign(_SIGNED + digest.encode())
     return KeySignature(public_key=public, signature=base64.b64encode(signed).decode())
+
+
+def can_check() -> bool:
+    """Whether this computer can check a signature: it takes cryptography."""
+    return find_spec("cryptography") is not None
 
 
 def holds(key: KeySignature, digest: str) -> bool:
@@ -56,8 +63,10 @@ def holds(key: KeySignature, digest: str) -> bool:
 def read_public_keys(path: Path) -> tuple[str, ...]:
     """Public keys of a file, one a line as in ``lab-key.pub``; comments are left out.
 
-    Raises InputError where it is not there or a line is no Ed25519 key.
+    Raises InputError where it is not there, a line is no Ed25519 key, or without cryptography: who
+    names keys wants signatures checked.
     """
+    _refuse_without_cryptography("Checking a signature")
     found = []
     lines = read_foreign(path, KEY).decode("utf-8", "replace").splitlines()
     for number, line in enumerate(lines, start=1):
@@ -76,6 +85,11 @@ def read_public_keys(path: Path) -> tuple[str, ...]:
     if not found:
         raise InputError(f"{path} holds no public key: give the file that ends in .pub.")
     return tuple(found)
+
+
+def _refuse_without_cryptography(what: str) -> None:
+    if not can_check():
+        raise needs_extra(what, "cryptography", "keys")
 
 
 def _private_key(path: Path, passphrase: Callable[[], str]) -> "Ed25519PrivateKey":

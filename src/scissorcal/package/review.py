@@ -127,8 +127,14 @@ def against(
             "sign it, then 'scissorcal package build'"
         )
     if review.key is not None:
-        from scissorcal.package.keys import holds
+        from scissorcal.package.keys import can_check, holds
 
+        if not can_check():
+            return (
+                f"has a review ({review.words}) whose signature by the key "
+                f"{review.key.fingerprint} is not checked, because cryptography is not installed: "
+                "pip install 'scissorcal[keys]'"
+            )
         if not holds(review.key, review.digest):
             return (
                 f"has a forged review ({review.words}): the signature by the key "

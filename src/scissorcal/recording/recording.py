@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.errors import MissingError
+from scissorcal.errors import needs_extra
 from scissorcal.recording.header import Joint, Kind, Stroke, StrokeKind
 from scissorcal.recording.layout import SAMPLE_DTYPE
 
@@ -68,17 +68,15 @@ class Recording:
 
         The columns are those of ``scissorcal export``: ``opening_rad`` (``opening_m`` for a linear
         joint), ``motor_torque_Nm`` and so on; ``time_s`` is the device clock from the first sample.
-        Raises MissingError where pandas is not installed.
+        Raises InputError where pandas is not installed.
         """
         from scissorcal.recording.layout import columns
 
         try:
             import pandas as pd
         except ImportError:
-            raise MissingError(
-                "to_pandas() needs pandas, which is not installed. Run 'pip install pandas', or "
-                "use recording.samples, a NumPy array with the same fields."
-            ) from None
+            array = "use recording.samples, a NumPy array with the same fields"
+            raise needs_extra("to_pandas()", "pandas", "analysis", array) from None
         return pd.DataFrame(columns(self))
 
     @property

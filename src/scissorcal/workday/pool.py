@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
 
-from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.errors import InputError, ScissorcalError, needs_extra
 from scissorcal.workday.answers import answering, read_answer
 
 P = ParamSpec("P")
@@ -129,10 +129,7 @@ def _cluster(address: str) -> Iterator[Pool]:
     try:
         distributed: Any = import_module("dask.distributed")
     except ImportError as error:
-        raise InputError(
-            "--cluster needs dask.distributed, which is not installed: pip install "
-            "'scissorcal[cluster]'."
-        ) from error
+        raise needs_extra("--cluster", "dask.distributed", "cluster") from error
     if address.startswith("tls:") and not distributed.Security().tls_ca_file:
         raise InputError(
             f"{address} asks for TLS, and dask knows no certificates: name them in its "

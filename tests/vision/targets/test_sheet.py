@@ -1,5 +1,7 @@
 """Printed targets: at true scale, all their marks to be found, each telling its own name."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +11,16 @@ from PIL import Image
 
 from scissorcal.vision.targets.boards import BLADE_MAT, DICTIONARY, MAT_FIELD_M, TARGETS, targets_of
 from scissorcal.vision.targets.detect import find_board, find_markers
-from scissorcal.vision.targets.sheet import PAPER_MM, RULERS_MM, Paper, SheetName, target_sheet
-from scissorcal.vision.targets.sheet_files import PIXELS_PER_MM, sheet_pdf, sheet_png, write_target
+from scissorcal.vision.targets.pdf import sheet_pdf
+from scissorcal.vision.targets.sheet import (
+    PAPER_MM,
+    RULERS_MM,
+    Paper,
+    SheetName,
+    Words,
+    target_sheet,
+)
+from scissorcal.vision.targets.sheet_files import PIXELS_PER_MM, sheet_png, write_target
 from tests.vision.scenes import photo_of
 
 SHEETS = [(name, paper) for name in ("camera", "blade", "plate") for paper in ("A4", "Letter")]
@@ -137,6 +147,40 @@ def test_the_text_names_the_target_and_the_check() -> None:
         assert "200.0 mm" in words
         for board, _, _ in target_sheet(name, paper).boards:
             assert f"{board.name} ({DICTIONARY} {board.ids[0]}-{board.ids[-1]}" in words
+
+
+@pytest.mark.parametrize(("name", "paper"), SHEETS)
+def test_the_pdf_holds_the_sheets_words(name: SheetName, paper: Paper) -> None:
+    sheet = target_sheet(name, paper)
+    document = pypdfium2.PdfDocument(sheet_pdf(sheet))
+    page = document[0]
+    read = page.get_textpage().get_text_range()  # of several blanks it gives one
+    assert sorted(read.splitlines()) == sorted(" ".join(one.text.split()) for one in sheet.words)
+    assert document.get_metadata_dict()["Title"] == f"scissorcal target: {name} ({paper})"
+    document.close()
+
+
+def test_signs_of_the_pdf_format_stay_text() -> None:
+    """Parentheses and backslashes end a string, or change it, where they are not escaped."""
+    text = r"a (b) \n) 20 × 30 mm, c:\t"
+    sheet = replace(target_sheet("blade"), words=(Words(20.0, 20.0, 4.0, text),))
+    document = pypdfium2.PdfDocument(sheet_pdf(sheet))
+    assert document[0].get_textpage().get_text_range() == text
+    document.close()
+
+
+def test_the_pdfs_table_says_where_its_objects_are() -> None:
+    """A reader that does not repair files needs each place exact to the byte."""
+    data = sheet_pdf(target_sheet("camera"))
+    table = int(data.rsplit(b"startxref\n", 1)[1].split()[0])
+    head, count, *rows = data[table:].split(b"\n")
+    assert (head, count) == (b"xref", b"0 7")
+    for number, row in enumerate(rows[1:7], start=1):
+        assert len(row) == 19  # and the end of its line: 20 bytes for each
+        assert data[int(row[:10]) :].startswith(b"%d 0 obj\n" % number)
+    length = int(re.search(rb"/Length (\d+) >>\nstream\n", data)[1])  # type: ignore[index]
+    start = data.index(b"stream\n") + len(b"stream\n")
+    assert data[start + length :].startswith(b"\nendstream")
 
 
 def test_the_same_sheet_gives_the_same_bytes(tmp_path: Path) -> None:

@@ -11,7 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, Protocol, TypeVar
 
-import mpmath
+from scissorcal.errors import needs_extra
+
+try:
+    import mpmath
+except ImportError:
+    raise needs_extra("bench extremes", "mpmath", "bench") from None
 
 mp = mpmath.MPContext()
 mp.dps = 50

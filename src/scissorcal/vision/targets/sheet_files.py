@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from scissorcal.errors import file_error
 from scissorcal.files import replacing
+from scissorcal.vision.targets.pdf import sheet_pdf
 from scissorcal.vision.targets.sheet import Sheet
 
 if TYPE_CHECKING:
     from PIL import Image
 
 PIXELS_PER_MM = 20
-_POINTS_PER_MM = 72.0 / 25.4
 
 
 def write_target(sheet: Sheet, folder: Path) -> tuple[Path, Path]:
@@ -32,35 +32,6 @@ def write_target(sheet: Sheet, folder: Path) -> tuple[Path, Path]:
         raise file_error(error, folder) or error from None
     pdf, png = contents
     return pdf, png
-
-
-def sheet_pdf(sheet: Sheet) -> bytes:
-    """Give a sheet as a PDF of one page."""
-    from reportlab.pdfgen.canvas import Canvas
-
-    stream = io.BytesIO()
-    points = _POINTS_PER_MM
-    page = Canvas(stream, pagesize=(sheet.width * points, sheet.height * points), invariant=1)
-    page.setTitle(f"scissorcal target: {sheet.name} ({sheet.paper})")
-    page.setViewerPreference("PrintScaling", "None")
-    # One path for each shade: neighbours in one path have no seam between them.
-    for level in sorted({shape.level for shape in sheet.rectangles}):
-        path = page.beginPath()
-        for shape in sheet.rectangles:
-            if shape.level == level:
-                low = sheet.height - shape.y - shape.height
-                path.rect(
-                    shape.x * points, low * points, shape.width * points, shape.height * points
-                )
-        page.setFillGray(level)
-        page.drawPath(path, stroke=0, fill=1)
-    page.setFillGray(0.0)
-    for words in sheet.words:
-        page.setFont("Helvetica", words.size * points)
-        page.drawString(words.x * points, (sheet.height - words.y) * points, words.text)
-    page.showPage()
-    page.save()
-    return stream.getvalue()
 
 
 def sheet_png(sheet: Sheet) -> bytes:

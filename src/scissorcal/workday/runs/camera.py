@@ -1,6 +1,7 @@
 """The camera: photographs of a board captured, fitted, or a camera file imported."""
 
 from collections.abc import Callable, Iterable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,11 @@ CameraBoard = CharucoBoard | Chessboard
 STREAM = 2
 WORST = 3
 """Photographs whose residuals are drawn: those with the largest rms."""
+
+NOT_DRAWN = (
+    "residuals.png and uncertainty.png were not drawn, because matplotlib is not installed: pip "
+    "install 'scissorcal[plots]', then 'scissorcal fit camera --force'."
+)
 
 
 def capture_camera(
@@ -69,7 +75,10 @@ def capture_camera(
 
 
 def fit(engine: "Engine", request: "Request") -> "Made":
-    """Fit the camera to all photographs of boards; draw residuals and uncertainty."""
+    """Fit the camera to all photographs of boards; draw residuals and uncertainty.
+
+    Both are charts of matplotlib; a note replaces them where that is not installed.
+    """
     import numpy as np
 
     from scissorcal.calibration.camera.fit import fit_camera, seen_board
@@ -87,7 +96,12 @@ def fit(engine: "Engine", request: "Request") -> "Made":
         progress=request.progress,
     )
     boards = [seen_board(photo.name, photo.detection, priors) for photo in photos]
-    return Made(result, lambda folder: _draw(result, boards, captures, folder))
+    charts = find_spec("matplotlib") is not None
+    return Made(
+        result,
+        lambda folder: _draw(result, boards, captures, folder, charts=charts),
+        () if charts else (NOT_DRAWN,),
+    )
 
 
 def import_camera(engine: "Engine", file: Path) -> tuple["CameraFit", "CameraFile", Path]:
@@ -149,8 +163,10 @@ def _draw(
     boards: Sequence["SeenBoard"],
     captures: Sequence[PhotoCapture],
     folder: Path,
+    *,
+    charts: bool,
 ) -> None:
-    """Draw residuals over the picture, the uncertainty, and the worst photographs."""
+    """Draw the worst photographs, and charts of residuals and uncertainty where ``charts``."""
     from scissorcal.calibration.camera.pictures import (
         left_over,
         residual_chart,
@@ -158,8 +174,9 @@ def _draw(
     )
     from scissorcal.vision.overlay import residual_overlay, write_picture
 
-    residual_chart(found, boards, folder / "residuals.png")
-    uncertainty_chart(found, folder / "uncertainty.png")
+    if charts:
+        residual_chart(found, boards, folder / "residuals.png")
+        uncertainty_chart(found, folder / "uncertainty.png")
     files = [capture.path(photo) for capture in captures for photo in capture.index.photographs]
     order = sorted(range(len(files)), key=lambda index: -found.views[index].rms_px)
     for place, index in enumerate(order[:WORST], start=1):

@@ -40,10 +40,14 @@ class Request:
 
 @dataclass(frozen=True)
 class Made:
-    """A result, and how to draw its pictures into a folder; None where the report draws it."""
+    """A result, and how to draw its pictures into a folder; None where the report draws it.
+
+    ``notes`` say what this computer could not do beside the fit.
+    """
 
     result: Any
     draw: Callable[[Path], None] | None = None
+    notes: tuple[str, ...] = ()
 
 
 class FitModule(Protocol):
@@ -54,7 +58,10 @@ class FitModule(Protocol):
 
 @dataclass(frozen=True)
 class FitOutcome:
-    """One fit of a workspace: its result, file, pictures and state, and whether it was cached."""
+    """One fit of a workspace: its result, file, pictures and state, and whether it was cached.
+
+    ``notes`` are those of `Made`.
+    """
 
     what: str
     result: Any
@@ -62,6 +69,7 @@ class FitOutcome:
     pictures: tuple[Path, ...]
     cached: bool
     state: StepState
+    notes: tuple[str, ...] = ()
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -167,7 +175,8 @@ def fit_step(
     state = engine.state(step.name)
     if state.state != "incomplete":
         request.checkpoint.unlink(missing_ok=True)
-    return FitOutcome(step.what, made.result, path, pictures_beside(path), False, state)
+    drawn = pictures_beside(path)
+    return FitOutcome(step.what, made.result, path, drawn, False, state, made.notes)
 
 
 def load_result(engine: Engine, what: str) -> Any:

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, needs_extra
 from scissorcal.files import replacing
 from scissorcal.foreign import open_foreign, reading
 from scissorcal.foreign.formats import LOG
@@ -67,7 +68,7 @@ def predict_workspace(
     )
 
     tell = progress or (lambda done, sentence: None)
-    _refuse_endings(table, plot)
+    _refuse_files(table, plot)
     engine = Engine.of(workspace)
     recipe = engine.recipe
     fit = load_result(engine, "friction")
@@ -162,7 +163,7 @@ def _headings(path: Path) -> list[str]:
         return [cell.strip() for cell in row]
 
 
-def _refuse_endings(table: Path | None, plot: Path | None) -> None:
+def _refuse_files(table: Path | None, plot: Path | None) -> None:
     """Refuse before any work what could not be written after it."""
     for path, endings in ((table, (".csv",)), (plot, PLOTS)):
         if path is None:
@@ -171,6 +172,8 @@ def _refuse_endings(table: Path | None, plot: Path | None) -> None:
             raise InputError(f"{path}: give the name the ending {' or '.join(endings)}.")
         if not path.parent.is_dir():
             raise InputError(f"{path.parent} is no folder. Make it first, or choose another.")
+    if plot is not None and find_spec("matplotlib") is None:
+        raise needs_extra("--plot", "matplotlib", "plots", "give --table FILE.csv")
 
 
 def _write_table(found: "Prediction", path: Path, position: str, effort: str) -> None:

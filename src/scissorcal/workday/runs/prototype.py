@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import scissorcal
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import InputError, MissingError, needs_extra
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM
@@ -202,16 +202,17 @@ def prototype_server(
     """A server of the package's page that follows the workspace's rig; see `serve`.
 
     With a ``device`` the page may start commands on it, with a ``camera`` a track too. Raises
-    MissingError where aiohttp is not installed, InputError where a camera has no device, and what
-    `workspace_scene` raises.
+    InputError where aiohttp is not installed or a camera has no device, MissingError where the page
+    was not built and cannot be, and what `workspace_scene` raises.
     """
     _require_aiohttp()
-    from scissorcal.prototype.document import page_of, policy_of
+    from scissorcal.prototype.document import ensure_page, page_of, policy_of
     from scissorcal.prototype.server import PrototypeServer
 
     if camera != NONE and device == NONE:
         raise InputError("--camera is for a track that the page starts: name a --device, too.")
     scene = workspace_scene(workspace, package_path)
+    ensure_page()
     commands: tuple[RigCommand, ...] = ()
     if device != NONE:
         commands = rig_commands(workspace, device, camera=camera, package_path=package_path)
@@ -269,12 +270,9 @@ def export_page(
 
 
 def _require_aiohttp() -> None:
-    """MissingError, with the remedy, where the server's library is not installed."""
+    """InputError, with the remedy, where the server's library is not installed."""
     try:
         import aiohttp  # noqa: F401
     except ImportError:
-        raise MissingError(
-            "The page's server needs aiohttp, which is not installed: pip install "
-            "'scissorcal[prototype]', or write the page into a file with 'scissorcal package "
-            "export --html FILE'."
-        ) from None
+        export = "write the page into a file with 'scissorcal package export --html FILE'"
+        raise needs_extra("The page's server", "aiohttp", "prototype", export) from None
