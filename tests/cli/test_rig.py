@@ -43,7 +43,8 @@ def test_captures_on_the_virtual_rig_fill_the_plan(quick: Path, cli: Cli) -> Non
     assert [step["state"] for step in steps[:3]] == ["done", "done", "missing"]
 
 
-def test_unplugged_while_capturing_keeps_what_was_recorded(quick: Path, cli: Cli) -> None:
+@pytest.mark.realtime
+def test_a_port_unplugged_while_capturing_keeps_what_was_recorded(quick: Path, cli: Cli) -> None:
     assert cli("device", "probe", "--device", "sim", "--realtime").code == 0
     with SimProcess("office-paper", faults=["unplug=1.5"]) as sim:
         said = cli("capture", "friction", "--device", sim.port, "--json")
@@ -79,6 +80,7 @@ def test_a_port_that_speaks_something_else_is_said_to(quick: Path, cli: Cli) -> 
     assert "Traceback" not in said.err
 
 
+@pytest.mark.realtime
 def test_the_doctor_examines_the_virtual_rig(cli: Cli) -> None:
     said = cli("device", "doctor", "--device", "sim", "--seconds", "0.5", "--json")
     assert said.code in (0, 3)

@@ -303,6 +303,7 @@ def test_tracks_of_lines_stay_readable(cli: Cli, workspace: Path) -> None:
     assert math.isfinite(rows[0].time_s)
 
 
+@pytest.mark.realtime
 def test_a_running_camera_and_a_rig_on_a_port(
     cli: Cli, calibrated: Path, recipe: Recipe, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -204,7 +204,7 @@ def test_samples_are_recorded_while_the_choice_goes_on_in_its_own_thread(
     assert np.all(np.diff(recording.samples["sequence"].astype(np.int64)) == 1)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_rig_in_real_time_idles_while_the_next_part_is_chosen(tmp_path: Path) -> None:
     """The choice keeps a processor busy for two seconds in its own thread, twice."""
     parts = [sweep_part(RECIPE, IDENTITY, (1.5,), first=0)]

@@ -85,7 +85,8 @@ def test_a_late_computer_needs_a_device_that_waits_longer(
     assert brake_after_ms(measured) == recommended
 
 
-def test_listening_keeps_the_stream_going() -> None:
+@pytest.mark.realtime
+def test_a_served_rig_is_listened_to_for_longer_than_it_streams_unheard() -> None:
     with SimProcess("office-paper", seed=3) as sim, open_link(sim.port) as link:
         found = examine(link, seconds=6.5)
     assert found.measurements.frames > 5600
@@ -111,7 +112,8 @@ def test_adapter_timer_is_read_from_its_file(tmp_path: Path) -> None:
     assert adapter_timer_ms("/dev/ttyUSB7", tmp_path) == 16.0
 
 
-def test_a_line_with_losses_fails_its_checks() -> None:
+@pytest.mark.realtime
+def test_a_served_line_with_losses_fails_its_checks() -> None:
     told: list[float] = []
     with (
         SimProcess("office-paper", seed=3, faults=("drop=0.01", "garble=0.01")) as sim,
