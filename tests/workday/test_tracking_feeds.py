@@ -13,6 +13,7 @@ import pytest
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.vision.live import Frame, timed
 from scissorcal.vision.track import Tracked
+from scissorcal.workday.tracking import feeds
 from scissorcal.workday.tracking.camera_thread import CameraThread
 from scissorcal.workday.tracking.feeds import (
     live_feed,
@@ -20,6 +21,7 @@ from scissorcal.workday.tracking.feeds import (
     refuse_without_sledge,
 )
 from scissorcal.workday.tracking.pictures import PlatePicture
+from tests.guard import GUARD_S
 
 
 def a_frame(number: int, rate_Hz: float = 30.0, stamp_s: float = float("nan")) -> Frame:
@@ -76,8 +78,9 @@ def test_what_ends_a_camera_is_raised_after_its_last_picture() -> None:
     thread.close()
 
 
-def test_a_feed_ends_with_what_ended_its_camera() -> None:
+def test_a_feed_ends_with_what_ended_its_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where the camera fails while its last picture is being located."""
+    monkeypatch.setattr(feeds, "NO_PICTURE_S", GUARD_S)
     failing = threading.Event()
 
     def camera() -> Iterator[Frame]:
@@ -116,7 +119,7 @@ def test_a_camera_that_hangs_does_not_hold_up_the_end() -> None:
     closing = threading.Thread(target=thread.close)
     closing.start()
     release.set()
-    closing.join(10.0)
+    closing.join(GUARD_S)
     assert not closing.is_alive()
 
 
