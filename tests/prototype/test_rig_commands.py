@@ -20,7 +20,9 @@ from scissorcal.prototype.rig_commands import (
     State,
 )
 
-from .made import BOUND_s
+from tests.guard import GUARD_S
+
+
 
 REQUEST = "Take everything out."
 RENDER = RigCommand("render", ("render",), REQUEST)
@@ -40,7 +42,7 @@ class Told:
         self._news.set()
 
     async def wait_for(self, is_it: Callable[[State], bool]) -> State:
-        async with asyncio.timeout(BOUND_s):
+        async with asyncio.timeout(GUARD_S):
             while not (self.states and is_it(self.states[-1])):
                 self._news.clear()
                 await self._news.wait()
@@ -67,7 +69,7 @@ def trial(
         try:
             await act(commands, told)
         finally:
-            async with asyncio.timeout(BOUND_s):
+            async with asyncio.timeout(GUARD_S):
                 await commands.close()
         assert not commands.runs
 
@@ -221,7 +223,7 @@ def _until_gone(pid: int) -> None:
     """Raises ProcessLookupError once nothing has that number, or only a body to be buried."""
     import time
 
-    for _ in range(int(BOUND_s / 0.01)):
+    for _ in range(int(GUARD_S / 0.01)):
         os.kill(pid, 0)
         state = Path(f"/proc/{pid}/stat")
         if state.exists() and state.read_text().rpartition(")")[2].split()[0] == "Z":

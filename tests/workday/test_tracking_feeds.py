@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import DeviceError, InputError
+from scissorcal.recording import SAMPLE_DTYPE
 from scissorcal.vision.live import Frame, timed
 from scissorcal.vision.track import Tracked
 from scissorcal.workday.tracking import feeds
@@ -103,6 +104,65 @@ def test_a_feed_ends_with_what_ended_its_camera(monkeypatch: pytest.MonkeyPatch)
 
     with ExitStack() as stack, pytest.raises(DeviceError, match="is gone"):
         for _ in live_feed(stack, Eye(), camera(), None).events:  # type: ignore[arg-type]
+            pass
+
+
+def test_samples_and_pictures_of_a_running_rig_come_as_one_stream(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A picture stands at its time since the feed began, behind the samples that came before."""
+    monkeypatch.setattr(feeds, "time", SimpleNamespace(monotonic=lambda: 50.0, time_ns=lambda: 7))
+    taken = threading.Semaphore(1)
+
+    def camera() -> Iterator[Frame]:
+        for number in range(3):
+            assert taken.acquire(timeout=GUARD_S)
+            yield a_frame(number)
+
+    class Eye:
+        locate = staticmethod(seen)
+
+        @staticmethod
+        def picture(found: Tracked) -> PlatePicture:
+            return PlatePicture(
+                found.frame.number, 0.0, 50.25 + found.frame.number, "no target", 0
+            )
+
+    motion: Any = SimpleNamespace(step=lambda: np.zeros(50, SAMPLE_DTYPE))
+    blocks, times = 0, []
+    with ExitStack() as stack:
+        feed = live_feed(stack, Eye(), camera(), motion)  # type: ignore[arg-type]
+        assert feed.base_ns == 7
+        for event in feed.events:
+            if not isinstance(event, PlatePicture):
+                assert len(event) == 50
+                blocks += 1
+                continue
+            assert blocks > len(times)
+            times.append(event.arrived_s)
+            taken.release()
+            if len(times) == 3:
+                break
+    assert times == [0.25, 1.25, 2.25]
+
+
+def test_a_camera_that_stops_beside_a_rig_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter(range(50, 1000))
+    monkeypatch.setattr(
+        feeds, "time", SimpleNamespace(monotonic=lambda: float(next(clock)), time_ns=lambda: 7)
+    )
+    over = threading.Event()
+
+    def camera() -> Iterator[Frame]:
+        over.wait()
+        yield from ()
+
+    eye: Any = SimpleNamespace(locate=seen)
+    motion: Any = SimpleNamespace(step=lambda: np.zeros(50, SAMPLE_DTYPE))
+    with ExitStack() as stack, pytest.raises(DeviceError, match="no picture for 5 s"):
+        feed = live_feed(stack, eye, camera(), motion)
+        stack.callback(over.set)
+        for _ in feed.events:
             pass
 
 
