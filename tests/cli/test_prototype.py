@@ -1,7 +1,7 @@
 """``scissorcal prototype`` as a person uses it: served, followed, started, stopped, killed.
 
-What a page does with a command that runs is tested without a rig in tests/prototype: test_server.py,
-test_rig_commands.py and test_rig_feed.py.
+What a page does with a command that runs is tested without a rig in tests/prototype:
+test_server.py, test_rig_commands.py and test_rig_feed.py.
 """
 
 import asyncio

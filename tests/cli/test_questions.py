@@ -13,12 +13,14 @@ from scissorcal.cli import questions
 from scissorcal.prototype.rig_commands import ENVIRONMENT, QUESTION
 from tests.guard import GUARD_S
 
-PROGRAM = f"""
-import os, sys, threading, time
+PROGRAM = (
+    f"""
+import os, sys, time
 import typer
 from scissorcal.cli import questions
 questions.PATIENCE_s = {GUARD_S}
-""" + """
+"""
+    + """
 from scissorcal.cli.live_view import LiveView
 from scissorcal.cli.root import _asking
 from scissorcal.cli.terminal import echo
@@ -35,8 +37,10 @@ with _asking():
         sys.exit(130)
 echo("done", err=True)
 """
+)
 ASKS = "with LiveView() as view: view.confirm('Clear the blades.\\x1b[2J')"
-WORKS = "echo('works', err=True); threading.Event().wait()"
+WORKS = "echo('works', err=True); [time.sleep(0.02) for _ in iter(int, 1)]"
+"""It sleeps for moments: a signal that comes just before a sleep begins does not end it."""
 
 
 @contextmanager

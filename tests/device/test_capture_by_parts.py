@@ -204,9 +204,7 @@ def test_samples_are_recorded_while_the_choice_goes_on_in_its_own_thread(
 
     path = tmp_path / "cut.mcap"
     with open_writer(path, "cut", link, RECIPE, "", by_parts=True) as writer:
-        capture_by_parts(
-            link, RECIPE, "cut", writer, choose, longest_s=60.0, progress=progress
-        )
+        capture_by_parts(link, RECIPE, "cut", writer, choose, longest_s=60.0, progress=progress)
     assert threads
     assert threading.main_thread() not in threads
     recording = read_recording(path)

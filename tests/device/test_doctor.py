@@ -149,9 +149,7 @@ def test_listening_keeps_the_stream_going(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_line_with_losses_fails_its_checks(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[float] = []
     link = Listened(Faults(drop_share=0.01, garble_share=0.01))
-    found = examined(
-        link, 1.0, monkeypatch, progress=lambda done, sentence: told.append(done)
-    )
+    found = examined(link, 1.0, monkeypatch, progress=lambda done, sentence: told.append(done))
     assert found.measurements.lost > 0
     assert found.measurements.garbled > 0
     assert "lost frames" in {verdict.check for verdict in failed(found.verdicts)}

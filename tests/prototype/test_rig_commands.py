@@ -19,10 +19,7 @@ from scissorcal.prototype.rig_commands import (
     RigCommands,
     State,
 )
-
 from tests.guard import GUARD_S
-
-
 
 REQUEST = "Take everything out."
 RENDER = RigCommand("render", ("render",), REQUEST)
@@ -136,13 +133,15 @@ def test_arming_another_command_takes_the_place_of_the_first(tmp_path: Path) -> 
 WAITS = """
 try:
     print('ready', file=sys.stderr, flush=True)
-    time.sleep(60)
+    while True:
+        time.sleep(0.02)
 except KeyboardInterrupt:
     print(' 50 %  half of it (3 s)', file=sys.stderr)
     print('The samples are kept.', file=sys.stderr)
     print('Error: Interrupted.', file=sys.stderr)
     sys.exit(130)
 """
+"""It sleeps for moments: a signal that comes just before a sleep begins does not end it."""
 
 
 def test_any_page_stops_it_as_ctrl_c_does(tmp_path: Path) -> None:

@@ -15,7 +15,6 @@ from scissorcal.recording.following import RecordingFollower
 from scissorcal.recording.partfile import create_locked
 from scissorcal.recording.plate_channels import POSE
 from scissorcal.recording.recovering import recover
-
 from tests.guard import GUARD_S
 
 from .made import a_writer, samples_of

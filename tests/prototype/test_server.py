@@ -24,7 +24,6 @@ from scissorcal.prototype.server import (
     samples_message,
 )
 from scissorcal.prototype.watcher import ALLOWED_AT_ONCE, MOST_WAITING, Watcher
-
 from tests.guard import GUARD_S
 
 from .made import a_browser, a_server, a_writer, ask, heard, samples_of
@@ -33,9 +32,11 @@ REQUEST = "Take everything out."
 RENDER = RigCommand("render", ("render",), REQUEST)
 WAITS = (
     "import sys, time\n"
-    "try:\n    print('ready', file=sys.stderr, flush=True)\n    time.sleep(60)\n"
+    "try:\n    print('ready', file=sys.stderr, flush=True)\n"
+    "    while True:\n        time.sleep(0.02)\n"
     "except KeyboardInterrupt:\n    sys.exit(130)\n"
 )
+"""It sleeps for moments: a signal that comes just before a sleep begins does not end it."""
 HOW: dict[str, Any] = {"program": (sys.executable, "-c", WAITS)}
 
 

@@ -27,7 +27,6 @@ from scissorcal.kernel import (
     decode,
     encode,
 )
-
 from tests.guard import GUARD_S
 
 STREAM = Config(ConfigKey.STREAM, 7, 1.0)
@@ -87,7 +86,9 @@ class Host:
 Script = Callable[[Host, Clock], Iterator[None]]
 
 
-def run(script: Script, monkeypatch: pytest.MonkeyPatch, faults: Faults | None = None) -> ServeReport:
+def run(
+    script: Script, monkeypatch: pytest.MonkeyPatch, faults: Faults | None = None
+) -> ServeReport:
     """Serve; a step of the script after each tick, and the end with its end."""
     host, clock = Host(), Clock()
     monkeypatch.setattr(room, "time", SimpleNamespace(monotonic=clock.monotonic, sleep=clock.sleep))
