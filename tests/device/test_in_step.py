@@ -88,26 +88,29 @@ def test_an_unplugged_rig_is_a_device_error_and_its_samples_are_kept(tmp_path: P
 
 
 def test_a_killed_servo_is_detected_and_the_motors_are_released() -> None:
-    with in_step() as rig, open_link(rig.port) as link:
-        with open_motion(link, servo_config(RECIPE, link.identity)) as motion:
-            assert isinstance(motion, PortMotion)
-            path = PathBuilder(*motion.position, motion.tick_s)
-            path.rest(20.0)
-            blocks = motion.track(path.reference())
-            while motion.mode is not Mode.TRACK:
-                next(blocks)
-            assert motion.pid is not None
-            os.kill(motion.pid, signal.SIGKILL)
-            with pytest.raises(DeviceError, match=r"killed by signal 9\. Without commands"):
-                for _ in blocks:
-                    pass
-            link.flush()
-            rig.pass_ticks(1)
-            assert link.state().flags & StateFlag.MOTOR_ENABLED, "it was killed in its path"
-            rig.pass_ticks(20)
-            link.flush()
-            rig.pass_ticks(1)
-            assert not link.state().flags & StateFlag.MOTOR_ENABLED
+    with (
+        in_step() as rig,
+        open_link(rig.port) as link,
+        open_motion(link, servo_config(RECIPE, link.identity)) as motion,
+    ):
+        assert isinstance(motion, PortMotion)
+        path = PathBuilder(*motion.position, motion.tick_s)
+        path.rest(20.0)
+        blocks = motion.track(path.reference())
+        while motion.mode is not Mode.TRACK:
+            next(blocks)
+        assert motion.pid is not None
+        os.kill(motion.pid, signal.SIGKILL)
+        with pytest.raises(DeviceError, match=r"killed by signal 9\. Without commands"):
+            for _ in blocks:
+                pass
+        link.flush()
+        rig.pass_ticks(1)
+        assert link.state().flags & StateFlag.MOTOR_ENABLED, "it was killed in its path"
+        rig.pass_ticks(20)
+        link.flush()
+        rig.pass_ticks(1)
+        assert not link.state().flags & StateFlag.MOTOR_ENABLED
 
 
 def test_a_pause_keeps_the_servo_alive_and_the_motors_off() -> None:
