@@ -101,17 +101,19 @@ def watch(pid: int, own: int) -> None:
     waits, worst_ms = Waits(pid, own), 0.0
     due = time.monotonic() + EVERY_S
     while True:
-        if select.select([sys.stdin], [], [], max(0.0, due - time.monotonic()))[0]:
-            asked = sys.stdin.readline().strip()
-            if not asked:
-                return
-            if asked == "begin":
-                waits, worst_ms, due = Waits(pid, own), 0.0, time.monotonic() + EVERY_S
-            print(worst_ms, flush=True)
+        asked = select.select([sys.stdin], [], [], max(0.0, due - time.monotonic()))[0]
+        late_s = time.monotonic() - due
+        if late_s >= 0.0:  # also where something was asked meanwhile
+            worst_ms = max(worst_ms, 1e3 * late_s, waits.worst_ms())
+            due = max(due + EVERY_S, time.monotonic())
+        if not asked:
             continue
-        late_ms = 1e3 * (time.monotonic() - due)
-        worst_ms = max(worst_ms, late_ms, waits.worst_ms())
-        due = max(due + EVERY_S, time.monotonic())
+        what = sys.stdin.readline().strip()
+        if not what:
+            return
+        if what == "begin":
+            waits, worst_ms, due = Waits(pid, own), 0.0, time.monotonic() + EVERY_S
+        print(worst_ms, flush=True)
 
 
 if __name__ == "__main__":
