@@ -22,16 +22,20 @@ PYTEST := $(RUN)/pytest -n auto --dist loadfile
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
+.PHONY: demo test test-slow test-realtime lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
 
 demo: $(INSTALLED)
 	$(RUN)/scissorcal demo
 
 test: $(READY)
-	$(PYTEST) -m "not slow" $(PYTEST_ARGS)
+	$(PYTEST) -m "not slow and not realtime" $(PYTEST_ARGS)
 
 test-slow: $(READY)
-	$(PYTEST) -m slow $(PYTEST_ARGS)
+	$(PYTEST) -m "slow and not realtime" $(PYTEST_ARGS)
+
+# What needs a port in real time: alone, in one process. CONTRIBUTING.md says what counts.
+test-realtime: $(READY)
+	$(RUN)/pytest -p no:xdist -m realtime $(PYTEST_ARGS)
 
 lint: $(STAMP)
 	$(RUN)/ruff check .

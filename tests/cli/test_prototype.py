@@ -1,6 +1,11 @@
-"""``scissorcal prototype`` as a person uses it: served, followed, started, stopped, killed."""
+"""``scissorcal prototype`` as a person uses it: served, followed, started, stopped, killed.
+
+What a page does with a command that runs is tested without a rig in tests/prototype:
+test_server.py, test_rig_commands.py and test_rig_feed.py.
+"""
 
 import asyncio
+import itertools
 import json
 import os
 import signal
@@ -16,20 +21,20 @@ import aiohttp
 import numpy as np
 import pytest
 
+from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.package import build_package
 from scissorcal.recording import RecordingWriter, Stroke, read_recording
 from scissorcal.render.engine import REQUEST
 from scissorcal.workday.runs.prototype import workspace_hands
 from scissorcal.workday.workspace import Workspace, create_workspace
+from tests.guard import GUARD_S
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.prototype.made import ask, heard, samples_of
 from tests.strange_device import StrangeDevice
 from tests.strange_device.terminal import serve_on_pty
 
 from .conftest import Cli
-
-BOUND_s = 120.0
 
 
 @pytest.fixture
@@ -66,7 +71,7 @@ def watch(url: str, act: "Callable[[aiohttp.ClientWebSocketResponse], Any]") -> 
 
     async def run() -> Any:
         async with (
-            asyncio.timeout(BOUND_s),
+            asyncio.timeout(GUARD_S),
             aiohttp.ClientSession() as session,
             session.ws_connect(url.replace("/?", "/rig?")) as page,
         ):
@@ -91,6 +96,7 @@ async def start(page: aiohttp.ClientWebSocketResponse, command: str) -> None:
             return
 
 
+@pytest.mark.realtime
 def test_a_rendering_is_started_followed_and_stopped_and_keeps_its_recording(
     packed: Workspace,
 ) -> None:
@@ -104,7 +110,7 @@ def test_a_rendering_is_started_followed_and_stopped_and_keeps_its_recording(
         said = watch(url, act)
         assert (said["code"], said["sentence"]) == (130, "Stopped.")
         process.send_signal(signal.SIGINT)
-        out, _ = process.communicate(timeout=BOUND_s)
+        out, _ = process.communicate(timeout=GUARD_S)
         assert process.returncode == 0
         envelope = json.loads(out)
         assert envelope["command"] == "prototype"
@@ -116,14 +122,36 @@ def test_a_rendering_is_started_followed_and_stopped_and_keeps_its_recording(
     assert any("Ctrl-C" in note for note in recording.notes)
 
 
+def test_a_rendering_that_ctrl_c_ends_keeps_its_recording(
+    packed: Workspace, cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same in virtual time: the interrupt comes between two ticks."""
+    exchange, answered = LockstepLink.exchange, itertools.count()
+
+    def interrupted(self: LockstepLink, command: bytes | None) -> list[bytes]:
+        is_recorded = any(packed.captures_dir.glob("render-*.part"))
+        if is_recorded and next(answered) == 2000:
+            raise KeyboardInterrupt
+        return exchange(self, command)
+
+    monkeypatch.setattr(LockstepLink, "exchange", interrupted)
+    said = cli("render", "--device", "sim", "--yes", "--workspace", packed.root)
+    assert said.code == 130
+    (path,) = packed.recordings("render")
+    recording = read_recording(path)
+    assert len(recording.samples) > 1000
+    assert any("Ctrl-C" in note for note in recording.notes)
+
+
+@pytest.mark.realtime
 def test_a_killed_server_takes_its_command_with_it_and_the_recording_is_kept(
     packed: Workspace,
 ) -> None:
     with served(packed, "--device", "sim") as (process, url):
         watch(url, lambda page: start(page, "render"))
         process.kill()
-        process.communicate(timeout=BOUND_s)
-        until = time.monotonic() + BOUND_s
+        process.communicate(timeout=GUARD_S)
+        until = time.monotonic() + GUARD_S
         while not packed.recordings("render"):
             assert time.monotonic() < until, "the rendering goes on without the server"
             time.sleep(0.05)
@@ -131,6 +159,7 @@ def test_a_killed_server_takes_its_command_with_it_and_the_recording_is_kept(
     assert any("Ctrl-C" in note for note in read_recording(path).notes)
 
 
+@pytest.mark.realtime
 def test_an_unplugged_rig_is_told_in_a_sentence(packed: Workspace) -> None:
     async def act(page: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:
         await start(page, "render")
@@ -153,6 +182,7 @@ def test_an_unplugged_rig_is_told_in_a_sentence(packed: Workspace) -> None:
     assert said["following"].startswith("render-")
 
 
+@pytest.mark.realtime
 def test_nothing_moves_before_the_rigs_own_question_is_answered_on_the_page(
     packed: Workspace,
 ) -> None:
@@ -176,6 +206,7 @@ def test_nothing_moves_before_the_rigs_own_question_is_answered_on_the_page(
     assert not packed.recordings("render")
 
 
+@pytest.mark.realtime
 def test_what_another_terminal_started_is_followed_and_not_stopped_from_the_page(
     packed: Workspace,
 ) -> None:
@@ -201,7 +232,7 @@ def test_what_another_terminal_started_is_followed_and_not_stopped_from_the_page
             assert other.poll() is None
         finally:
             other.send_signal(signal.SIGINT)
-            other.wait(BOUND_s)
+            other.wait(GUARD_S)
 
 
 @pytest.mark.parametrize("opens", [True, False])

@@ -1,15 +1,23 @@
-"""Commands that speak to a rig: through a real pseudo-terminal, served by another process."""
+"""Commands that speak to a rig: in virtual time, and through a real pseudo-terminal."""
 
 import os
 import pty
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from scissorcal.device.diagnosis import diagnose
+from scissorcal.device.doctor import Examination
+from scissorcal.device.link import PortLink
+from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.sim.faults import Faults
 from scissorcal.device.sim.process import SimProcess
+from tests.device.in_step import in_step, patient
+from tests.device.test_doctor import SOUND
 
-from .conftest import Cli
+from .conftest import Cli, Said
 
 
 @pytest.fixture
@@ -43,16 +51,35 @@ def test_captures_on_the_virtual_rig_fill_the_plan(quick: Path, cli: Cli) -> Non
     assert [step["state"] for step in steps[:3]] == ["done", "done", "missing"]
 
 
-def test_unplugged_while_capturing_keeps_what_was_recorded(quick: Path, cli: Cli) -> None:
-    assert cli("device", "probe", "--device", "sim", "--realtime").code == 0
-    with SimProcess("office-paper", faults=["unplug=1.5"]) as sim:
-        said = cli("capture", "friction", "--device", sim.port, "--json")
+def test_unplugged_while_capturing_keeps_what_was_recorded(
+    quick: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert cli("device", "probe", "--device", "sim").code == 0
+
+    class Unplugged(LockstepLink):
+        def __init__(self, specimen: str, rng: np.random.Generator) -> None:
+            super().__init__(specimen, rng, Faults(unplug_s=1.5))
+
+    monkeypatch.setattr("scissorcal.device.lockstep.LockstepLink", Unplugged)
+    assert_kept(cli("capture", "friction", "--device", "sim", "--json"), quick, cli)
+
+
+def assert_kept(said: Said, folder: Path, cli: Cli) -> None:
+    """A capture ended with a fault of the device, and says where its samples are."""
     assert said.code == 4
     kept = re.search(r"kept in (captures/friction-\S+\.mcap)\.", said.err)
     assert kept, said.err
-    assert said.envelope["files"] == [str(quick / kept[1])]
-    shown = cli("recording", "show", quick / kept[1], "--json").envelope["result"]["recording"]
+    assert said.envelope["files"] == [str(folder / kept[1])]
+    shown = cli("recording", "show", folder / kept[1], "--json").envelope["result"]["recording"]
     assert shown["samples"] > 500
+
+
+@pytest.mark.realtime
+def test_a_port_unplugged_while_capturing_keeps_what_was_recorded(quick: Path, cli: Cli) -> None:
+    assert cli("device", "probe", "--device", "sim", "--realtime").code == 0
+    with SimProcess("office-paper", faults=["unplug=1.5"]) as sim:
+        said = cli("capture", "friction", "--device", sim.port, "--json")
+    assert_kept(said, quick, cli)
 
 
 @pytest.mark.parametrize("words", [["capture", "friction"], ["device", "doctor"], ["render"]])
@@ -79,6 +106,24 @@ def test_a_port_that_speaks_something_else_is_said_to(quick: Path, cli: Cli) -> 
     assert "Traceback" not in said.err
 
 
+def test_the_doctor_tells_what_it_measured(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
+    patient(monkeypatch)
+    examined: list[tuple[str, float]] = []
+
+    def examine(link: PortLink, seconds: float, progress: object = None) -> Examination:
+        examined.append((link.identity.serial, seconds))
+        return Examination(SOUND, diagnose(SOUND, link.name))
+
+    monkeypatch.setattr("scissorcal.device.doctor.examine", examine)
+    monkeypatch.setattr("scissorcal.device.sim.process.SimProcess", in_step)
+    said = cli("device", "doctor", "--device", "sim", "--seconds", "0.5", "--json")
+    assert said.code == 0, said.err
+    assert examined == [("office-paper", 0.5)]
+    assert said.envelope["result"]["identity"]["name"] == "scissorcal-sim"
+    assert {verdict["check"] for verdict in said.envelope["verdicts"]} >= {"round trip", "drift"}
+
+
+@pytest.mark.realtime
 def test_the_doctor_examines_the_virtual_rig(cli: Cli) -> None:
     said = cli("device", "doctor", "--device", "sim", "--seconds", "0.5", "--json")
     assert said.code in (0, 3)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scissorcal.cli.output import table, verdict_lines
 from scissorcal.cli.terminal import drawn, echo, printable, printable_json, style
 from scissorcal.verdicts import Verdict
+from tests.guard import GUARD_S
 
 from .conftest import Cli
 
@@ -74,7 +75,7 @@ def test_a_reader_who_leaves_changes_no_exit_code(words: list[str], code: int) -
     running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     assert running.stdout is not None
     running.stdout.close()
-    assert running.wait(timeout=60) == code
+    assert running.wait(timeout=GUARD_S) == code
 
 
 def test_nothing_is_said_of_a_reader_who_left() -> None:
@@ -84,7 +85,7 @@ def test_nothing_is_said_of_a_reader_who_left() -> None:
         assert running.stderr is not None
         running.stdout.close()
         assert running.stderr.read() == b""
-        assert running.wait(timeout=60) == 0
+        assert running.wait(timeout=GUARD_S) == 0
 
 
 def test_the_log_is_not_written_through_a_link(cli: Cli, workspace: Path, tmp_path: Path) -> None:

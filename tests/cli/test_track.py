@@ -22,6 +22,7 @@ from scissorcal.vision.live import Frame
 from scissorcal.vision.sim import Pose, chained
 from scissorcal.vision.sim.sim_camera import OPENINGS_DEG, SIM_LENS, render_frame, sim_plate_scene
 from tests.cli.conftest import Cli
+from tests.guard import GUARD_S
 
 SLIDING = "\n[plate.tracking]\nspeed_mm_per_s = 3.0\ncamera_delay_ms = 40.0\n"
 
@@ -303,6 +304,7 @@ def test_tracks_of_lines_stay_readable(cli: Cli, workspace: Path) -> None:
     assert math.isfinite(rows[0].time_s)
 
 
+@pytest.mark.realtime
 def test_a_running_camera_and_a_rig_on_a_port(
     cli: Cli, calibrated: Path, recipe: Recipe, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -341,13 +343,16 @@ def test_a_camera_that_shows_no_target_ends_with_why(
     cli: Cli, workspace: Path, album: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cli("import", album / "camera.yml")
+    """It does so 50 times a second by the clock of its pictures, however late they are seen."""
     monkeypatch.setattr("scissorcal.workday.runs.track.PATIENCE_S", 0.5)
+    monkeypatch.setattr("scissorcal.workday.tracking.feeds.NO_PICTURE_S", GUARD_S)
     grey = np.full((1500, 2000, 3), 90, np.uint8)
 
     def camera(source: str) -> Iterator[Frame]:
+        begun = time.monotonic()
         for number in range(10_000):
             time.sleep(0.02)
-            yield Frame(number, 0.02 * number, grey, None, math.nan, time.monotonic())
+            yield Frame(number, 0.02 * number, grey, None, math.nan, begun + 0.02 * number)
 
     monkeypatch.setattr("scissorcal.workday.runs.track.frames_of", camera)
     said = cli("track", "--camera", "0")

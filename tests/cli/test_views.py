@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scissorcal.cli import live_view
 from scissorcal.cli import progress as progress_module
 from scissorcal.cli.live_view import LiveView, effort_plot
 from scissorcal.cli.output import table
@@ -67,8 +68,9 @@ def recorded(tmp_path: Path) -> Recorder:
 
 
 def test_a_capture_shows_opening_torque_and_coverage(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(live_view.time, "monotonic", lambda: 7.0)
     recorder = recorded(tmp_path)
     with LiveView() as view:
         view.show(0.0, "closing", recorder)

@@ -1,4 +1,7 @@
-"""A path on a port: the servo in its own process, the rig served by another; host's clock."""
+"""A path on a port: the servo in its own process, the rig served by another; host's clock.
+
+In virtual time: test_follow.py.
+"""
 
 import time
 from dataclasses import replace
@@ -18,6 +21,8 @@ from scissorcal.model.surface import Plane
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.tracking.plate_pose import PlatePose, fixed_pose, level_plate
 from tests.control.virtual import mechanics, points
+
+pytestmark = pytest.mark.realtime
 
 SPECIMEN = load_specimen("office-paper")
 MATERIAL = Material(1e4, 0.2, 1.0)

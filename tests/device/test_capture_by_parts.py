@@ -22,6 +22,7 @@ from scissorcal.errors import InputError
 from scissorcal.recording import Recording, read_header, read_recording
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed, short
+from tests.guard import GUARD_S
 
 RECIPE = short("paper-80gsm")
 PLACES = 3
@@ -185,26 +186,36 @@ def test_samples_are_recorded_while_the_choice_goes_on_in_its_own_thread(
     link = LockstepLink("office-paper", np.random.default_rng(3))
     parts = strokes_of((0.8, 0, 0))
     threads = set()
+    waits: list[tuple[int, threading.Event]] = []
 
     def choose(recorded: Recording, advance: float) -> Part | None:
         threads.add(threading.current_thread())
-        time.sleep(0.3)
+        idled = threading.Event()
+        waits.append((len(recorded.samples), idled))
+        assert idled.wait(GUARD_S)
         return None if recorded.strokes else parts[0]
+
+    def progress(share: float, sentence: str, recorder: Recorder) -> None:
+        if not waits:
+            return
+        begun, idled = waits[-1]
+        if recorder.sample_count > begun + 1000 * (CHOOSING_S + 0.2):
+            idled.set()
 
     path = tmp_path / "cut.mcap"
     with open_writer(path, "cut", link, RECIPE, "", by_parts=True) as writer:
-        capture_by_parts(link, RECIPE, "cut", writer, choose, longest_s=60.0)
+        capture_by_parts(link, RECIPE, "cut", writer, choose, longest_s=60.0, progress=progress)
     assert threads
     assert threading.main_thread() not in threads
     recording = read_recording(path)
     label = recording.samples["stroke"]
     after = label[np.flatnonzero(label == 1)[-1] + 1 :]
-    assert len(after) > 1000 * (CHOOSING_S + IDLE_S)
+    assert len(after) > 1000 * (CHOOSING_S + 0.2 + IDLE_S)
     assert np.all(after == -1)
     assert np.all(np.diff(recording.samples["sequence"].astype(np.int64)) == 1)
 
 
-@pytest.mark.slow
+@pytest.mark.realtime
 def test_a_rig_in_real_time_idles_while_the_next_part_is_chosen(tmp_path: Path) -> None:
     """The choice keeps a processor busy for two seconds in its own thread, twice."""
     parts = [sweep_part(RECIPE, IDENTITY, (1.5,), first=0)]

@@ -1,4 +1,7 @@
-"""Captures through a real pseudo-terminal and the servo's own process; and what may go wrong."""
+"""Captures on a pseudo-terminal in real time and the servo's own process; what may go wrong.
+
+The same without a clock: test_in_step.py for port and process, test_capture.py in virtual time.
+"""
 
 import os
 import signal
@@ -22,6 +25,8 @@ from scissorcal.errors import DeviceError
 from scissorcal.kernel import ConfigKey, Mode, StateFlag, StopReason
 from scissorcal.recording import read_recording, recover
 from tests.device.recipes import changed
+
+pytestmark = pytest.mark.realtime
 
 RECIPE = changed(
     "paper-80gsm",

@@ -1,15 +1,23 @@
 """The doctor measures what is there, and names the remedy for what is wrong."""
 
+from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from scissorcal.device import doctor as room
 from scissorcal.device.diagnosis import Measurements, brake_after_ms, diagnose
-from scissorcal.device.doctor import adapter_timer_ms, clock_drift, examine
+from scissorcal.device.doctor import Examination, adapter_timer_ms, clock_drift, examine
 from scissorcal.device.link import open_link
+from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.sim.faults import Faults
 from scissorcal.device.sim.process import SimProcess
+from scissorcal.device.sim.rig import TICK_S
 from scissorcal.device.timing import Percentiles
+from scissorcal.kernel import Hello, State, decode, encode
 from scissorcal.verdicts import failed
 
 GOOD = Percentiles(0.9, 1.2, 1.5, 3.0)
@@ -85,7 +93,72 @@ def test_a_late_computer_needs_a_device_that_waits_longer(
     assert brake_after_ms(measured) == recommended
 
 
-def test_listening_keeps_the_stream_going() -> None:
+class Listened(LockstepLink):
+    """A rig in virtual time with what a port has: round trips, and waits in which states come."""
+
+    def __init__(self, faults: Faults | None = None) -> None:
+        super().__init__("office-paper", np.random.default_rng(3), faults)
+        self._kept: list[bytes] = []
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+    def keep_streaming(self) -> None:
+        self._protocol.receive(encode(Hello(1)))
+
+    def round_trip(self) -> float:
+        self._pass()
+        return TICK_S
+
+    def receive(self, timeout: float) -> Iterator[State]:
+        for _ in range(max(1, round(timeout / TICK_S))):
+            self._pass()
+            payloads, self._kept = self._kept, []
+            for payload in payloads:
+                state = decode(payload)
+                assert isinstance(state, State)
+                yield state
+
+    def _pass(self) -> None:
+        self._kept += self.exchange(None)
+
+
+def examined(link: Any, seconds: float, monkeypatch: pytest.MonkeyPatch, **how: Any) -> Examination:
+    """Examine a rig by its own virtual time; waits of this computer are exact."""
+    clock = SimpleNamespace(
+        perf_counter=lambda: link.virtual_time,
+        clock_getres=lambda which: 1e-9,
+        CLOCK_MONOTONIC=0,
+    )
+    monkeypatch.setattr(room, "time", clock)
+    monkeypatch.setattr(room, "select", SimpleNamespace(select=lambda *_: link._pass()))
+    return examine(link, seconds, **how)
+
+
+def test_listening_keeps_the_stream_going(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A device streams for 5 s to a host of which it hears nothing."""
+    found = examined(Listened(), 6.5, monkeypatch)
+    measured = found.measurements
+    assert measured.frames == pytest.approx(6500, abs=30)
+    assert measured.lost == measured.garbled == measured.unanswered == 0
+    assert measured.interval.worst == pytest.approx(1.0)
+    assert measured.lateness.worst == pytest.approx(0.0, abs=1e-6)
+    assert measured.simulated
+
+
+def test_a_line_with_losses_fails_its_checks(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[float] = []
+    link = Listened(Faults(drop_share=0.01, garble_share=0.01))
+    found = examined(link, 1.0, monkeypatch, progress=lambda done, sentence: told.append(done))
+    assert found.measurements.lost > 0
+    assert found.measurements.garbled > 0
+    assert "lost frames" in {verdict.check for verdict in failed(found.verdicts)}
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+
+
+@pytest.mark.realtime
+def test_a_served_rig_is_listened_to_for_longer_than_it_streams_unheard() -> None:
     with SimProcess("office-paper", seed=3) as sim, open_link(sim.port) as link:
         found = examine(link, seconds=6.5)
     assert found.measurements.frames > 5600
@@ -111,7 +184,8 @@ def test_adapter_timer_is_read_from_its_file(tmp_path: Path) -> None:
     assert adapter_timer_ms("/dev/ttyUSB7", tmp_path) == 16.0
 
 
-def test_a_line_with_losses_fails_its_checks() -> None:
+@pytest.mark.realtime
+def test_a_served_line_with_losses_fails_its_checks() -> None:
     told: list[float] = []
     with (
         SimProcess("office-paper", seed=3, faults=("drop=0.01", "garble=0.01")) as sim,

@@ -1,25 +1,33 @@
 """The heartbeat means that the supervisor's main loop works, not only that its process lives."""
 
-import time
-from collections.abc import Iterator
+import threading
 
 import pytest
 
-from scissorcal.device import heartbeat as room
-from scissorcal.device.heartbeat import Heartbeat
+from scissorcal.device.heartbeat import BEAT_S, PATIENCE_S, Heartbeat
+from tests.guard import GUARD_S
 
 
 class Beats:
+    """Counts beats, and lets a test wait for one."""
+
     def __init__(self) -> None:
         self.count = 0
+        self.came = threading.Event()
 
     def __call__(self) -> None:
         self.count += 1
+        self.came.set()
 
-    def within(self, seconds: float) -> int:
-        before = self.count
-        time.sleep(seconds)
-        return self.count - before
+
+class Clock:
+    """Seconds that pass when a test says so."""
+
+    def __init__(self) -> None:
+        self.now_s = 10.0
+
+    def __call__(self) -> float:
+        return self.now_s
 
 
 @pytest.fixture
@@ -28,32 +36,64 @@ def beats() -> Beats:
 
 
 @pytest.fixture
-def running(beats: Beats, monkeypatch: pytest.MonkeyPatch) -> Iterator[Heartbeat]:
-    monkeypatch.setattr(room, "PATIENCE_S", 0.4)
-    heartbeat = Heartbeat(beats)
-    heartbeat.start()
-    yield heartbeat
-    heartbeat.close()
+def clock() -> Clock:
+    return Clock()
 
 
-def test_it_beats_while_a_block_takes_long(running: Heartbeat, beats: Beats) -> None:
-    running.seen()
-    assert beats.within(0.3) > 0
+@pytest.fixture
+def heartbeat(beats: Beats, clock: Clock) -> Heartbeat:
+    """One whose thread does not run: a test calls `pulse` for it."""
+    return Heartbeat(beats, clock)
+
+
+def pulses(heartbeat: Heartbeat, clock: Clock, seconds: float) -> None:
+    """What the thread does within so many seconds."""
+    for _ in range(round(seconds / BEAT_S)):
+        clock.now_s += BEAT_S
+        heartbeat.pulse()
+
+
+def test_it_beats_while_a_block_takes_long(
+    heartbeat: Heartbeat, beats: Beats, clock: Clock
+) -> None:
+    heartbeat.seen()
+    pulses(heartbeat, clock, PATIENCE_S - BEAT_S)
+    assert beats.count == 1 + round(PATIENCE_S / BEAT_S) - 1
 
 
 def test_it_ends_where_the_main_loop_hangs_and_returns_with_it(
-    running: Heartbeat, beats: Beats
+    heartbeat: Heartbeat, beats: Beats, clock: Clock
 ) -> None:
-    time.sleep(0.6)
-    assert beats.within(0.3) == 0
-    running.seen()
-    assert beats.within(0.3) > 0
+    clock.now_s += PATIENCE_S
+    pulses(heartbeat, clock, 10.0)
+    assert beats.count == 0
+    heartbeat.seen()
+    heartbeat.pulse()
+    assert beats.count == 2
 
 
-def test_it_goes_on_while_a_person_is_asked(running: Heartbeat, beats: Beats) -> None:
-    with running.held():
-        time.sleep(0.6)
-        assert beats.within(0.3) > 0
+def test_it_goes_on_while_a_person_is_asked(
+    heartbeat: Heartbeat, beats: Beats, clock: Clock
+) -> None:
+    with heartbeat.held():
+        pulses(heartbeat, clock, 60.0)
+    assert beats.count == 60.0 / BEAT_S + 1
+    clock.now_s += PATIENCE_S
+    heartbeat.pulse()
+    assert beats.count == 60.0 / BEAT_S + 1
+
+
+def test_a_thread_of_its_own_beats_until_it_is_closed(beats: Beats, clock: Clock) -> None:
+    heartbeat = Heartbeat(beats, clock)
+    heartbeat.start()
+    for _ in range(3):
+        beats.came.clear()
+        assert beats.came.wait(GUARD_S)
+    heartbeat.close()
+    count = beats.count
+    heartbeat.close()
+    assert beats.count == count
+    assert "servo-heartbeat" not in {thread.name for thread in threading.enumerate()}
 
 
 def test_it_can_be_closed_before_it_was_started(beats: Beats) -> None:

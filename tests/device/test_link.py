@@ -1,13 +1,19 @@
 """The handshake and its refusals, against a thread on the other side of a pseudo-terminal."""
 
+import fcntl
 import struct
-import time
-from collections.abc import Callable
+import termios
+from collections import deque
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from scissorcal.device.link import check_identity, open_link
+from scissorcal.device import link as room
+from scissorcal.device.link import DEFAULT_BAUD, PortLink, check_identity, open_link
+from scissorcal.device.ports import open_port
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     SCHEMA_HASH,
@@ -21,6 +27,7 @@ from scissorcal.kernel import (
     encode_frame,
 )
 from tests.device.conftest import IDENTITY, Answer, FarEnd
+from tests.guard import GUARD_S
 
 Make = Callable[[Answer], FarEnd]
 STATE = State(1, 5, 9000, 0.5, -0.06, 0.01, 0.2)
@@ -38,32 +45,72 @@ def silent(message: Message) -> list[bytes]:
     return []
 
 
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An answer is waited for however late it comes, so that nothing is asked twice."""
+    monkeypatch.setattr(room, "HELLO_WAIT_S", GUARD_S)
+    monkeypatch.setattr(room, "CONFIGURE_WAIT_S", GUARD_S)
+
+
+def opened(end: FarEnd) -> PortLink:
+    return open_link(end.port, timeout=GUARD_S)
+
+
+def until_waiting(end: FarEnd, count: int) -> None:
+    """Until so many bytes wait to be read by the host."""
+    waiting = 0
+    while waiting < count:
+        told = fcntl.ioctl(end._slave, termios.FIONREAD, struct.pack("i", 0))
+        (waiting,) = struct.unpack("i", told)
+
+
 def test_identity_arrives_although_stale_and_garbled_bytes_wait(far_end: Make) -> None:
     end = far_end(honest)
     stale = encode(IDENTITY._replace(name="yesterday"))
-    end.say(b"\x05\x99" * 300 + stale + encode(STATE) * 10 + encode(STATE)[:9])
-    time.sleep(0.05)
-    with open_link(end.port) as link:
+    waiting = b"\x05\x99" * 300 + stale + encode(STATE) * 10 + encode(STATE)[:9]
+    end.say(waiting)
+    until_waiting(end, len(waiting))
+    with opened(end) as link:
         assert link.identity.name == "bench rig"
         assert link.received.garbled <= 1
 
 
-def test_configure_sends_again_what_got_lost(far_end: Make) -> None:
-    lost = 2
+class Scripted(PortLink):
+    """A link whose port is a list of answers, one for each message that is sent."""
 
-    def forgetful(message: Message) -> list[bytes]:
-        nonlocal lost
-        if isinstance(message, Config) and lost:
-            lost -= 1
-            return []
-        return honest(message)
+    def __init__(self, *answers: list[Message]) -> None:
+        super().__init__(SimpleNamespace(close=lambda: None), "A scripted port")  # type: ignore[arg-type]
+        self.sent: list[Message] = []
+        self._answers = deque(answers)
 
-    end = far_end(forgetful)
-    with open_link(end.port) as link:
-        assert link.configure(ConfigKey.STREAM, 1.0) == 1.0
-    sent = [message for message in end.heard if isinstance(message, Config)]
+    def send(self, message: Message) -> None:
+        self.sent.append(message)
+
+    def receive(self, timeout: float) -> Iterator[Message]:
+        for answer in self._answers.popleft():
+            if isinstance(answer, ConfigEcho):
+                asked = self.sent[-1]
+                assert isinstance(asked, Config)
+                answer = answer._replace(nonce=asked.nonce)
+            yield answer
+
+
+ECHO = ConfigEcho(0, 1, 0, 1.0)
+
+
+def test_configure_sends_again_what_got_lost() -> None:
+    link = Scripted([], [STATE], [STATE, ECHO])
+    assert link.configure(ConfigKey.STREAM, 1.0) == 1.0
+    sent = [message for message in link.sent if isinstance(message, Config)]
     assert [(message.key, message.value) for message in sent] == [(1, 1.0)] * 3
     assert len({message.nonce for message in sent}) == 3
+
+
+def test_what_is_never_confirmed_is_told_with_the_attempts() -> None:
+    link = Scripted(*([[STATE]] * room.CONFIGURE_ATTEMPTS))
+    with pytest.raises(DeviceError, match="did not confirm STREAM = 1 in 5 attempts"):
+        link.configure(ConfigKey.STREAM, 1.0)
+    assert len(link.sent) == room.CONFIGURE_ATTEMPTS
 
 
 @pytest.mark.parametrize(
@@ -82,7 +129,7 @@ def test_configure_reports_what_the_device_says(
         return honest(message)
 
     with (
-        open_link(far_end(refusing).port) as link,
+        opened(far_end(refusing)) as link,
         pytest.raises(DeviceError, match=words),
     ):
         link.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.1)
@@ -102,8 +149,8 @@ def test_a_file_is_not_a_port(tmp_path: Path) -> None:
 
 def test_busy_port_is_refused(far_end: Make) -> None:
     end = far_end(honest)
-    with open_link(end.port), pytest.raises(DeviceError, match="in use by another program"):
-        open_link(end.port)
+    with opened(end), pytest.raises(DeviceError, match="in use by another program"):
+        opened(end)
 
 
 def test_forbidden_port_is_refused(far_end: Make, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -117,13 +164,31 @@ def test_forbidden_port_is_refused(far_end: Make, monkeypatch: pytest.MonkeyPatc
         open_link(far_end(honest).port)
 
 
-def test_silence_and_foreign_data_give_different_errors(far_end: Make) -> None:
-    with pytest.raises(DeviceError, match="sent nothing within"):
-        open_link(far_end(silent).port, timeout=0.3)
-    with pytest.raises(DeviceError, match="no valid frame"):
-        open_link(far_end(lambda message: [b"$GPGGA,foreign\r\n"]).port, timeout=0.3)
-    with pytest.raises(DeviceError, match="does not answer the handshake"):
-        open_link(far_end(lambda message: [encode(STATE)]).port, timeout=0.3)
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        (b"", "sent nothing within 0.3 s"),
+        (b"$GPGGA,foreign\r\n", "sent 16 bytes but no valid frame"),
+        (encode(STATE), "does not answer the handshake"),
+    ],
+)
+def test_silence_and_foreign_data_give_different_errors(
+    said: bytes, words: str, far_end: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The time of the handshake is over once what the far end says has been heard."""
+    monkeypatch.setattr(room, "HELLO_WAIT_S", 0.01)
+    once = iter([[said]] if said else [])
+    end = far_end(lambda message: next(once, []))
+    with PortLink(open_port(end.port, DEFAULT_BAUD), end.port) as link:
+        looks = iter(range(20))
+
+        def clock() -> float:
+            heard = link.received.bytes_received
+            return float(heard >= len(said) if said else next(looks) > 9)
+
+        monkeypatch.setattr(room, "time", SimpleNamespace(monotonic=clock))
+        with pytest.raises(DeviceError, match=words):
+            link.shake_hands(0.3)
 
 
 def test_other_schema_gives_both_hashes(far_end: Make) -> None:
@@ -133,7 +198,7 @@ def test_other_schema_gives_both_hashes(far_end: Make) -> None:
         return [encode(identity)]
 
     with pytest.raises(DeviceError, match="0000000000001234") as caught:
-        open_link(far_end(other).port)
+        opened(far_end(other))
     assert f"{SCHEMA_HASH:016x}" in str(caught.value)
     assert "Update the device's firmware" in str(caught.value)
 
@@ -145,12 +210,12 @@ def test_other_protocol_version_says_what_to_update(
     later = struct.pack("<BB30s", 0x11, version, b"")
     end = far_end(lambda message: [encode_frame(later)])
     with pytest.raises(DeviceError, match=f"version {version}, .* update {remedy}"):
-        open_link(end.port)
+        opened(end)
 
 
 def test_unplugging_is_a_device_error(far_end: Make) -> None:
     end = far_end(honest)
-    with open_link(end.port) as link:
+    with opened(end) as link:
         end.unplug()
         with pytest.raises(DeviceError, match="is gone"):
             link.configure(ConfigKey.STREAM, 1.0)
@@ -172,6 +237,17 @@ def test_invalid_limits_are_refused(wrong: dict[str, float]) -> None:
         check_identity("port", IDENTITY._replace(**wrong))  # type: ignore[arg-type]
 
 
-def test_round_trip_is_measured(far_end: Make) -> None:
-    with open_link(far_end(honest).port) as link:
-        assert 0 < link.round_trip() < 0.5
+def test_the_round_trip_is_the_time_from_question_to_answer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Asked(Scripted):
+        def receive(self, timeout: float) -> Iterator[Message]:
+            yield STATE
+            asked = self.sent[-1]
+            assert isinstance(asked, Hello)
+            yield IDENTITY._replace(nonce_echo=asked.nonce - 1)
+            yield IDENTITY._replace(nonce_echo=asked.nonce)
+
+    clock: Any = SimpleNamespace(perf_counter=iter([7.0, 7.25]).__next__)
+    monkeypatch.setattr(room, "time", clock)
+    assert Asked().round_trip() == 0.25

@@ -82,6 +82,7 @@ def test_a_plate_with_a_hole_on_the_virtual_rig(kappa: float) -> None:
     assert abs(ledger.unbooked_J) < 0.01 * exchanged
 
 
+@pytest.mark.realtime
 def test_a_hand_feels_pieces_over_a_port_as_in_lockstep() -> None:
     """A busy computer may leave frames unanswered: what is answered is the pieces' torque."""
     tables = make_tables(fracture_energy=0.1)  # a uniform sheet would be a sixth as tough

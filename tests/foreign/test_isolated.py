@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import pytest
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.foreign import Format, isolated, parse_isolated
 from scissorcal.foreign.child import MOST_HELD_BYTES
+from tests.guard import GUARD_S
 
 KIND = Format("a test", 10_000, "Write it again.", memory_bytes=600_000_000, processor_s=20)
 HERE = "tests.foreign.parsers"
@@ -150,11 +152,10 @@ def test_a_child_ends_with_its_parent() -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, env=FINDS_TESTS
     )
     pid = int(done.stdout)
-    for _ in range(200):
-        if not _runs(pid):
-            return
-        threading.Event().wait(0.05)
-    pytest.fail("the child still runs")
+    until = time.monotonic() + GUARD_S
+    while _runs(pid):
+        assert time.monotonic() < until, "the child still runs"
+        time.sleep(0.02)
 
 
 def _runs(pid: int) -> bool:

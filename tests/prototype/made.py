@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from scissorcal.prototype.rig_commands import RigCommand
 from scissorcal.prototype.server import PrototypeServer
 from scissorcal.recording import RecordingWriter, layout
+from tests.guard import GUARD_S
 
 POLICY = "default-src 'none'"
-BOUND_s = 30.0
-"""Of each wait: far more than any takes on a busy computer."""
 
 
 def small_page(socket: str) -> tuple[str, str]:
@@ -58,18 +57,18 @@ def running(server: PrototypeServer) -> Iterator[PrototypeServer]:
     thread = threading.Thread(target=lambda: asyncio.run(run()))
     thread.start()
     try:
-        assert ready.wait(BOUND_s)
+        assert ready.wait(GUARD_S)
         yield server
     finally:
         loops[0].call_soon_threadsafe(over.set)
-        thread.join(BOUND_s)
+        thread.join(GUARD_S)
 
 
 async def heard(
     socket: aiohttp.ClientWebSocketResponse, is_it: Callable[[dict[str, Any]], bool]
 ) -> dict[str, Any]:
     """The first message that ``is_it``."""
-    async with asyncio.timeout(BOUND_s):
+    async with asyncio.timeout(GUARD_S):
         while True:
             message: dict[str, Any] = json.loads(await socket.receive_str())
             if is_it(message):

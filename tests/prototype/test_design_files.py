@@ -128,9 +128,9 @@ def test_contours_of_one_shape_are_plates_and_holes(browser: Browser, tmp_path: 
 
 def focus(bed: Bed) -> str:
     """The data-key of what has the focus, once the tables are there anew."""
-    bed.page.wait_for_timeout(100)
     found: str = bed.run(
-        "() => document.activeElement.dataset.key ?? document.activeElement.tagName"
+        """() => new Promise((done) => setTimeout(() =>  // behind the timer of the tables
+          done(document.activeElement.dataset.key ?? document.activeElement.tagName)))"""
     )
     return found
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
+from tests.browser import wait_until
 from tests.prototype.test_page_hand import close, file, open_page, package, scene
 
 __all__ = ["file", "package", "scene"]
@@ -42,10 +43,8 @@ def test_captions_are_whole_and_lie_over_nothing(
 ) -> None:
     opened = open_page(browser, file, viewport={"width": width, "height": height})
     opened.run(NOTE)
-    for _ in range(100):
-        opened.page.wait_for_timeout(50)
-        if opened.run("() => noted.lens !== null && Object.keys(noted.texts).length > 1"):
-            break
+    drawn = "() => noted.lens !== null && Object.keys(noted.texts).length > 1"
+    wait_until(opened.page, lambda: opened.run(drawn), "the drawing was made")
     found = opened.run(FOUND)
     assert any("contact" in text for text in found["texts"])
     for text, (left, right, top, bottom) in found["texts"].items():

@@ -10,6 +10,7 @@ import pytest
 
 from scissorcal.errors import InputError
 from scissorcal.prototype.server import PrototypeServer
+from tests.guard import GUARD_S
 
 from .made import a_browser, a_server, small_page
 
@@ -193,7 +194,7 @@ def test_it_listens_on_this_computer_alone(tmp_path: Path) -> None:
             port = urlsplit(server.url).port
             assert port is not None
             with socket.socket() as other:
-                other.settimeout(5.0)
+                other.settimeout(GUARD_S)
                 assert other.connect_ex(("127.0.0.2", port)) != 0
 
     asyncio.run(trial())

@@ -1,6 +1,5 @@
 """The page of a package, opened from disk: what it draws, and how a person works it."""
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,12 +15,11 @@ from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.variations import central_values, variations
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import scene_of
-from tests.browser import Seen, open_file
+from tests.browser import Seen, open_file, wait_until
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.prototype.test_scene import unpacked as read
 
 MOST_BYTES = 1_000_000
-WAIT_S = 30.0
 UNNAMED = """() => [...document.querySelectorAll("input, button, select, textarea, canvas.plain")]
   .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim()
     || [...(one.labels || [])].some((label) => label.textContent.trim())))
@@ -45,16 +43,13 @@ class Shown:
 
     def until(self, script: str) -> None:
         """Wait until an expression of the app `a` is true; the page's policy forbids eval in it."""
-        end = time.monotonic() + WAIT_S
-        while not self.run(f"() => {{ const a = scissorcal; return {script}; }}"):
-            assert time.monotonic() < end, f"waited in vain until {script}"
-            self.page.wait_for_timeout(30)
+        asked = f"() => {{ const a = scissorcal; return {script}; }}"
+        wait_until(self.page, lambda: self.run(asked), script)
 
     def stroke(self) -> None:
         """One stroke by the key, to its end."""
         self.page.locator("canvas.plain").focus()
         self.page.keyboard.press("Space")
-        assert self.run("() => scissorcal.rig.plays")
         self.until("!a.rig.plays")
 
     def part(self, name: str, is_on: bool) -> None:
@@ -121,11 +116,9 @@ def test_a_stroke_of_the_pointer_cuts_the_sheet(shown: Shown) -> None:
     mouse.up()
     # at rest, behind the hand by what friction holds: at most the lag at the largest torque
     shown.until("a.rig.rate === 0 && a.rig.pose.opening - a.rig.wanted.opening < 0.15")
-    shown.page.wait_for_timeout(500)  # the numbers are shown ten times a second
-    after = shown.run("() => scissorcal.rig.crackMost")
-    assert after > before + 0.005
-    number = shown.page.locator("[data-number=crack] dd").inner_text()
-    assert float(number.split()[0]) == pytest.approx(1e3 * after, abs=0.06)
+    number = "parseFloat(document.querySelector('[data-number=crack] dd').textContent)"
+    shown.until(f"Math.abs({number} - 1e3 * a.rig.crackMost) < 0.06")
+    assert shown.run("() => scissorcal.rig.crackMost") > before + 0.005
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
@@ -250,10 +243,12 @@ def test_a_slider_with_the_focus_follows_a_draw_and_moves_on_from_there(shown: S
 
 
 def test_blades_that_nobody_moves_stand_still(shown: Shown) -> None:
+    start = shown.run("() => scissorcal.rig.pose.opening")
     shown.page.locator("canvas.plain").press("ArrowDown")
-    shown.page.wait_for_timeout(700)
+    shown.until(f"a.rig.pose.opening !== {start} && a.rig.isStill")
     before = shown.run("() => [scissorcal.rig.pose, scissorcal.rig.energy]")
-    shown.page.wait_for_timeout(500)
+    passed = shown.run("() => scissorcal.rig.time")
+    shown.until(f"a.rig.time > {passed} + 0.3")
     assert shown.run("() => [scissorcal.rig.pose, scissorcal.rig.energy]") == before
     assert shown.run("() => scissorcal.rig.rate") == 0.0
 
@@ -356,8 +351,14 @@ def test_a_plate_of_pieces_keeps_its_cracks_where_the_law_changes(shown: Shown) 
     assert shown.run("() => scissorcal.rig.crackMost") == 0.0
 
 
-FOLLOW = """([recording, times, openings, advances]) => scissorcal.rig.follow(
-  { recording, time_s: times, opening_rad: openings, advance_m: advances })"""
+FOLLOW = """(messages) => {
+  const { rig } = scissorcal;
+  for (const [recording, time_s, opening_rad, advance_m] of messages)
+    rig.follow({ recording, time_s, opening_rad, advance_m });
+  const { pose, crackMost, energy, isFollowing } = rig;
+  return { pose, crackMost, energy, isFollowing };
+}"""
+"""All in one go: between two calls of a test the page may have waited for too long."""
 
 
 def test_the_page_cuts_what_a_followed_rig_cuts_and_gives_the_blades_back(shown: Shown) -> None:
@@ -365,13 +366,12 @@ def test_the_page_cuts_what_a_followed_rig_cuts_and_gives_the_blades_back(shown:
     time_s = np.arange(0.0, 0.8, 0.004)
     opening = high - (high - low) * np.sin(np.pi * time_s / 1.6) ** 2
     advance = np.full_like(time_s, -shown.scene.contact_m[0])
-    ends = (0, 60, 200)
-    for first, last in pairwise(ends):  # as messages come
-        rows = [values[first:last].tolist() for values in (time_s, opening, advance)]
-        shown.run(FOLLOW, ["one", *rows])
-    assert shown.run("() => scissorcal.rig.isFollowing")
-    script = "const { pose, crackMost, energy } = scissorcal.rig"
-    found = shown.run(f"() => {{ {script}; return {{ pose, crackMost, energy }}; }}")
+    messages = [
+        ["one", *(values[first:last].tolist() for values in (time_s, opening, advance))]
+        for first, last in pairwise((0, 60, 200))
+    ]
+    found = shown.run(FOLLOW, messages)
+    assert found["isFollowing"]
     assert found["pose"]["opening"] == opening[-1]
     fine_s = np.arange(0.0, time_s[-1] + 5e-4, 1e-3)
     fine = np.interp(fine_s, time_s, opening).astype(np.float32)
@@ -383,6 +383,5 @@ def test_the_page_cuts_what_a_followed_rig_cuts_and_gives_the_blades_back(shown:
     cracks_m = stepped["contact"] + along
     assert found["crackMost"] == pytest.approx(float(cracks_m[-1]), abs=1e-6)
     shown.until("!a.rig.isFollowing")
-    shown.run(FOLLOW, ["two", [0.0], [opening[0]], [advance[0]]])  # a fresh sheet
-    fresh_m = shown.run("() => scissorcal.rig.crackMost")
-    assert fresh_m == pytest.approx(float(cracks_m[0]), abs=1e-6)
+    fresh = shown.run(FOLLOW, [["two", [0.0], [opening[0]], [advance[0]]]])
+    assert fresh["crackMost"] == pytest.approx(float(cracks_m[0]), abs=1e-6)

@@ -79,7 +79,8 @@ COUNTS = """async (milliseconds) => {
 def test_at_rest_four_pictures_a_second_at_most_and_a_key_is_answered_at_once(opened: Open) -> None:
     opened.settle()
     counted = opened.page.evaluate(COUNTS, 1500)
-    assert 1 <= counted["count"] <= 7
+    assert counted["count"] <= 4 * counted["seconds"] + 1
+    opened.settle(0.1)  # and some there are: its time goes by
     waited = opened.run(
         """async () => {
           const { rig } = scissorcal, frame = () => new Promise(requestAnimationFrame);

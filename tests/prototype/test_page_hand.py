@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page
 from scissorcal.package import ModelPackage, build_package, open_package
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import Scene, scene_of
-from tests.browser import Seen, open_file
+from tests.browser import Seen, open_file, wait_until
 from tests.package.fits import cut_fit, friction_fit, recipe
 
 WIDE = {"width": 1400, "height": 1000}
@@ -56,9 +56,9 @@ class Open:
 
     def settle(self, seconds: float = 0.6) -> None:
         """Let the page's own time pass; it has less of it than the clock on a busy computer."""
-        until = self.run("() => scissorcal.rig.time") + seconds
-        while self.run("() => scissorcal.rig.time") < until:
-            self.page.wait_for_timeout(50)
+        end = self.run("() => scissorcal.rig.time") + seconds
+        passed = "() => scissorcal.rig.time"
+        wait_until(self.page, lambda: self.run(passed) >= end, f"the page's time is {end}")
 
     def set_slider(self, name: str, value: float) -> None:
         code = """([name, value]) => {

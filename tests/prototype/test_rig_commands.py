@@ -19,8 +19,7 @@ from scissorcal.prototype.rig_commands import (
     RigCommands,
     State,
 )
-
-from .made import BOUND_s
+from tests.guard import GUARD_S
 
 REQUEST = "Take everything out."
 RENDER = RigCommand("render", ("render",), REQUEST)
@@ -40,7 +39,7 @@ class Told:
         self._news.set()
 
     async def wait_for(self, is_it: Callable[[State], bool]) -> State:
-        async with asyncio.timeout(BOUND_s):
+        async with asyncio.timeout(GUARD_S):
             while not (self.states and is_it(self.states[-1])):
                 self._news.clear()
                 await self._news.wait()
@@ -67,7 +66,7 @@ def trial(
         try:
             await act(commands, told)
         finally:
-            async with asyncio.timeout(BOUND_s):
+            async with asyncio.timeout(GUARD_S):
                 await commands.close()
         assert not commands.runs
 
@@ -134,13 +133,15 @@ def test_arming_another_command_takes_the_place_of_the_first(tmp_path: Path) -> 
 WAITS = """
 try:
     print('ready', file=sys.stderr, flush=True)
-    time.sleep(60)
+    while True:
+        time.sleep(0.02)
 except KeyboardInterrupt:
     print(' 50 %  half of it (3 s)', file=sys.stderr)
     print('The samples are kept.', file=sys.stderr)
     print('Error: Interrupted.', file=sys.stderr)
     sys.exit(130)
 """
+"""It sleeps for moments: a signal that comes just before a sleep begins does not end it."""
 
 
 def test_any_page_stops_it_as_ctrl_c_does(tmp_path: Path) -> None:
@@ -221,7 +222,7 @@ def _until_gone(pid: int) -> None:
     """Raises ProcessLookupError once nothing has that number, or only a body to be buried."""
     import time
 
-    for _ in range(int(BOUND_s / 0.01)):
+    for _ in range(int(GUARD_S / 0.01)):
         os.kill(pid, 0)
         state = Path(f"/proc/{pid}/stat")
         if state.exists() and state.read_text().rpartition(")")[2].split()[0] == "Z":

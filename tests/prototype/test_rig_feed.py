@@ -15,8 +15,9 @@ from scissorcal.recording.following import RecordingFollower
 from scissorcal.recording.partfile import create_locked
 from scissorcal.recording.plate_channels import POSE
 from scissorcal.recording.recovering import recover
+from tests.guard import GUARD_S
 
-from .made import BOUND_s, a_writer, samples_of
+from .made import a_writer, samples_of
 
 
 class Clock:
@@ -158,7 +159,7 @@ def test_a_recording_of_another_process_is_followed_through_its_new_name(
     with another(tmp_path) as process:
         found = list(looks(feed, clock, 1.0 + 2 * QUIET_s))
         assert said(found) == ["Following render-1.mcap."]
-        process.communicate("go on\n", timeout=BOUND_s)
+        process.communicate("go on\n", timeout=GUARD_S)
     found += looks(feed, clock, 5.0)
     assert said(found)[1:] == ["render-1.mcap is complete."]
     assert rows_of(found)["time_s"][-1] == pytest.approx(4.996)
@@ -171,7 +172,7 @@ def test_a_killed_writer_is_said_and_its_recording_is_still_recovered(
     with another(tmp_path) as process:
         found = list(looks(feed, clock, 1.0))
         process.kill()
-        process.communicate(timeout=BOUND_s)
+        process.communicate(timeout=GUARD_S)
     found += looks(feed, clock, 2 * QUIET_s)
     assert len(said(found)) == 2
     assert "ended without closing it" in said(found)[1]
@@ -185,7 +186,7 @@ def test_an_interrupted_recording_of_before_is_not_followed_but_the_next_one_is(
 ) -> None:
     with another(tmp_path) as process:
         process.kill()
-        process.communicate(timeout=BOUND_s)
+        process.communicate(timeout=GUARD_S)
     old = tmp_path / "captures" / "render-1.mcap.part"
     os.utime(old, (time.time() - 100.0,) * 2)
     assert not said(list(looks(feed, clock, 1.0)))

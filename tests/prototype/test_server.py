@@ -24,16 +24,19 @@ from scissorcal.prototype.server import (
     samples_message,
 )
 from scissorcal.prototype.watcher import ALLOWED_AT_ONCE, MOST_WAITING, Watcher
+from tests.guard import GUARD_S
 
-from .made import BOUND_s, a_browser, a_server, a_writer, ask, heard, samples_of
+from .made import a_browser, a_server, a_writer, ask, heard, samples_of
 
 REQUEST = "Take everything out."
 RENDER = RigCommand("render", ("render",), REQUEST)
 WAITS = (
     "import sys, time\n"
-    "try:\n    print('ready', file=sys.stderr, flush=True)\n    time.sleep(60)\n"
+    "try:\n    print('ready', file=sys.stderr, flush=True)\n"
+    "    while True:\n        time.sleep(0.02)\n"
     "except KeyboardInterrupt:\n    sys.exit(130)\n"
 )
+"""It sleeps for moments: a signal that comes just before a sleep begins does not end it."""
 HOW: dict[str, Any] = {"program": (sys.executable, "-c", WAITS)}
 
 
@@ -41,7 +44,7 @@ def served(folder: Path, act: Callable[[PrototypeServer], Coroutine[Any, Any, No
     """Act with a server, within a bounded time."""
 
     async def trial() -> None:
-        async with asyncio.timeout(4 * BOUND_s), a_server(folder, RENDER, **HOW) as server:
+        async with asyncio.timeout(4 * GUARD_S), a_server(folder, RENDER, **HOW) as server:
             await act(server)
 
     asyncio.run(trial())
@@ -100,7 +103,7 @@ def test_a_message_that_is_too_long_ends_its_page_alone(tmp_path: Path) -> None:
         async with a_browser(server) as bad, a_browser(server) as good:
             await heard(bad, is_state())
             await bad.send_str("x" * (MOST_MESSAGE_BYTES + 1))
-            ended = await bad.receive(BOUND_s)
+            ended = await bad.receive(GUARD_S)
             assert ended.type in (WSMsgType.CLOSE, WSMsgType.CLOSED)
             assert bad.close_code == aiohttp.WSCloseCode.MESSAGE_TOO_BIG
             await ask(good, "arm", "render")
@@ -109,12 +112,17 @@ def test_a_message_that_is_too_long_ends_its_page_alone(tmp_path: Path) -> None:
     served(tmp_path, act)
 
 
-def test_a_page_that_sends_too_often_is_closed(tmp_path: Path) -> None:
+def test_a_page_that_sends_too_often_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it may send grows by the clock; here it does not, however slowly the page sends."""
+    monkeypatch.setattr("scissorcal.prototype.watcher.ALLOWED_A_s", 0.0)
+
     async def act(server: PrototypeServer) -> None:
         async with a_browser(server) as page:
             for _ in range(int(3 * ALLOWED_AT_ONCE)):
                 await ask(page, "nothing")
-            while (await page.receive(BOUND_s)).type is WSMsgType.TEXT:
+            while (await page.receive(GUARD_S)).type is WSMsgType.TEXT:
                 pass
             assert page.close_code == aiohttp.WSCloseCode.POLICY_VIOLATION
         async with a_browser(server) as again:
@@ -133,7 +141,7 @@ def test_so_many_pages_and_no_more(tmp_path: Path) -> None:
                 await session.ws_connect(url, headers=headers)
             assert refused.value.status == 503
             await pages[0].close()
-            async with asyncio.timeout(BOUND_s):
+            async with asyncio.timeout(GUARD_S):
                 while server.watching == MOST_PAGES:
                     await asyncio.sleep(0.01)
             pages[0] = await session.ws_connect(url, headers=headers)
@@ -229,7 +237,7 @@ def test_a_page_that_leaves_after_arming_lets_nobody_else_start(tmp_path: Path) 
 
 def test_the_end_of_the_server_ends_the_command_and_tells_the_pages(tmp_path: Path) -> None:
     async def trial() -> None:
-        async with aiohttp.ClientSession() as session, asyncio.timeout(BOUND_s):
+        async with aiohttp.ClientSession() as session, asyncio.timeout(GUARD_S):
             async with a_server(tmp_path, RENDER, **HOW) as server:
                 page = await session.ws_connect(server.url.replace("/?", "/rig?"))
                 await ask(page, "arm", "render")

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page
 
 from scissorcal.prototype.rig_commands import RigCommand
 from scissorcal.prototype.server import MOST_PAGES, PrototypeServer
-from tests.browser import bundled, watch
+from tests.browser import bundled, wait_until, watch
 
 from .made import a_writer, running, samples_of
 
@@ -66,11 +66,7 @@ window.tried = (async () => {
 
 def until(page: Page, expression: str) -> None:
     """Wait until it is true; the page's policy lets no text be evaluated within the page."""
-    for _ in range(1200):
-        if page.evaluate(expression):
-            return
-        page.wait_for_timeout(25)
-    pytest.fail(f"{expression} did not become true")
+    wait_until(page, lambda: page.evaluate(expression), expression)
 
 
 @contextmanager
@@ -168,12 +164,12 @@ def test_a_page_tries_again_for_some_seconds_and_then_says_what_to_do(
             page.goto(site)
             until(page, "told.why.length > 0")
         assert page.evaluate("told.why.at(-1)").endswith("trying again.")
-        for _ in range(200):
-            page.clock.run_for(1000)
-            page.wait_for_timeout(50)  # for what does not go by the clock: the network
-            if GONE in page.evaluate("told.why.at(-1)"):
-                break
-        assert GONE in page.evaluate("told.why.at(-1)")
+
+        def is_gone() -> bool:
+            page.clock.run_for(1000)  # what does not go by it is the network
+            return GONE in page.evaluate("told.why.at(-1)")
+
+        wait_until(page, is_gone, GONE)
         count = page.evaluate("told.why.length")
         page.clock.run_for(60_000)
         assert page.evaluate("told.why.length") == count, "it is over"

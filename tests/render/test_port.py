@@ -1,9 +1,13 @@
-"""Rendering through a real pseudo-terminal, in real time. No time is asserted."""
+"""Rendering through a real pseudo-terminal, in real time. No time is asserted.
+
+Without a clock: test_in_step.py and, in virtual time, test_engine.py and test_plate_rendering.py.
+"""
 
 import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from scissorcal.device.link import open_link
 from scissorcal.device.sim.process import SimProcess
@@ -12,6 +16,8 @@ from scissorcal.package import ModelPackage
 from scissorcal.recording import read_recording
 from scissorcal.render import VirtualStrokes, latency_of, open_writer, render
 from tests.render.plate_motion import Move, Tracker
+
+pytestmark = pytest.mark.realtime
 
 
 def test_a_port_is_served_by_a_separate_process(paper: ModelPackage, tmp_path: Path) -> None:

@@ -1,5 +1,8 @@
 """What --device sim opens: a virtual rig in virtual time, or served as a port."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 
@@ -8,6 +11,7 @@ from scissorcal.device.lockstep import LockstepLink
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey
 from scissorcal.workday.rigs import open_rig
+from tests.device.in_step import InStepRig, in_step, patient
 
 
 def first_states(run: int) -> list[bytes]:
@@ -22,6 +26,26 @@ def test_a_virtual_rig_runs_in_virtual_time_and_repeats_itself_by_seed_and_run()
     assert first_states(run=0) != first_states(run=1)
 
 
+def test_in_real_time_it_is_a_port_of_its_specimen_and_seed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    patient(monkeypatch)
+    served: list[tuple[str, int]] = []
+
+    @contextmanager
+    def serve(specimen: str, seed: int) -> Iterator[InStepRig]:
+        served.append((specimen, seed))
+        with in_step(specimen, seed) as rig:
+            yield rig
+
+    monkeypatch.setattr("scissorcal.device.sim.process.SimProcess", serve)
+    with open_rig("sim", "office-paper", seed=4, realtime=True) as link:
+        assert isinstance(link, PortLink)
+        assert link.identity.serial == "office-paper"
+    assert served == [("office-paper", 4)]
+
+
+@pytest.mark.realtime
 def test_in_real_time_it_is_a_port() -> None:
     with open_rig("sim", "office-paper", realtime=True) as link:
         assert isinstance(link, PortLink)

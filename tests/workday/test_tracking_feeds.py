@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import DeviceError, InputError
+from scissorcal.recording import SAMPLE_DTYPE
 from scissorcal.vision.live import Frame, timed
 from scissorcal.vision.track import Tracked
+from scissorcal.workday.tracking import feeds
 from scissorcal.workday.tracking.camera_thread import CameraThread
 from scissorcal.workday.tracking.feeds import (
     live_feed,
@@ -20,6 +22,7 @@ from scissorcal.workday.tracking.feeds import (
     refuse_without_sledge,
 )
 from scissorcal.workday.tracking.pictures import PlatePicture
+from tests.guard import GUARD_S
 
 
 def a_frame(number: int, rate_Hz: float = 30.0, stamp_s: float = float("nan")) -> Frame:
@@ -76,8 +79,9 @@ def test_what_ends_a_camera_is_raised_after_its_last_picture() -> None:
     thread.close()
 
 
-def test_a_feed_ends_with_what_ended_its_camera() -> None:
+def test_a_feed_ends_with_what_ended_its_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where the camera fails while its last picture is being located."""
+    monkeypatch.setattr(feeds, "NO_PICTURE_S", GUARD_S)
     failing = threading.Event()
 
     def camera() -> Iterator[Frame]:
@@ -103,6 +107,55 @@ def test_a_feed_ends_with_what_ended_its_camera() -> None:
             pass
 
 
+def test_samples_and_pictures_of_a_running_rig_come_as_one_stream(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A picture stands at its time since the feed began, behind the samples that came before."""
+    monkeypatch.setattr(feeds, "time", SimpleNamespace(monotonic=lambda: 50.0, time_ns=lambda: 7))
+    taken = threading.Semaphore(1)
+
+    def camera() -> Iterator[Frame]:
+        for number in range(3):
+            assert taken.acquire(timeout=GUARD_S)
+            yield a_frame(number)
+
+    class Eye:
+        locate = staticmethod(seen)
+
+        @staticmethod
+        def picture(found: Tracked) -> PlatePicture:
+            return PlatePicture(found.frame.number, 0.0, 50.25 + found.frame.number, "no target", 0)
+
+    motion: Any = SimpleNamespace(step=lambda: np.zeros(50, SAMPLE_DTYPE))
+    blocks, times = 0, []
+    with ExitStack() as stack:
+        feed = live_feed(stack, Eye(), camera(), motion)  # type: ignore[arg-type]
+        assert feed.base_ns == 7
+        for event in feed.events:
+            if not isinstance(event, PlatePicture):
+                assert len(event) == 50
+                blocks += 1
+                continue
+            assert blocks > len(times)
+            times.append(event.arrived_s)
+            taken.release()
+            if len(times) == 3:
+                break
+    assert times == [0.25, 1.25, 2.25]
+
+
+def test_a_camera_that_stops_beside_a_rig_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter(range(50, 1000))
+    monkeypatch.setattr(
+        feeds, "time", SimpleNamespace(monotonic=lambda: float(next(clock)), time_ns=lambda: 7)
+    )
+    eye: Any = SimpleNamespace(locate=seen)
+    motion: Any = SimpleNamespace(step=lambda: np.zeros(50, SAMPLE_DTYPE))
+    with ExitStack() as stack, pytest.raises(DeviceError, match="no picture for 5 s"):
+        for _ in live_feed(stack, eye, iter(()), motion).events:
+            pass
+
+
 def test_a_camera_that_hangs_does_not_hold_up_the_end() -> None:
     release = threading.Event()
 
@@ -116,7 +169,7 @@ def test_a_camera_that_hangs_does_not_hold_up_the_end() -> None:
     closing = threading.Thread(target=thread.close)
     closing.start()
     release.set()
-    closing.join(10.0)
+    closing.join(GUARD_S)
     assert not closing.is_alive()
 
 

@@ -19,12 +19,15 @@ class Heartbeat:
     every 40 ms as long as that was within the last ``PATIENCE_S``, so that a block that takes
     long (a slow disk, a busy processor) does not end a rendering, while a main loop that hangs is
     noticed ``PATIENCE_S`` and the servo's own limit later. A process that is stopped or dies does
-    not beat at all.
+    not beat at all. ``clock`` gives seconds, of which only differences count.
     """
 
-    def __init__(self, beat: Callable[[], None]) -> None:
+    def __init__(
+        self, beat: Callable[[], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._beat = beat
-        self._seen_at = time.monotonic()
+        self._clock = clock
+        self._seen_at = clock()
         self._held = 0
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="servo-heartbeat", daemon=True)
@@ -36,7 +39,7 @@ class Heartbeat:
 
     def seen(self) -> None:
         """The main loop works now."""
-        self._seen_at = time.monotonic()
+        self._seen_at = self._clock()
         self._beat()
 
     @contextmanager
@@ -55,7 +58,11 @@ class Heartbeat:
         if self._thread.is_alive():
             self._thread.join()
 
+    def pulse(self) -> None:
+        """Beat where the main loop works, or waits for a person; the thread calls it."""
+        if self._held or self._clock() - self._seen_at < PATIENCE_S:
+            self._beat()
+
     def _run(self) -> None:
         while not self._over.wait(BEAT_S):
-            if self._held or time.monotonic() - self._seen_at < PATIENCE_S:
-                self._beat()
+            self.pulse()

@@ -1,4 +1,7 @@
-"""The probe on a pseudo-terminal, in real time, against the independent device."""
+"""The probe on a pseudo-terminal, in real time, against the independent device.
+
+In virtual time: test_recovery.py and test_refusals.py.
+"""
 
 import pytest
 
@@ -6,6 +9,8 @@ from scissorcal.device.link import open_link
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.recipe.library import builtin_recipe
 from tests.strange_device import FAULTS, StrangeDevice, serve_on_pty
+
+pytestmark = pytest.mark.realtime
 
 RECIPE = builtin_recipe("paper-80gsm")
 BRAKED_S = 0.015

@@ -1,4 +1,7 @@
-"""The served rig, end to end: a real process, a real pseudo-terminal, real frames."""
+"""The served rig, end to end: a real process, a real pseudo-terminal, real frames.
+
+What it serves and when, without a clock: test_serving.py.
+"""
 
 import contextlib
 import itertools
@@ -15,6 +18,7 @@ from scissorcal.device.link import open_link
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import ConfigKey, State
+from tests.guard import GUARD_S
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs pseudo-terminals")
 
@@ -33,8 +37,8 @@ def steps_of(states: list[State]) -> set[int]:
     return {after.sequence - before.sequence for before, after in itertools.pairwise(states)}
 
 
-def ended(pid: int, seconds: float = 5.0) -> bool:
-    """Whether a process ends in time; zombies, which init may reap late, count as ended."""
+def ended(pid: int, seconds: float = GUARD_S) -> bool:
+    """Whether a process ends; zombies, which init may reap late, count as ended."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         try:
@@ -46,6 +50,7 @@ def ended(pid: int, seconds: float = 5.0) -> bool:
     return False
 
 
+@pytest.mark.realtime
 def test_a_day_on_the_pty() -> None:
     with SimProcess("office-paper", seed=3) as sim:
         with open_link(sim.port) as link:
@@ -65,6 +70,7 @@ def test_a_day_on_the_pty() -> None:
     assert not sim.running
 
 
+@pytest.mark.realtime
 def test_it_stays_alive_while_a_reader_does_not_read() -> None:
     with SimProcess("office-paper") as sim, open_link(sim.port) as link:
         link.configure(ConfigKey.STREAM, 1.0)
@@ -76,6 +82,7 @@ def test_it_stays_alive_while_a_reader_does_not_read() -> None:
         assert min(steps_of(late)) >= 1  # what waited in buffers comes first, in order
 
 
+@pytest.mark.realtime
 def test_a_port_unplugged_in_use_is_a_device_error() -> None:
     with SimProcess("office-paper", faults=["unplug=0.2"]) as sim:
         with open_link(sim.port) as link:
@@ -91,19 +98,19 @@ def test_it_ends_with_a_killed_parent() -> None:
         [
             sys.executable,
             "-c",
-            "import time\n"
+            "import sys\n"
             "from scissorcal.device.sim.process import SimProcess\n"
             "sim = SimProcess('office-paper')\n"
             "print(sim.pid, flush=True)\n"
-            "time.sleep(60)\n",
+            "sys.stdin.read()\n",
         ],
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )
-    assert parent.stdout is not None
-    with parent.stdout as stdout:
-        pid = int(stdout.readline())
-    parent.kill()
-    parent.wait()
+    with parent:
+        assert parent.stdout is not None
+        pid = int(parent.stdout.readline())
+        parent.kill()
     assert ended(pid)
 
 
@@ -117,7 +124,7 @@ def test_signals_end_it_cleanly(number: int) -> None:
             server.wait(0.2)  # a stdin that is no pipe does not end it
         assert server.poll() is None
         server.send_signal(number)
-        assert server.wait(5.0) == 0
+        assert server.wait(GUARD_S) == 0
 
 
 def test_mistakes_are_reported_before_anything_starts() -> None:

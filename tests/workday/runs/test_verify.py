@@ -27,6 +27,7 @@ from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
 from scissorcal.workday.workspace import Workspace
+from tests.guard import GUARD_S
 from tests.workday.made import fitted_workspace, quick_workspace, record_friction
 
 FEW = VerifySettings(fits=6)
@@ -271,7 +272,7 @@ def test_a_killed_run_loses_nothing_and_leaves_no_worker(
     assert partial.read_bytes().splitlines(keepends=True)[: len(before)] == before
     assert outcome.fitted <= 9 - 5 + 1
     assert without_times(outcome.result) == without_times(whole)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + GUARD_S
     while any(is_running(pid) for pid in children) and time.monotonic() < deadline:
         time.sleep(0.1)
     assert not any(is_running(pid) for pid in children)
