@@ -17,7 +17,6 @@ from scissorcal.workday.workspace import Workspace
 from tests.strange_device import FAULTS, StrangeDevice, VirtualPort
 from tests.workday.made import quick_workspace
 
-
 SHORT = """[0.3, 0.8]
 repeats = 1
 excitation_s = 3.0

@@ -23,7 +23,6 @@ from scissorcal.workday.runs.control import control_workspace, stated_pose
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import Workspace, create_workspace
 
-
 LONG = """speeds_rad_per_s = [0.05, 0.12, 0.3, 0.7, 1.5]
 repeats = 2
 excitation_s = 10.0
