@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from scissorcal.vision.sim.sim_camera import (
     render_card_photographs,
     render_plate_photographs,
 )
+from scissorcal.workday.tracking import sim_world
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,12 @@ def workspace(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
     assert cli("init", folder, "--recipe", "paper-80gsm").code == 0
     monkeypatch.chdir(folder)
     return folder
+
+
+@pytest.fixture
+def few_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The virtual camera takes 4 pictures a second in place of 10, each of which is rendered."""
+    monkeypatch.setattr(sim_world, "SimCamera", partial(sim_world.SimCamera, frames_Hz=4.0))
 
 
 def run_instead(function: Callable[[], Answer], patch: pytest.MonkeyPatch) -> None:

@@ -120,6 +120,7 @@ def test_a_plate_that_moves_faster_than_stated_is_told(
     assert result["figures"]["pictures"]["refused"] == 7
 
 
+@pytest.mark.usefixtures("few_pictures")
 def test_a_world_is_tracked_by_camera_and_contact(cli: Cli, calibrated: Path) -> None:
     said = cli("track", "--camera", "sim", "--device", "sim", "--seconds", "2.2", "--json")
     assert said.code == 0, said.err
@@ -127,7 +128,7 @@ def test_a_world_is_tracked_by_camera_and_contact(cli: Cli, calibrated: Path) ->
     assert (result["state"], result["frame"]) == ("fused", "rig")
     assert result["rig"] == "scissorcal-sim office-paper"
     assert result["figures"]["contacts"]["used"] > 15
-    assert result["figures"]["pictures"]["used"] > 12
+    assert result["figures"]["pictures"]["used"] > 4
     assert result["figures"]["rig"]["drift_ppm"] == pytest.approx(30.0, abs=2.0)
     # the specimen's plate, 20 mm along, 10 mm up, turned by 3 deg
     assert 1e3 * np.array(result["translation_m"]) == pytest.approx([20.0, 10.0, 0.0], abs=0.6)
@@ -140,7 +141,7 @@ def test_a_world_is_tracked_by_camera_and_contact(cli: Cli, calibrated: Path) ->
     assert shown.code == 0
     assert "track, rotary joint" in shown.out
     assert "/scissorcal/plate/pose" in shown.out
-    for channel, rows in (("sample", 1000), ("pose", 40), ("picture", 15)):
+    for channel, rows in (("sample", 1000), ("pose", 20), ("picture", 5)):
         table = calibrated / f"{channel}.csv"
         said = cli("export", name, table, "--channel", channel)
         assert said.code == 0
@@ -177,6 +178,7 @@ def test_a_rig_alone_starts_from_the_fitted_plate(cli: Cli, calibrated: Path) ->
     assert result["figures"]["camera"] is None
 
 
+@pytest.mark.usefixtures("few_pictures")
 def test_contacts_of_another_blade_are_told_in_mm(cli: Cli, calibrated: Path) -> None:
     """A blade that is stated 10 mm too short puts its tip 2 mm below where it is."""
     path = calibrated / "recipe.toml"

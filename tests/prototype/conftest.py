@@ -1,5 +1,6 @@
-"""One browser for the tests of a file, and the designer alone in a page."""
+"""One browser for all tests of a process, and the designer alone in a page."""
 
+import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,10 +11,28 @@ from tests.browser import open_browser
 from tests.prototype.design_bed import Bed, open_bed
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
+@pytest.fixture(scope="session")
+def launched() -> Iterator[tuple[Browser, asyncio.AbstractEventLoop]]:
     with open_browser() as found:
-        yield found
+        loop = asyncio.get_running_loop()
+        asyncio._set_running_loop(None)
+        yield found, loop
+        asyncio._set_running_loop(loop)
+
+
+@pytest.fixture(scope="module")
+def browser(launched: tuple[Browser, asyncio.AbstractEventLoop]) -> Iterator[Browser]:
+    """The process's browser, without the pages of other files.
+
+    Between its calls, playwright's loop counts as running; where no file uses it, it does not, so
+    that the tests there can run loops of their own.
+    """
+    found, loop = launched
+    asyncio._set_running_loop(loop)
+    yield found
+    for context in found.contexts:
+        context.close()
+    asyncio._set_running_loop(None)
 
 
 @pytest.fixture

@@ -1,14 +1,13 @@
 """Hands that the page makes: how fast, how long, and where they end."""
 
 import json
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Browser, Page
 
-from tests.browser import bundled, open_browser
+from tests.browser import bundled
 from tests.prototype.design_bed import scene
 
 HARNESS = """
@@ -26,11 +25,10 @@ TICK_s = 1e-3
 
 
 @pytest.fixture(scope="module")
-def page() -> Iterator[Page]:
-    with open_browser() as browser:
-        found = browser.new_page()
-        found.set_content(f"<script>{bundled(HARNESS)}</script>")
-        yield found
+def page(browser: Browser) -> Page:
+    found = browser.new_page()
+    found.set_content(f"<script>{bundled(HARNESS)}</script>")
+    return found
 
 
 def played(page: Page, which: str, told: dict[str, Any], opening: float = 0.0) -> Any:

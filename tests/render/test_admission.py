@@ -46,6 +46,7 @@ def test_the_rule_is_half_of_what_damping_takes_over_the_delay() -> None:
     assert allowed_stiffness(coarse, 1.0) == pytest.approx(2.0 * 0.0128 / coarse.encoder_step_rad)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one_sided", [False, True])
 def test_no_simulated_loop_oscillates_or_chatters_where_the_rule_admits_it(one_sided: bool) -> None:
     loops = draw_loops(250, np.random.default_rng(20), friction=True)
@@ -54,6 +55,7 @@ def test_no_simulated_loop_oscillates_or_chatters_where_the_rule_admits_it(one_s
     assert not found.chattering().any()
 
 
+@pytest.mark.slow
 def test_most_loops_oscillate_at_little_more_than_twice_the_rule() -> None:
     """What the margin of two gives away, and no more: half of them do at 2.2 times the rule."""
     loops = draw_loops(150, np.random.default_rng(21), friction=True)
@@ -61,6 +63,7 @@ def test_most_loops_oscillate_at_little_more_than_twice_the_rule() -> None:
     assert np.mean(found.oscillating(loops.encoder)) > 0.6
 
 
+@pytest.mark.slow
 def test_loops_without_dry_friction_oscillate_at_their_eigenvalues() -> None:
     """Hulin's boundary, twice the rule: none below it, nearly all beyond."""
     loops = draw_loops(150, np.random.default_rng(22), friction=False)

@@ -22,8 +22,8 @@ from tests.render.plate_motion import Move, Tracker, true_torque
 
 Array = NDArray[np.float64]
 
-STROKES = VirtualStrokes(count=4, rate_rad_per_s=0.5)
-BEGINS_S, TAKES_S = 7.2, 0.8
+STROKES = VirtualStrokes(count=3, rate_rad_per_s=0.5)
+BEGINS_S, TAKES_S = 7.0, 0.8
 """Within the third closing stroke, while the crack runs."""
 GONE_S = (4.9, 5.25)
 """Within the second closing stroke."""
@@ -123,6 +123,7 @@ def test_a_late_noisy_biased_tracker_keeps_the_tolerance(
     assert np.abs(np.diff(found.samples["torque_command"])).max() <= 1.001e-3 * slew
 
 
+@pytest.mark.slow
 def test_a_plate_that_is_taken_to_rest_is_wrong_by_half_of_the_torque(
     upper_paper: ModelPackage, tmp_path: Path
 ) -> None:

@@ -17,6 +17,26 @@ from scissorcal.workday.workspace import Workspace
 from tests.strange_device import FAULTS, StrangeDevice, VirtualPort
 from tests.workday.made import quick_workspace
 
+SHORT = """[0.3, 0.8]
+repeats = 1
+excitation_s = 3.0
+
+[capture.cut]
+speeds_rad_per_s = [0.6]
+strokes_per_sheet = 2
+sheets = 2
+"""
+
+
+def short_workspace(folder: Path) -> Workspace:
+    """A quick workspace whose captures take seconds."""
+    workspace = quick_workspace(folder)
+    text = workspace.recipe_path.read_text(encoding="utf-8")
+    short = text.replace("[0.1, 0.3, 0.8]\n", SHORT)
+    assert short != text
+    workspace.recipe_path.write_text(short, encoding="utf-8")
+    return workspace
+
 
 def capture(workspace: Workspace, faults: Faults | None = None) -> Path:
     recipe = workspace.recipe()
@@ -28,15 +48,15 @@ def capture(workspace: Workspace, faults: Faults | None = None) -> Path:
 
 
 def test_a_capture_that_was_stopped_is_incomplete_and_kept(tmp_path: Path) -> None:
-    workspace = quick_workspace(tmp_path / "stuck")
+    workspace = short_workspace(tmp_path / "stuck")
     with pytest.raises(DeviceError) as raised:
-        capture(workspace, Faults(stuck_encoder_s=6.0))
+        capture(workspace, Faults(stuck_encoder_s=3.0))
     assert raised.value.exit_code == 4
     assert raised.value.stop == StopReason.ENCODER_FAULT.name
     (path,) = workspace.recordings("friction")
     recording = read_recording(path)
     assert recording.stop == StopReason.ENCODER_FAULT.name
-    assert len(recording.samples) > 4000
+    assert len(recording.samples) > 1500
     assert any(StopReason.ENCODER_FAULT.sentence in note for note in recording.notes)
     assert Engine.of(workspace).state("capture friction").state == "incomplete"
     capture(workspace)
@@ -44,7 +64,7 @@ def test_a_capture_that_was_stopped_is_incomplete_and_kept(tmp_path: Path) -> No
 
 
 def test_a_stop_after_the_last_stroke_leaves_a_capture_incomplete(tmp_path: Path) -> None:
-    workspace = quick_workspace(tmp_path / "late")
+    workspace = short_workspace(tmp_path / "late")
     path = capture(workspace)
     whole = read_recording(path)
     path.unlink()
@@ -55,7 +75,7 @@ def test_a_stop_after_the_last_stroke_leaves_a_capture_incomplete(tmp_path: Path
 
 
 def test_strokes_that_cut_nothing_do_not_count(tmp_path: Path) -> None:
-    workspace = quick_workspace(tmp_path / "old-sheet")
+    workspace = short_workspace(tmp_path / "old-sheet")
     recipe = workspace.recipe()
     path = workspace.new_recording("cut")
     link = VirtualPort(StrangeDevice(FAULTS["no sheet"], seed=1))

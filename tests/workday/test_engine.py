@@ -337,7 +337,8 @@ def test_a_whole_capture_is_done(captured: Workspace) -> None:
 def test_a_speed_that_the_fit_hardly_uses_is_named_in_plan_and_report(tmp_path: Path) -> None:
     """At 0.05 rad/s the encoder of the virtual rig does not show the direction of motion."""
     workspace = quick_workspace(tmp_path / "slow")
-    text = workspace.recipe_path.read_text(encoding="utf-8").replace("[0.1, 0.3", "[0.05, 0.3")
+    text = workspace.recipe_path.read_text(encoding="utf-8")
+    text = text.replace("[0.1, 0.3, 0.8]", "[0.05, 0.3]\nrepeats = 1\nexcitation_s = 3.0")
     workspace.recipe_path.write_text(text, encoding="utf-8")
     link = LockstepLink("office-paper", np.random.default_rng(2))
     path = workspace.new_recording("friction")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from scissorcal.workday.tracking.sim_world import SimCamera
 from tests.workday.track_world import a_recipe, score, tracked
 
 SEEDS = 8
@@ -12,7 +13,7 @@ MOVES = ("speed_mm_per_s = 5", "turn_deg_per_s = 1")
 
 def test_contact_tells_the_height_that_pictures_leave_open() -> None:
     recipe = a_recipe()
-    session, world, end = tracked(recipe, 3, 2.6, rig=True)
+    session, world, end = tracked(recipe, 3, 2.6, rig=True, camera=SimCamera(4.0))
     assert session.follower.state == "fused"
     value, error = score(session, world, end)
     assert value < chi2.ppf(0.9999, 6)

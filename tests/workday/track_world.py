@@ -22,7 +22,7 @@ from scissorcal.vision.sim.sim_camera import SIM_LENS, sim_plate_scene
 from scissorcal.workday.tracking.feeds import idle_rig, sim_feed, sim_rig_feed
 from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
 from scissorcal.workday.tracking.session import RigDrive, TrackSession
-from scissorcal.workday.tracking.sim_world import SimWorld
+from scissorcal.workday.tracking.sim_world import SimCamera, SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder
 
 Array = NDArray[np.float64]
@@ -77,10 +77,10 @@ def a_session(
 
 
 def tracked(
-    recipe: Recipe, seed: int, seconds: float, *, rig: bool
+    recipe: Recipe, seed: int, seconds: float, *, rig: bool, camera: SimCamera | None = None
 ) -> tuple[TrackSession, SimWorld, float]:
     """Follow a world for so long; the session, the world, and the host's time at the end."""
-    world, eye = SimWorld(recipe, seed, rig=rig), an_eye(recipe, seed)
+    world, eye = SimWorld(recipe, seed, rig=rig, camera=camera), an_eye(recipe, seed)
     session = a_session(recipe, rig=rig)
     if not rig:
         last = 0.0

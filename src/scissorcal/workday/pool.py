@@ -90,7 +90,11 @@ def open_pool(workers: int | None = None, cluster: str | None = None) -> Iterato
         return
     count = workers or len(os.sched_getaffinity(0))
     if count == 1:
-        yield Pool(_Here(), 1, ahead=1)
+        gc.freeze()  # what is there before the first job is not searched again after each
+        try:
+            yield Pool(_Here(), 1, ahead=1)
+        finally:
+            gc.unfreeze()
         return
     context = multiprocessing.get_context("spawn")
     with (

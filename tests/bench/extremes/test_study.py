@@ -77,8 +77,8 @@ def test_a_run_that_ends_early_has_tried_some_of_everything():
 def test_everyday_states_are_right_and_nothing_extreme_is_wrong():
     rng = np.random.default_rng(130)
     for state in [
-        *(everyday_state(rng) for _ in range(8)),
-        *(random_state(rng) for _ in range(8)),
+        *(everyday_state(rng) for _ in range(4)),
+        *(random_state(rng) for _ in range(6)),
     ]:
         for one in try_state(state).compared:
             assert one.outcome != "wrong", (one, state)
@@ -143,15 +143,6 @@ def test_names_of_cells_are_unique(monkeypatch):
     monkeypatch.setattr(cells_module, "CELLS", cells_module.CELLS[:1] * 2)
     with pytest.raises(ValueError, match="two cells are named"):
         all_cells()
-
-
-@pytest.mark.parametrize(
-    "one",
-    [c for c in all_cells() if not c.slow and c.part in ("kernel", "model")],
-    ids=lambda c: c.name,
-)
-def test_a_cell_keeps_what_it_states(one):
-    assert try_cell(one, 130).outcome in ("right", "refused"), try_cell(one, 130).sentence
 
 
 def test_a_run_with_a_budget_writes_its_page_and_twin(tmp_path: Path, monkeypatch):

@@ -23,12 +23,40 @@ from scissorcal.workday.runs.control import control_workspace, stated_pose
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import Workspace, create_workspace
 
+LONG = """speeds_rad_per_s = [0.05, 0.12, 0.3, 0.7, 1.5]
+repeats = 2
+excitation_s = 10.0
+"""
+FEWER = """speeds_rad_per_s = [0.2, 0.7]
+repeats = 1
+excitation_s = 4.0
+"""
+SHORT = """
+[capture.friction_advance]
+speeds_mm_per_s = [30.0, 80.0]
+repeats = 1
+excitation_s = 3.0
+
+[fit.friction]
+rung = "coulomb+viscous"
+symmetry = "symmetric"
+critic = false
+
+[fit.friction_advance]
+rung = "coulomb+viscous"
+symmetry = "symmetric"
+critic = false
+"""
+
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """A workspace with draft fits of both axes."""
+    """A workspace with draft fits of one law to short captures of both axes."""
     folder = tmp_path_factory.mktemp("day")
     workspace = create_workspace(folder / "paper", "paper-80gsm")
+    text = workspace.recipe_path.read_text(encoding="utf-8")
+    assert LONG in text
+    workspace.recipe_path.write_text(text.replace(LONG, FEWER) + SHORT, encoding="utf-8")
     capture_into(workspace, "friction", "sim", designed=False)
     capture_advance_into(workspace, "sim")
     fit_workspace(workspace, ("friction", "friction-advance"), effort="draft")

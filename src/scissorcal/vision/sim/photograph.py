@@ -81,7 +81,7 @@ def render(
 def _lay(radiance: Picture, layer: Layer, lens: Lens, rng: np.random.Generator) -> None:
     if layer.shadow > 0.0:
         _cast_shadow(radiance, layer, lens)
-    seen = [lens.sees(_fine(o, layer, lens), layer.pose) for o in layer.outlines_m]
+    seen = _seen(layer.outlines_m, layer, lens)
     box = _box(seen, lens, 1)
     if box is None:
         return
@@ -98,7 +98,7 @@ def _cast_shadow(radiance: Picture, layer: Layer, lens: Lens) -> None:
     import cv2
 
     moved = [np.asarray(outline) + layer.shadow_m for outline in layer.outlines_m]
-    seen = [lens.sees(_fine(outline, layer, lens), layer.pose) for outline in moved]
+    seen = _seen(moved, layer, lens)
     soft = layer.shadow_soft_m * lens.focal_px / float(layer.pose.shift_m[2])
     box = _box(seen, lens, int(np.ceil(3.0 * soft)) + 1)
     if box is None:
@@ -172,16 +172,25 @@ def _on_plane(pixels: Array, lens: Lens, pose: Pose) -> Array:
     return np.asarray(np.nan_to_num(where))
 
 
-def _fine(outline: Array, layer: Layer, lens: Lens) -> Array:
-    """The outline with every side cut so short that its projection is straight."""
-    closed = np.vstack([outline, outline[:1]])
-    seen = lens.sees(closed, layer.pose)
-    length = np.linalg.norm(np.diff(seen, axis=0), axis=1)
+def _seen(outlines: Sequence[Array], layer: Layer, lens: Lens) -> list[Array]:
+    """Pixels of each outline, every side cut so short that its projection is straight.
+
+    All outlines at once: a target has hundreds of short ones.
+    """
+    closed = [np.vstack([outline, outline[:1]]) for outline in outlines if len(outline)]
+    if not closed:
+        return []
+    corners = np.concatenate(closed)
+    length = np.linalg.norm(np.diff(lens.sees(corners, layer.pose), axis=0), axis=1)
     count = np.where(np.isfinite(length), np.ceil(length / (20.0 * FINEST_PX)), 1.0)
     count = np.clip(count, 1, _CUT_ALL).astype(np.int64)
+    joints = np.cumsum([len(outline) for outline in closed])[:-1] - 1
+    count[joints] = 0  # from one outline to the next there is no side
+    ends = np.cumsum(count)
     index = np.repeat(np.arange(len(count)), count)
-    step = (np.arange(len(index)) - np.repeat(np.cumsum(count) - count, count)) / count[index]
-    return np.asarray(closed[index] + step[:, None] * (closed[index + 1] - closed[index]))
+    step = (np.arange(len(index)) - np.repeat(ends - count, count)) / count[index]
+    fine = corners[index] + step[:, None] * (corners[index + 1] - corners[index])
+    return np.split(lens.sees(fine, layer.pose), ends[joints])
 
 
 def _box(seen: Sequence[Array], lens: Lens, room: int) -> tuple[int, int, int, int] | None:
