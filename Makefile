@@ -21,7 +21,7 @@ PYTEST := $(RUN)/pytest -n auto --dist loadfile
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-slow lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
+.PHONY: demo test test-slow test-explore lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
 
 demo: $(READY)
 	$(RUN)/scissorcal demo
@@ -31,6 +31,11 @@ test: $(READY)
 
 test-slow: $(READY)
 	$(PYTEST) -m slow $(PYTEST_ARGS)
+
+# Property tests with fresh examples, for MINUTES; prints what shows a failure again.
+test-explore: MINUTES = 5
+test-explore: $(READY)
+	$(RUN)/python -m tests.explore --minutes $(MINUTES) $(EXPLORE_ARGS)
 
 lint: $(STAMP)
 	$(RUN)/ruff check .

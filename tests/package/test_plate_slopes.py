@@ -38,14 +38,14 @@ def compare(seed: int) -> Steepest:
     return found
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
 def test_no_slope_of_a_random_plate_is_above_its_bound(seed: int) -> None:
     compare(seed)
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.integers(0, 2**32 - 1))
 def test_no_slope_of_many_random_plates_is_above_its_bound(seed: int) -> None:
     compare(seed)
