@@ -114,9 +114,12 @@ class Edge:
         cosine = np.cos(beta)
         rise = level - self.offset_m * cosine
         grade = np.sin(beta) + np.tan(self.taper_rad) * cosine
-        with np.errstate(invalid="ignore", divide="ignore"):
-            root = grade + np.sqrt(grade**2 + 2.0 * self.curvature_per_m * cosine * rise)
-            return np.asarray(np.where(root > 0.0, 2.0 * rise / root, np.nan))
+        bend = self.curvature_per_m * cosine
+        with np.errstate(all="ignore"):
+            root = np.sqrt(grade**2 + 2.0 * bend * rise)
+            # Two forms of one root: each adds numbers of one sign, so that no digits cancel.
+            station = np.where(grade > 0.0, 2.0 * rise / (grade + root), (root - grade) / bend)
+            return np.where(np.isfinite(station), station, np.nan)
 
 
 @dataclass(frozen=True)
