@@ -48,7 +48,7 @@ def test_the_process_goes_on(number):
 """
 
 
-@pytest.mark.parametrize("profile", ["suite", "explore"])
+@pytest.mark.parametrize("profile", ["suite", pytest.param("explore", marks=pytest.mark.slow)])
 def test_examples_depend_on_no_loaded_module_and_no_hash_seed(profile: str, tmp_path: Path) -> None:
     (tmp_path / "draw.py").write_text(DRAW)
     (tmp_path / "constants.py").write_text(f"MANY = {[n / 997 for n in range(1, 900)]}\n")
@@ -67,6 +67,7 @@ def test_examples_depend_on_no_loaded_module_and_no_hash_seed(profile: str, tmp_
     assert drawn[0] == drawn[1]
 
 
+@pytest.mark.slow
 def test_a_failure_is_stated_with_the_command_that_shows_it_again(tmp_path: Path) -> None:
     (tmp_path / "conftest.py").write_text(CONFTEST)
     (tmp_path / "test_numbers.py").write_text(NEVER_LARGE)
@@ -87,6 +88,7 @@ def test_a_failure_is_stated_with_the_command_that_shows_it_again(tmp_path: Path
     assert command_for(failure) in summary([failure], tried)
 
 
+@pytest.mark.slow
 def test_a_test_that_ends_its_process_is_a_failure(tmp_path: Path) -> None:
     (tmp_path / "conftest.py").write_text(CONFTEST)
     (tmp_path / "test_ends.py").write_text(ENDS)
@@ -95,6 +97,7 @@ def test_a_test_that_ends_its_process_is_a_failure(tmp_path: Path) -> None:
     assert tried == []
 
 
+@pytest.mark.slow
 def test_a_search_without_any_test_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match="No test ran"):
         explore(0.0, ["test_missing.py"], root=tmp_path)
