@@ -6,8 +6,8 @@ failed is left out of later rounds. The end prints, for each failure, the falsif
 command that shows it again, and the exit code is 1 if there was one. What is found is repaired at
 its cause and becomes an ``@example`` of its test.
 
-Tests marked slow take part with ``--slow``; a test runs once in each round even if its share is
-shorter, and they would take most of a short search. ``paths`` restrict the search.
+Tests marked slow take part with ``--slow``: one is a state machine whose run of minutes is never
+cut short. ``paths`` restrict the search.
 """
 
 import argparse
@@ -59,7 +59,7 @@ def explore(
 ) -> tuple[list[Failure], list[Tried]]:
     """Search for ``minutes`` in ``paths`` below ``root``; what failed, once a test, and was tried.
 
-    Each process tries one test at least.
+    Each process tries one test at least, and with no time at all one seed of it.
     """
     began = time.time()
     rounds = max(math.ceil(minutes / ROUND_MINUTES), 1)

@@ -1,21 +1,26 @@
 """The part of `tests.explore` inside pytest: a share of the time for each test, seed after seed.
 
 Each test that hypothesis drives runs again and again, with a new seed each time, until its share of
-what is left of the round is used up; its module's and session's fixtures stay. What a test did and
-the first failure of each are written to a file of JSON lines at once, so that they survive a crash.
+what is left of the round is used up; its module's and session's fixtures stay. A slow test does not
+take more: the rest of a seed's examples is then drawn and not tried. What a test did and the first
+failure of each are written to a file of JSON lines at once, so that they survive a crash.
 """
 
+import functools
 import json
+import math
 import random
-import re
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 from _pytest.runner import runtestprotocol
 from hypothesis import core
+from hypothesis.errors import HypothesisException, StopTest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -63,21 +68,22 @@ class Exploration:
         if share <= 0.0 and self.any_tried:
             return True
         self.any_tried = True
-        runs = examples = 0
-        failed = False
-        while not failed and (runs == 0 or time.time() < began + share):
-            seed = self.seeds.getrandbits(32)
-            self._write(test=item.nodeid, seed=seed)
-            reports = _run(item, seed)
-            runs += 1
-            examples += _examples(item)
-            if any(report.skipped for report in reports):
-                break
-            failed = any(report.failed for report in reports)
-            if failed:
-                self._write(test=item.nodeid, seed=seed, failure=_said(item, reports))
+        runs, failed = 0, False
+        # Where no time was given, the first test tries one seed.
+        with _until(item, began + share if share > 0.0 else math.inf) as tried:
+            while not failed and (runs == 0 or time.time() < began + share):
+                seed = self.seeds.getrandbits(32)
+                self._write(test=item.nodeid, seed=seed)
+                reports = _run(item, seed)
+                runs += 1
+                if any(report.skipped for report in reports):
+                    break
+                failed = any(report.failed for report in reports)
+                if failed:
+                    self._write(test=item.nodeid, seed=seed, failure=_said(item, reports))
         item.session._setupstate.teardown_exact(nextitem)
-        self._write(test=item.nodeid, runs=runs, examples=examples, seconds=time.time() - began)
+        seconds = time.time() - began
+        self._write(test=item.nodeid, runs=runs, examples=tried.examples, seconds=seconds)
         return True
 
     def _write(self, **what: Any) -> None:
@@ -85,15 +91,49 @@ class Exploration:
             to.write(json.dumps(what) + "\n")
 
 
+@dataclass
+class _Tried:
+    examples: int = 0
+    failed: bool = False
+
+
+@contextmanager
+def _until(item: pytest.Item, end: float) -> Iterator[_Tried]:
+    """Let a test try examples until its time is up, but one at least, and all after a failure.
+
+    What hypothesis draws up to a failure is the same as without this, so that the seed alone shows
+    the failure again. Tests of a state machine have no inner function: they are not cut short.
+    """
+    tried = _Tried()
+    handle = getattr(getattr(item, "obj", None), "hypothesis", None)
+    if handle is None:
+        yield tried
+        return
+    inner = handle.inner_test
+
+    @functools.wraps(inner)
+    def timed(*args: Any, **kwargs: Any) -> Any:
+        if time.time() >= end and tried.examples > 0 and not tried.failed:
+            return None
+        tried.examples += 1
+        try:
+            return inner(*args, **kwargs)
+        except BaseException as why:
+            tried.failed |= not isinstance(why, HypothesisException | StopTest)
+            raise
+
+    handle.inner_test = timed
+    try:
+        yield tried
+    finally:
+        handle.inner_test = inner
+
+
 def _run(item: pytest.Item, seed: int) -> Sequence[pytest.TestReport]:
     core.global_force_seed = seed
-    item.hypothesis_statistics = item.hypothesis_report_information = ""
+    item.hypothesis_report_information = ""
     # What comes next is the item's parent: the item is torn down, and its module is not.
     return runtestprotocol(item, log=False, nextitem=item.parent)
-
-
-def _examples(item: pytest.Item) -> int:
-    return sum(map(int, re.findall(r"(\d+) passing", item.hypothesis_statistics)))
 
 
 def _said(item: pytest.Item, reports: Sequence[pytest.TestReport]) -> str:

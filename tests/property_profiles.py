@@ -11,6 +11,7 @@ make them differ, and are switched off here:
 `explore` is the profile of `python -m tests.explore` and of the commands that it prints: the seed
 comes from `--hypothesis-seed`, the explicit examples are left to the suite, and constants are drawn
 from the whole source, whatever is loaded, because a program's faults lie near its constants.
+Decision 174.
 """
 
 from functools import cache
