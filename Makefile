@@ -22,7 +22,7 @@ PYTEST := $(RUN)/pytest -n auto --dist loadfile
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
-.PHONY: demo test test-slow test-realtime lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
+.PHONY: demo test test-slow test-realtime test-explore lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
 
 demo: $(INSTALLED)
 	$(RUN)/scissorcal demo
@@ -36,6 +36,11 @@ test-slow: $(READY)
 # What needs a port in real time: alone, in one process. CONTRIBUTING.md says what counts.
 test-realtime: $(READY)
 	$(RUN)/pytest -p no:xdist -m realtime $(PYTEST_ARGS)
+
+# Property tests with fresh examples, for MINUTES; prints what shows a failure again.
+test-explore: MINUTES = 5
+test-explore: $(READY)
+	$(RUN)/python -m tests.explore --minutes $(MINUTES) $(EXPLORE_ARGS)
 
 lint: $(STAMP)
 	$(RUN)/ruff check .

@@ -117,7 +117,7 @@ def refused(path: Path, kind: type[Any], why: str, remedy: str) -> None:
         load(path, kind)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(place=st.floats(0.0, 1.0, exclude_max=True), flip=st.integers(1, 255), cut=st.booleans())
 def test_a_flipped_or_missing_byte_is_refused(
     stored: Path, place: float, flip: int, cut: bool

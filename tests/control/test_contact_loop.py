@@ -85,7 +85,7 @@ def alone(loop: ContactLoop) -> ContactLoop:
     return replace(loop, stiffness_factor=1.0, mass_factor=1.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     stiffness=st.floats(1e1, 1e6),
     mass=st.floats(1e-3, 1e2),

@@ -28,7 +28,7 @@ ANGLES = st.tuples(*[st.floats(-20, 20)] * 3)
 PLACES = st.tuples(st.floats(-30, 30), st.floats(-20, 20), st.floats(-5, 5))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(angles=ANGLES, place=PLACES, x=st.floats(-0.02, 0.02), up=st.floats(-2e-3, 8e-3))
 def test_the_foot_on_a_plane_is_the_lot(
     angles: tuple[float, float, float], place: tuple[float, float, float], x: float, up: float
@@ -47,7 +47,7 @@ def test_the_foot_on_a_plane_is_the_lot(
     assert foot.curvature == pytest.approx(0.0, abs=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     radius=st.floats(0.02, 0.2),
     place=PLACES,

@@ -90,7 +90,7 @@ def test_places_count_along_the_surface() -> None:
     assert contour.place_of(foot) == pytest.approx(contour.place[len(contour.feet) // 2], abs=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     x=st.lists(st.integers(0, 80), min_size=2, max_size=8).filter(lambda x: len(set(x)) > 1),
     speed=st.floats(1.0, 90.0),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from scissorcal.device.advance_trajectory import (
@@ -54,7 +54,6 @@ def test_the_blades_stand_open_and_the_sledge_in_the_middle_of_its_stops():
     assert reference.advance[-1] == pytest.approx(middle)
 
 
-@settings(deadline=None)
 @given(
     st.floats(-1.0, 1.0),
     st.floats(0.0, 0.4),

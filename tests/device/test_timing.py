@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.device.timing import FeltLag, LoopRights, TimeHistogram
@@ -36,7 +36,6 @@ def reference_lag(sequences: list[int], sent: list[bool]) -> tuple[list[int], in
     return lags, held
 
 
-@settings(deadline=None)
 @given(
     steps=st.lists(st.tuples(st.integers(1, 100), st.booleans()), min_size=1, max_size=40),
     start=st.sampled_from([0, 2**32 - 50]),
@@ -95,7 +94,6 @@ def test_without_a_command_no_lag_is_stated() -> None:
     assert "not measured" in lag.sentence
 
 
-@settings(deadline=None)
 @given(times=st.lists(st.integers(1, 10**10), min_size=1, max_size=200), pieces=st.integers(1, 5))
 def test_counted_times_have_the_percentiles_of_the_times(times: list[int], pieces: int) -> None:
     histogram = TimeHistogram()

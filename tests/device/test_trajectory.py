@@ -34,7 +34,7 @@ CUTTING = ("paper-80gsm", "cotton-cloth")
     speed=st.floats(1e-2, 50),
     acceleration=st.floats(1, 200),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_glides_arrive_at_rest_within_their_bounds(
     distance: float, speed: float, acceleration: float
 ) -> None:

@@ -153,7 +153,7 @@ def test_a_block_shares_configuration_path_and_contours() -> None:
         LoopBlock.create(SERVO, control=CONTROL, reference_capacity=3).set_path(*STILL)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_no_contour_and_state_give_an_effort_that_is_no_number(data: st.DataObject) -> None:
     wide = st.floats(-1e6, 1e6, width=32)

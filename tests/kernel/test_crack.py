@@ -143,7 +143,7 @@ def test_a_damped_blade_presses_harder_while_it_sinks_in():
     blades=st.sampled_from([1, 2]),
     damping=st.sampled_from([0.0, 1e3]),
 )
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_extremes_stay_finite(kappa, energy, force, exponent, opening, advance, blades, damping):
     """Crossed blades, leaps of the opening, sheets behind the pivot, stiffness of steel or foam."""
     one = cutting(

@@ -65,7 +65,7 @@ WILD = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     axes=st.sampled_from([2, 3]),
     law=st.sampled_from(list(NormalLaw)),

@@ -253,7 +253,7 @@ def test_friction_by_displacement_is_the_models_while_sliding() -> None:
         assert np.sign(torque) == -sign
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(
         st.tuples(

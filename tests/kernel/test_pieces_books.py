@@ -67,7 +67,7 @@ def hands(draw: st.DrawFn) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.interp(at, knots, openings), np.interp(at, knots, advances[: len(knots)])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(plates(), hands(), st.sampled_from([1.0, 0.9, 0.5]), st.sampled_from([1, 2]))
 def test_the_hands_work_is_in_the_books(
     pieces: list[Piece],
@@ -97,7 +97,7 @@ def test_the_hands_work_is_in_the_books(
     assert np.abs(left).max() <= 0.5 * most + 2e-4 * spent[-1] + 1e-8
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(plates(), st.integers(0, 2**32 - 1), st.sampled_from([1.0, 0.8]))
 def test_no_step_books_more_than_was_there(pieces: list[Piece], seed: int, kappa: float) -> None:
     """Wild leaps of the hand: what a step books was stored, at its pose, with the old cracks."""

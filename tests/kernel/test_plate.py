@@ -70,7 +70,7 @@ def test_steps_on_a_moving_plate(case: dict[str, Any]) -> None:
     assert max(np.abs(case["out_torque"])) > 0.02
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(pitch=pitches, edge_x=near, edge_y=heights, stretch=stretches, crack=st.floats(0.0, 0.02))
 def test_forces_are_the_gradient_of_the_stored_energy(
     pitch: float, edge_x: float, edge_y: float, stretch: float, crack: float
@@ -126,7 +126,7 @@ def test_plate_and_blade_turned_about_the_pivot_give_the_same_torque(turn: float
     assert two.force == pytest.approx(along, rel=2e-3, abs=1e-4)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     numbers=st.tuples(*([st.floats(width=32, allow_nan=True, allow_infinity=True)] * 5)),
     opening=st.floats(-4.0, 4.0),
@@ -147,7 +147,7 @@ def test_any_sound_section_gives_finite_forces(
         assert out.torque == out.force == 0.0
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     edge=st.floats(-0.3, 0.3),
     height=st.floats(-0.05, 0.05),

@@ -14,7 +14,7 @@ from scissorcal.model import presliding_state
     length=st.floats(1e-3, 10.0),
     size=st.floats(1e-3, 1.0),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_it_is_the_closed_form(steps, length, size):
     path = 0.3 + size * np.cumsum(np.array([0.0, *map(float, steps)]))
     assert np.abs(presliding_path(path, length) - presliding_state(path, length)).max() < 1e-12

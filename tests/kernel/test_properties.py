@@ -63,7 +63,7 @@ def motions(draw: DrawFn) -> list[tuple[float, float, float]]:
     return [tuple(map(float, row)) for row in path.astype(np.float32)]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(models(), motions())
 def test_steps_are_finite_and_the_crack_never_falls_back(
     tables: ModelTables, motion: list[tuple[float, float, float]]
@@ -79,7 +79,7 @@ def test_steps_are_finite_and_the_crack_never_falls_back(
         crack = kernel.crack
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(models(fracture=False), motions())
 def test_pressing_agrees_with_the_float64_reference(
     tables: ModelTables, motion: list[tuple[float, float, float]]
@@ -101,7 +101,7 @@ def test_pressing_agrees_with_the_float64_reference(
         assert abs(got.indentation - wanted["indentation"]) <= rounding
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(models(), st.floats(0.05, 1.0), st.floats(-0.03, 0.03))
 def test_a_run_leaves_no_more_than_the_fracture_energy(
     tables: ModelTables, opening: float, advance: float
@@ -118,7 +118,7 @@ def test_a_run_leaves_no_more_than_the_fracture_energy(
         assert abs(kernel.crack - reference.crack) <= 2e-6 * max(1.0, abs(reference.crack))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(u16, u32, u32, f32, f32, f32, f32), min_size=1, max_size=40))
 def test_commands_are_always_finite_and_within_limits(
     rows: list[tuple[int, int, int, float, float, float, float]],
@@ -151,7 +151,7 @@ def test_commands_are_always_finite_and_within_limits(
         assert all(map(math.isfinite, servo.rates))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.binary(min_size=1, max_size=250), st.binary(max_size=300))
 def test_any_payload_survives_and_noise_before_it_costs_one_frame(
     payload: bytes, noise: bytes

@@ -161,7 +161,7 @@ FRAMES = st.lists(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(frames=FRAMES, mode=st.sampled_from([Mode.RENDER, Mode.DAMP, Mode.IDLE]))
 def test_whatever_comes_limits_slew_and_latches_hold(frames: list[object], mode: Mode) -> None:
     """Torque within its limit, slew kept from one sent command to the next, a stop stays."""

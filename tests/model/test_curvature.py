@@ -43,7 +43,7 @@ def test_powers_and_exponentials(exponent: float, start: float, ratio: float) ->
     assert_within(exact, response_curvature(exponential, low, high))
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(steps=st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=4), exponent=st.floats(0.6, 4.0))
 def test_a_spline_between_logarithms(steps: list[float], exponent: float) -> None:
     knots = tuple(1e-4 * 2.0**k for k in range(len(steps) + 2))

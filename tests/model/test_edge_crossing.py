@@ -1,9 +1,12 @@
 """Where a turned edge comes up through a height: closed forms, a search on curves, one root."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from scissorcal.model import Edge
 from scissorcal.model.edge_points import LARGEST_MISFIT_M, MOST_POINTS, edge_through
@@ -36,7 +39,7 @@ def points(draw: st.DrawFn) -> np.ndarray:
 
 
 @given(points())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_any_smooth_points_become_an_edge_near_them(given_points: np.ndarray) -> None:
     assume(len(given_points) >= 3)
     edge, misfit = edge_through(given_points)
@@ -48,10 +51,15 @@ def test_any_smooth_points_become_an_edge_near_them(given_points: np.ndarray) ->
 
 
 @given(points(), st.floats(-0.02, 0.02))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_at_the_station_the_edge_has_the_height_and_rises(
     given_points: np.ndarray, height: float
 ) -> None:
+    """There, and nowhere else, wherever heights at 4,001 stations leave no doubt.
+
+    Between neighbours, d apart, a curve leaves its chord by m d^2 / 8 at most, m its largest
+    second derivative, and where it turns its height changes by m d^2 at most.
+    """
     assume(len(given_points) >= 3)
     edge, _ = edge_through(given_points)
     found = edge.station_at_height(height, BETA)
@@ -59,15 +67,35 @@ def test_at_the_station_the_edge_has_the_height_and_rises(
     at, beta = found[known], BETA[known]
     reached = at * np.sin(beta) + edge.offset_at(at) * np.cos(beta)
     assert reached == pytest.approx(height, abs=1e-13)
-    assert np.all(np.sin(beta) + edge.slope_at(at) * np.cos(beta) >= 0.0)
+    assert np.all(np.sin(beta) + edge.slope_at(at) * np.cos(beta) >= -1e-13)
     stations = np.linspace(0.0, edge.length_m, 4001)
-    heights = np.multiply.outer(np.sin(BETA), stations) + np.multiply.outer(
-        np.cos(BETA), edge.offset_at(stations)
-    )
-    above = heights >= height
-    rises = np.count_nonzero(~above[:, :-1] & above[:, 1:], axis=1)
-    assert np.all(rises[known] >= 1)
-    assert np.all(known | (rises != 1))
+    away = np.multiply.outer(np.sin(BETA), stations) - height
+    away += np.multiply.outer(np.cos(BETA), edge.offset_at(stations))
+    one, next_one = away[:, :-1], away[:, 1:]
+    width = (edge.length_m - edge.spline_start_m) / (len(edge.spline_m) - 3)
+    turn = np.abs(np.diff(edge.spline_m, 2)).max() * (stations[1] / width) ** 2
+    beside = np.minimum(np.abs(one), np.abs(next_one)) > turn / 8.0
+    through = np.abs(one - next_one) > turn
+    sure = np.all(np.where((one < 0.0) == (next_one < 0.0), beside, through), axis=1)
+    rises = np.count_nonzero((one < 0.0) & (next_one >= 0.0), axis=1)
+    assert np.array_equal(known[sure], rises[sure] == 1)
+
+
+@pytest.mark.parametrize("beyond", [1e-6, 1e-8, 1e-10, 1e-12])
+def test_a_rise_just_below_a_crest_is_found_and_just_above_it_there_is_none(beyond: float) -> None:
+    station = np.linspace(0.0, 0.3, 60)
+    wave = 0.004 * np.sin(2.0 * np.pi * 1.3 * station / 0.3)
+    offset = -0.03 + 0.05 * station + wave - 0.6 * station**2
+    edge, _ = edge_through(np.stack([station, offset], axis=1))
+    beta = np.radians(3.0)
+    crest = brentq(lambda s: float(edge.slope_at(s)) + np.tan(beta), 0.05, 0.1, xtol=1e-15)
+    top = crest * np.sin(beta) + float(edge.offset_at(crest)) * np.cos(beta)
+    found = edge.station_at_height([top - beyond, top + beyond], beta)
+    assert crest - 0.01 < found[0] < crest
+    assert np.isnan(found[1])
+
+
+EPS = np.finfo(np.float64).eps
 
 
 @given(
@@ -76,25 +104,39 @@ def test_at_the_station_the_edge_has_the_height_and_rises(
     st.floats(-1.5, 3.0),
     st.floats(-0.002, 0.002),
 )
-@settings(max_examples=100, deadline=None)
+@example(offset=-0.001953125, taper=-5.0, curvature=-0.015625, height=-0.001953125)
 def test_lines_and_arcs_are_the_quadratics_root_wherever_it_is(
     offset: float, taper: float, curvature: float, height: float
 ) -> None:
-    slope = np.tan(np.radians(taper))
+    """What is left at the root is rounding: with u = eps / 2 and terms a s^2, b s and c of the law,
+
+    - the station is the root of a law whose b is off by u and whose a is off by 3 u, itself off
+      by 6 u (two products and a sum under the square root, the root, a sum, a quotient). With the
+      law's slope 2 a s + b that leaves 3 u |a s^2| + u |b s| + 6 u (2 |a s^2| + |b s|);
+    - the law's value, summed by Horner, is off by 4 u |a s^2| + 3 u |b s| + u |c|.
+
+    Together less than 10 eps of the terms' sum; likewise the slope, 6 eps of its own terms.
+    """
     edge = Edge("arc", offset, float(np.radians(taper)), 0.075, curvature_per_m=curvature)
     found = edge.station_at_height(height, BETA)
-    for station, beta in zip(found, BETA, strict=True):
-        law = np.array(
-            [
-                0.5 * curvature * np.cos(beta),
-                np.sin(beta) + slope * np.cos(beta),
-                offset * np.cos(beta) - height,
-            ]
-        )
-        if np.isfinite(station):
-            size = np.abs(law * [station**2, station, 1.0]).max()
-            assert np.polyval(law, station) == pytest.approx(0.0, abs=1e-14 + 1e-12 * size)
-            assert 2.0 * law[0] * station + law[1] >= -1e-9
+    bend = 0.5 * curvature * np.cos(BETA)
+    grade = np.sin(BETA) + np.tan(np.radians(taper)) * np.cos(BETA)
+    lift = offset * np.cos(BETA) - height
+    known = np.isfinite(found)
+    never, falling_line = grade**2 - 4.0 * bend * lift < 0.0, (grade <= 0.0) & (abs(bend) < 1e-300)
+    assert np.array_equal(known, ~(never | falling_line))
+    a, b, c, at = bend[known], grade[known], lift[known], found[known]
+    terms = (np.abs(a * at) + np.abs(b)) * np.abs(at) + np.abs(c)
+    assert np.all(np.abs((a * at + b) * at + c) <= 10 * EPS * terms)
+    assert np.all(2.0 * a * at + b >= -6 * EPS * (2.0 * np.abs(a * at) + np.abs(b)))
+
+
+def test_an_arc_that_falls_at_the_pivot_is_found_where_it_rises() -> None:
+    arc = Edge("arc", 1e-4, np.radians(-5.0), 0.075, curvature_per_m=3.0)
+    cubic = replace(arc, family="cubic")
+    found = arc.station_at_height(0.0, BETA[0])
+    assert 0.0 < found < arc.length_m
+    assert found == pytest.approx(cubic.station_at_height(0.0, BETA[0]), abs=1e-15)
 
 
 def test_a_cubic_without_bend_is_found_where_its_arc_is() -> None:

@@ -11,7 +11,7 @@ from scissorcal.model.edge_points import LARGEST_MISFIT_M, edge_through
 from tests.model.golden_edges import golden
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.integers(3, 200),
     st.floats(0.01, 0.5),

@@ -93,9 +93,7 @@ def test_every_flipped_byte_is_refused_or_harmless(
     assert refused > 0.8 * len(places)
 
 
-@settings(
-    deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_changed_range_of_a_member_is_refused(
     data: st.DataObject, paper: PackageSummary, copy_of_paper: Path
@@ -116,9 +114,7 @@ def test_any_changed_range_of_a_member_is_refused(
             open_package(copy_of_paper)
 
 
-@settings(
-    deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_changed_range_of_the_file_is_refused_or_harmless(
     data: st.DataObject, paper: PackageSummary, copy_of_paper: Path

@@ -55,7 +55,7 @@ def test_no_points_give_no_torque(paper: PackageSummary) -> None:
 
 
 @pytest.mark.filterwarnings(OUTSIDE)
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     opening=st.floats(np.radians(12.0), np.radians(50.0)),
     rate=st.floats(-1.0, 1.0),

@@ -67,7 +67,7 @@ def judge(law: TableLaw, tolerance: float, number_format: NumberFormat) -> None:
     assert np.all(away <= proof.value[place] + proof.rounding[place])
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     family=st.sampled_from(["power", "exponential", "spline"]),
     exponent=st.floats(0.5, 6.0),
@@ -98,7 +98,7 @@ def test_responses(
     judge(law, tolerance, number_format)
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 1000), tolerance=st.sampled_from([1e-2, 1e-4]), number_format=FORMATS)
 def test_spline_edges(seed: int, tolerance: float, number_format: NumberFormat) -> None:
     weights = np.random.default_rng(seed).normal(0.0, 2e-4, 8)
@@ -114,7 +114,7 @@ def test_spline_edges(seed: int, tolerance: float, number_format: NumberFormat) 
     judge(law, tolerance, number_format)
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(
     scale=st.floats(0.01, 1.0),
     tolerance=st.sampled_from([5e-2, 1e-3, 1e-4]),

@@ -21,7 +21,7 @@ def independent_points(low: float, high: float) -> Array:
     return np.sort(np.concatenate([even, low + (high - low) * np.geomspace(1e-12, 1.0, 4001)]))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     family=st.sampled_from(["power", "exponential"]),
     exponent=st.floats(0.5, 8.0),
@@ -46,7 +46,7 @@ def test_response_tables_keep_their_tolerance(
     assert np.all(np.abs(fitted.table.evaluate(x) - exact) <= allowed)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(exponent=st.floats(0.5, 8.0), tolerance=st.sampled_from([1e-2, 1e-3, 1e-5]))
 def test_monotone_tables_never_fall(exponent: float, tolerance: float) -> None:
     law = Response("power", 2.0, exponent, 3e-4)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.errors import InputError
@@ -227,7 +227,6 @@ def test_lines_are_found_across_multi_line_values_and_dotted_keys() -> None:
     assert key_lines(text, paths) == [1, 5, 9, 13, None]
 
 
-@settings(deadline=None)
 @given(st.text(max_size=200))
 def test_no_text_is_met_with_anything_but_a_sentence(text: str) -> None:
     with pytest.raises(InputError) as caught:
@@ -242,7 +241,6 @@ VALUES = st.recursive(
 ).filter(lambda value: value is not None)
 
 
-@settings(deadline=None)
 @given(
     key=st.sampled_from(["thickness_mm = 0.10", "cut = true", "opening_deg = [12.0, 50.0]"]),
     value=VALUES,

@@ -22,7 +22,7 @@ def test_what_is_shown_is_a_recipe_with_the_same_meaning(name, defaults):
     assert parse_recipe(shown) == recipe
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     median=st.floats(1e-9, 1e9),
     factor=st.floats(1.001, 1e6),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zstandard
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
@@ -102,13 +102,11 @@ def test_cuts_anywhere_keep_all_complete_chunks(whole: Whole) -> None:
     assert max(n for n in lost if n is not None) <= 146
 
 
-@settings(deadline=None)
 @given(share=st.floats(0, 1))
 def test_any_cut(whole: Whole, share: float) -> None:
     check_cut(whole, max(1, round(share * len(whole.data))))
 
 
-@settings(deadline=None)
 @given(at=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_a_flipped_bit_never_changes_a_sample(whole: Whole, at: float, bit: int) -> None:
     place = int(at * len(whole.data))
@@ -234,7 +232,6 @@ def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
         read_recording(tmp_path)
 
 
-@settings(deadline=None)
 @given(data=st.binary(max_size=300))
 def test_random_bytes_are_refused(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
     path = tmp_path_factory.getbasetemp() / "random.mcap"

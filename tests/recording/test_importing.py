@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.errors import InputError
@@ -267,7 +267,6 @@ def test_no_motion_is_noted(tmp_path: Path) -> None:
     assert "No stroke was found: the joint moves less than the least travel." in recording.notes
 
 
-@settings(deadline=None)
 @given(
     data=st.binary(max_size=200)
     | st.text(alphabet='0123,;.\t\n -eabn%#"', max_size=200).map(str.encode)

@@ -65,7 +65,7 @@ def by_blocks(steps: list[Any], chunk_bytes: int) -> bytes:
     return stream.getvalue()
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(steps=STEPS, chunk_bytes=st.sampled_from([200, 1024, 5000, 65536]))
 def test_the_bytes_are_the_librarys(steps: list[Any], chunk_bytes: int) -> None:
     assert by_blocks(steps, chunk_bytes) == by_the_library(steps, chunk_bytes)

@@ -9,7 +9,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
@@ -72,7 +72,6 @@ def test_the_metadata_of_a_file_follows_the_schema(tmp_path: Path) -> None:
         jsonschema.validate(document, stored())
 
 
-@settings(deadline=None)
 @given(
     recipe=st.text(),
     device=st.dictionaries(st.text(), st.none() | st.integers() | st.text() | st.floats()),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from scissorcal.calibration.signals.survey import survey
@@ -157,12 +157,19 @@ def test_what_decides_the_threshold_is_stated() -> None:
 
 
 @given(sd=st.floats(1e-6, 1e3), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
+@example(sd=1.0, seed=335)
+@settings(max_examples=30)
 def test_noise_is_told_from_motion(sd: float, seed: int) -> None:
-    """The estimate's own sd is 1.5 % of 4,000 samples; five of them are allowed."""
+    """Six standard deviations of the estimate are allowed: 10^-8 of seeds pass them.
+
+    It is the least of seven medians, of |differences| of orders 2 to 8. The median of n values
+    with density f there and correlations r_j has the variance sum_j cov(|j|) / (n f^2), where
+    cov is that of "below the median", summed over Hermite's orders of r_j = (-1)^j C(2k, k + j) /
+    C(2k, k). For n = 4,000 that is 2.2 % of the value at order 2 and 2.92 % at order 8.
+    """
     noise = np.random.default_rng(seed).normal(0.0, sd, 4000)
     slow = sd * np.sin(np.linspace(0.0, 20.0, 4000))
-    assert noise_of(slow + noise) == pytest.approx(sd, rel=0.09)
+    assert noise_of(slow + noise) == pytest.approx(sd, rel=6 * 0.0292)
 
 
 @pytest.mark.parametrize(("rate_Hz", "strokes_Hz"), [(10.0, 1.4), (20.0, 2.1), (250.0, 3.0)])

@@ -42,7 +42,6 @@ def test_constant_speeds_are_found_with_their_rests_left_out() -> None:
         assert moving <= (len(here) + 1) * 1e-3 <= moving + 0.11
 
 
-@settings(deadline=None)
 @given(
     noise=st.floats(0, 0.01),
     step=st.sampled_from([0.0, 1e-4, 5e-3]),
@@ -60,7 +59,6 @@ def test_noise_and_encoder_steps_do_not_split_strokes(
     assert [s.kind for s in labels.strokes] == (kinds[1:] + kinds[:1] if mirrored else kinds)
 
 
-@settings(deadline=None)
 @given(
     values=st.lists(st.floats(-10, 10), max_size=60),
     min_travel=st.floats(1e-3, 5),
@@ -119,7 +117,7 @@ def reference_turns(values: list[float], min_travel: float) -> list[int]:
         direction = -direction
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(
     values=st.lists(st.floats(-10, 10) | st.sampled_from([0.0, 1.0, 2.0]), max_size=60),
     cuts=st.lists(st.integers(0, 60), max_size=8),

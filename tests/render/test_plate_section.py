@@ -16,7 +16,7 @@ FACE = 0.002
 
 
 @pytest.mark.parametrize("blades", [1, 2])
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(angle=angles, place=places)
 def test_a_section_is_where_points_of_the_plate_meet_the_plane(
     blades: int, angle: tuple[float, ...], place: tuple[float, ...]
@@ -29,7 +29,7 @@ def test_a_section_is_where_points_of_the_plate_meet_the_plane(
 
 
 @pytest.mark.parametrize("blades", [1, 2])
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(angle=angles, place=places)
 def test_slopes_are_those_of_the_section(
     blades: int, angle: tuple[float, ...], place: tuple[float, ...]

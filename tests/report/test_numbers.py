@@ -4,7 +4,7 @@ import doctest
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.report import inputs, numbers, panel, strokes, text
@@ -40,7 +40,6 @@ def test_examples_in_docstrings_hold(module: object) -> None:
     assert outcome.failed == 0
 
 
-@settings(deadline=None)
 @given(VALUES, st.integers(1, 8))
 def test_any_number_can_be_written_and_read_back(value: float, digits: int) -> None:
     text = significant(value, digits)
@@ -53,7 +52,6 @@ def test_any_number_can_be_written_and_read_back(value: float, digits: int) -> N
         )
 
 
-@settings(deadline=None)
 @given(VALUES, st.integers(-290, 400))
 def test_any_number_can_be_written_to_any_place(value: float, decimals: int) -> None:
     text = with_decimals(value, decimals)
@@ -63,7 +61,6 @@ def test_any_number_can_be_written_to_any_place(value: float, decimals: int) -> 
         assert abs(value_of(text) - value) <= max(0.51 * 10.0**-decimals, 1e-14 * abs(value))
 
 
-@settings(deadline=None)
 @given(st.floats(min_value=1e-12, max_value=1e12), st.floats(min_value=1e-9, max_value=1e9))
 def test_a_mean_is_written_to_two_digits_of_its_sd(sd: float, mean: float) -> None:
     written = with_decimals(mean, decimals_for(sd, mean))

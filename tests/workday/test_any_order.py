@@ -98,7 +98,5 @@ TestAnyOrder = pytest.mark.slow(AnyOrder.TestCase)
 TestAnyOrder.settings = settings(
     max_examples=5,
     stateful_step_count=6,
-    deadline=None,
-    derandomize=True,
     suppress_health_check=list(HealthCheck),
 )

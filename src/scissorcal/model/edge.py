@@ -15,7 +15,6 @@ Family = Literal["line", "arc", "cubic", "spline"]
 
 NEWTON_STEPS = 30
 HALVINGS = 64
-CROSSING_CELLS = 512
 CLOSE = 1e-9
 """Share of the place within which Newton's last step must stay."""
 
@@ -68,13 +67,8 @@ class Edge:
     @cached_property
     def steepest(self) -> Array:
         """Largest slope e'(s) on the blade, from the pivot to the tip; shape of the parameters."""
-        ends = np.array([0.0, self.length_m])
-        if self.family == "spline":
-            pieces = np.shape(self.spline_m)[-1] - FEWEST + 1
-            knots = np.linspace(self.spline_start_m, self.length_m, pieces + 1)
-            ends = np.unique(np.clip(np.append(knots, 0.0), 0.0, self.length_m))
-        slopes = np.stack([self.slope_at(s) for s in _with_middles(ends)])
-        return _largest_of_parabolas(slopes[:-1:2], slopes[1::2], slopes[2::2])
+        _, *slopes = _slopes_of_pieces(self)
+        return _largest_of_parabolas(*slopes)
 
     def offset_at(self, station: ArrayLike) -> Array:
         """Offset e(s) in metres; ``station`` broadcasts with the parameters."""
@@ -114,9 +108,12 @@ class Edge:
         cosine = np.cos(beta)
         rise = level - self.offset_m * cosine
         grade = np.sin(beta) + np.tan(self.taper_rad) * cosine
-        with np.errstate(invalid="ignore", divide="ignore"):
-            root = grade + np.sqrt(grade**2 + 2.0 * self.curvature_per_m * cosine * rise)
-            return np.asarray(np.where(root > 0.0, 2.0 * rise / root, np.nan))
+        bend = self.curvature_per_m * cosine
+        with np.errstate(all="ignore"):
+            root = np.sqrt(grade**2 + 2.0 * bend * rise)
+            # Two forms of one root: each adds numbers of one sign, so that no digits cancel.
+            station = np.where(grade > 0.0, 2.0 * rise / (grade + root), (root - grade) / bend)
+            return np.where(np.isfinite(station), station, np.nan)
 
 
 @dataclass(frozen=True)
@@ -237,9 +234,19 @@ def edge_height(edge: Edge, contact: ArrayLike, blade_angle: ArrayLike) -> EdgeV
         return EdgeView(height, slope, station, x + height * slope)
 
 
-def _with_middles(ends: Array) -> Array:
-    """Ends of pieces, with the middle of each piece between them."""
-    return np.insert(ends, np.arange(1, len(ends)), 0.5 * (ends[:-1] + ends[1:]))
+def _slopes_of_pieces(edge: Edge) -> tuple[Array, Array, Array, Array]:
+    """Ends (pieces + 1,) of the pieces on the blade, and slopes at first, middle and last of each.
+
+    The slope is one parabola on each piece; slopes are (pieces,) and the parameters' axes.
+    """
+    ends = np.array([0.0, edge.length_m])
+    if edge.family == "spline":
+        pieces = np.shape(edge.spline_m)[-1] - FEWEST + 1
+        knots = np.linspace(edge.spline_start_m, edge.length_m, pieces + 1)
+        ends = np.unique(np.clip(np.append(knots, 0.0), 0.0, edge.length_m))
+    with_middles = np.insert(ends, np.arange(1, len(ends)), 0.5 * (ends[:-1] + ends[1:]))
+    slopes = np.stack([edge.slope_at(s) for s in with_middles])
+    return ends, slopes[:-1:2], slopes[1::2], slopes[2::2]
 
 
 def _largest_of_parabolas(first: Array, middle: Array, last: Array) -> Array:
@@ -293,17 +300,16 @@ def _station_by_halving(edge: Edge, x: Array, sine: Array, cosine: Array) -> Arr
 
 
 def _rising_station(edge: Edge, level: Array, beta: Array) -> Array:
-    """Where the edge alone rises through each level (n,): cells of a grid, then Newton in a cell.
+    """Where the edge alone rises through each level (n,): between turning points, then Newton.
 
     A Newton step that leaves what is known to hold the root is replaced by half of that.
     """
     sine, cosine = np.sin(beta), np.cos(beta)
-    stations = np.linspace(0.0, edge.length_m, CROSSING_CELLS + 1)
-    heights = np.multiply.outer(sine, stations)
-    heights += np.multiply.outer(cosine, edge.offset_at(stations)) - level[:, None]
-    rising = (heights[:, :-1] < 0.0) & (heights[:, 1:] >= 0.0)
-    cell = np.argmax(rising, axis=1)
-    low, high = stations[cell], stations[cell + 1]
+    stations = _turning_stations(edge, sine / cosine)
+    heights = stations * sine[:, None] + edge.offset_at(stations) * cosine[:, None]
+    rising = (heights[:, :-1] < level[:, None]) & (heights[:, 1:] >= level[:, None])
+    each, cell = np.arange(len(level)), np.argmax(rising, axis=1)
+    low, high = stations[each, cell], stations[each, cell + 1]
     station = 0.5 * (low + high)
     for _ in range(HALVINGS):
         away = station * sine + edge.offset_at(station) * cosine - level
@@ -315,6 +321,26 @@ def _rising_station(edge: Edge, level: Array, beta: Array) -> Array:
         if np.all(np.abs(station - before) <= 1e-15 * edge.length_m):
             break
     return np.where(np.count_nonzero(rising, axis=1) == 1, station, np.nan)
+
+
+def _turning_stations(edge: Edge, tilt: Array) -> Array:
+    """Stations (n, m), ascending along the blade, between which the turned edge is monotone.
+
+    They are the ends of its pieces and where its slope is -``tilt`` (n,), the tangent of the blade
+    angle: at most two places on a piece, the roots of a parabola. Places that a piece lacks stand
+    at its first end.
+    """
+    ends, first, middle, last = _slopes_of_pieces(edge)
+    level = first + tilt[:, None]
+    bend = 2.0 * (first + last) - 4.0 * middle
+    rise = last - first - bend
+    with np.errstate(all="ignore"):
+        both = -0.5 * (rise + np.copysign(np.sqrt(rise**2 - 4.0 * bend * level), rise))
+        shares = np.stack([both / bend, level / both])
+        shares = np.where((shares > 0.0) & (shares < 1.0), shares, 0.0)
+    turns = ends[:-1] + shares * np.diff(ends)
+    borders = np.broadcast_to(ends, (len(tilt), len(ends)))
+    return np.sort(np.concatenate([borders, *turns], axis=1), axis=1)
 
 
 def _plain(value: Array) -> float | Array:

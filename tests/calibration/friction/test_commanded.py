@@ -32,7 +32,7 @@ def acting(command, delay, lag):
     return force
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     st.lists(st.floats(-30.0, 30.0), min_size=4, max_size=8),
     st.integers(0, 3 * FINE).map(lambda steps: steps / FINE),

@@ -86,7 +86,7 @@ def law_and_values(rng) -> tuple[FrictionLaw, dict[str, float]]:
     return law, values
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_the_basis_is_the_law_at_every_sample_and_weighed(seed):
     """To 1e-4 of the largest, and 2.5 % of what Stribeck friction lacks after a reversal."""

@@ -225,7 +225,7 @@ def test_impossible_plates_are_refused(change: dict, words: str) -> None:
         specimen(plate={**LEVEL, **change})
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_no_plate_and_command_give_a_number_that_is_not_finite(
     data: st.DataObject,

@@ -262,7 +262,7 @@ def test_a_sheet_cut_to_its_end_gives_no_force() -> None:
     assert rig.stored_energy == 0.0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(data=st.data())
 def test_no_specimen_and_no_command_ever_gives_a_number_that_is_not_finite(
     data: st.DataObject,

@@ -36,7 +36,7 @@ def waves(draw: st.DrawFn) -> tuple[float, list[tuple[float, float]]]:
 
 
 @given(waves())
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_wave_is_scipys_natural_spline_and_straight_beyond(
     made: tuple[float, list[tuple[float, float]]],
 ) -> None:
@@ -57,7 +57,7 @@ def test_the_wave_is_scipys_natural_spline_and_straight_beyond(
 
 
 @given(waves(), st.floats(-0.1, 1.0), st.floats(0.01, 0.95), st.sampled_from(["both", "upper"]))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_the_edge_is_found_where_the_turned_blade_puts_it(
     made: tuple[float, list[tuple[float, float]]], share: float, opening: float, moving: str
 ) -> None:
@@ -100,7 +100,7 @@ def test_a_wave_of_nothing_changes_nothing() -> None:
 
 
 @given(waves(), st.floats(0.05, 0.95))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_beyond_its_crossing_the_edge_is_above_the_sheet(
     made: tuple[float, list[tuple[float, float]]], opening: float
 ) -> None:

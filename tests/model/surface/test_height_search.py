@@ -45,7 +45,7 @@ def test_nearest_points_of_a_tilted_plane():
         assert found.unique.all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 10_000), power=st.floats(-4, 3))
 def test_the_line_to_the_nearest_point_is_normal_to_the_surface(seed, power):
     field, p = rough(seed), cloud(10.0**power, 20, seed)

@@ -28,7 +28,7 @@ poses = st.builds(
 
 
 @given(poses, poses)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_pose_after_its_inverse_is_the_identity(a: Pose, b: Pose) -> None:
     assert np.allclose(
         difference(a.after(a.inverse()), Pose((1.0, 0, 0, 0), (0.0, 0, 0))), 0, atol=1e-9
