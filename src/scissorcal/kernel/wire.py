@@ -1,12 +1,14 @@
 """Bytes on the wire: CRC-16, frames, messages in frames, and a decoder of streams."""
 
 import re
-from typing import Any
+from collections.abc import Callable
+from operator import attrgetter
+from typing import Any, NamedTuple, get_type_hints
 
 from scissorcal.kernel._kernel import ffi, lib
 from scissorcal.kernel.messages import TYPES, Message
 
-LARGEST_PAYLOAD = int(lib.SC_PAYLOAD_MAX)
+LARGEST_PAYLOAD, _LARGEST_FRAME = int(lib.SC_PAYLOAD_MAX), int(lib.SC_FRAME_MAX)
 
 
 def crc16(data: bytes) -> int:
@@ -24,7 +26,7 @@ def encode_frame(payload: bytes) -> bytes:
     >>> encode_frame(bytes([1, 0, 2])).hex(" ")
     '02 01 04 02 ee db 00'
     """
-    frame = ffi.new("uint8_t[]", int(lib.SC_FRAME_MAX))
+    frame = ffi.new(_PAYLOAD, _LARGEST_FRAME)
     size = lib.sc_encode_frame(ffi.from_buffer(payload), len(payload), frame, len(frame))
     if size == 0:
         raise ValueError(
@@ -80,13 +82,11 @@ def encode(message: Message) -> bytes:
     >>> encode(Command(flags=1, echo_sequence=7, torque=0.25, force=0.0)).hex(" ")
     '02 02 02 01 02 07 01 01 01 01 03 80 3e 01 01 01 03 2f 4e 00'
     """
-    name, payload = _C_NAMES[type(message)], ffi.new("uint8_t[]", int(lib.SC_PAYLOAD_MAX))
+    known, payload = _IN_C[type(message)], ffi.new(_PAYLOAD, LARGEST_PAYLOAD)
     try:
-        fields = {
-            field: _text_bytes(value) if isinstance(value, str) else value
-            for field, value in message._asdict().items()
-        }
-        size = getattr(lib, f"sc_pack_{name}")(ffi.new(f"sc_{name} *", fields), payload)
+        values = map(_text_bytes, message) if known.has_text else message
+        fields = dict(zip(message._fields, values, strict=True))
+        size = known.pack(ffi.new(known.pointer, fields), payload)
     except (OverflowError, TypeError, UnicodeEncodeError) as error:
         kind = type(message).__name__
         raise ValueError(f"{kind} does not fit its frame: {error}.") from error
@@ -102,14 +102,18 @@ def decode(payload: bytes) -> Message:
     if kind is None:
         first = payload[0] if payload else "none"
         raise ValueError(f"No message has type {first}: the device speaks another protocol.")
-    name = _C_NAMES[kind]
-    struct = ffi.new(f"sc_{name} *")
-    if not getattr(lib, f"sc_unpack_{name}")(ffi.from_buffer(payload), len(payload), struct):
-        raise ValueError(f"A {name.upper()} does not have {len(payload)} bytes.")
-    return kind(**{field: _value(getattr(struct, field)) for field in kind._fields})
+    known = _IN_C[kind]
+    struct = ffi.new(known.pointer)
+    if not known.unpack(ffi.from_buffer(payload), len(payload), struct):
+        raise ValueError(f"A {known.name.upper()} does not have {len(payload)} bytes.")
+    values = known.read(struct)
+    return kind(*(map(_value, values) if known.has_text else values))
 
 
-def _text_bytes(text: str) -> list[int]:
+def _text_bytes(text: Any) -> Any:
+    """A text as its bytes, a number as it is."""
+    if not isinstance(text, str):
+        return text
     data = text.encode("ascii")
     if len(data) > 16:
         raise OverflowError(f"the text {text!r} is longer than 16 characters")
@@ -123,7 +127,24 @@ def _value(value: Any) -> Any:
     return bytes(value).split(b"\0", 1)[0].decode("ascii", "replace")
 
 
-_C_NAMES = {
-    kind: re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower() for kind in TYPES.values()
-}
-"""A message's name in C: ``config_echo`` for ConfigEcho."""
+class _InC(NamedTuple):
+    """A message in C: ``sc_config_echo`` for ConfigEcho; what is looked up once, not per frame."""
+
+    name: str
+    pointer: Any
+    pack: Callable[..., int]
+    unpack: Callable[..., bool]
+    read: Callable[[Any], tuple[Any, ...]]
+    has_text: bool
+
+    @classmethod
+    def of(cls, kind: type[Message]) -> "_InC":
+        name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower()
+        pack, unpack = (getattr(lib, f"sc_{verb}_{name}") for verb in ("pack", "unpack"))
+        has_text = str in get_type_hints(kind).values()
+        pointer = ffi.typeof(f"sc_{name} *")
+        return cls(name, pointer, pack, unpack, attrgetter(*kind._fields), has_text)
+
+
+_PAYLOAD = ffi.typeof("uint8_t[]")
+_IN_C = {kind: _InC.of(kind) for kind in TYPES.values()}
