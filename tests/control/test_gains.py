@@ -57,7 +57,7 @@ def test_no_finer_grid_finds_better_gains() -> None:
     assert decay == pytest.approx(contact_decay(LOOP, gains))
 
 
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(
     stiffness=st.floats(1e2, 1e5),
     mass=st.floats(0.02, 2.0),

@@ -83,7 +83,7 @@ def test_poles_and_sag_are_those_of_a_simulated_loop(delay_s: float) -> None:
     assert np.abs(steps_of(axis, swinging, 400)).max() > 10.0 * sag(axis, gains)
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(
     delay_ms=st.floats(0.0, 6.0),
     tick_us=st.sampled_from([250, 500, 1000, 2000]),

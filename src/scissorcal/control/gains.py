@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +113,13 @@ def contact_gains(
 
     Sought on grids, each of ``rounds`` about the best of the one before.
     """
+    return _contact_gains(tuple(loops), rounds, force_kp)
+
+
+@lru_cache(maxsize=64)  # a path's runs ask for the same loops
+def _contact_gains(
+    loops: tuple[ContactLoop, ...], rounds: int, force_kp: float
+) -> tuple[ContactGains, float]:
     most_kd = min(_most_kd(loop) for loop in loops)
     kd = np.array([0.0, *np.geomspace(1e-3 * most_kd, most_kd, GRID - 1)])
     ki = np.geomspace(LEAST_KI_PER_S, MOST_KI_PER_S, GRID)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from scissorcal.device.control import (
     GAIN_MARGIN,
@@ -111,6 +112,7 @@ def _best(axis: Axis, cutoffs_Hz: tuple[float, ...]) -> Design | None:
     return found
 
 
+@lru_cache(maxsize=1024)  # captures, plans and refusals of a day ask for the same axis
 def fastest_design(axis: Axis, lead: float, integral: float) -> Design | None:
     """The design of highest crossover of one shape; None where none keeps the margins.
 
