@@ -2,8 +2,8 @@
 
 Each test that hypothesis drives runs again and again, with a new seed each time, until its share of
 what is left of the round is used up; its module's and session's fixtures stay. A slow test does not
-take more: the rest of a seed's examples is then drawn and not tried. What a test did and the first
-failure of each are written to a file of JSON lines at once, so that they survive a crash.
+take more: the rest of its seed's examples is left out. What a test did and the first failure of
+each are written to a file of JSON lines at once, so that they survive a crash.
 """
 
 import functools
@@ -70,13 +70,13 @@ class Exploration:
         self.any_tried = True
         runs, failed = 0, False
         # Where no time was given, the first test tries one seed.
-        with _until(item, began + share if share > 0.0 else math.inf) as tried:
+        with until(item.obj, began + share if share > 0.0 else math.inf) as tried:
             while not failed and (runs == 0 or time.time() < began + share):
                 seed = self.seeds.getrandbits(32)
                 self._write(test=item.nodeid, seed=seed)
                 reports = _run(item, seed)
                 runs += 1
-                if any(report.skipped for report in reports):
+                if tried.cut_short or any(report.skipped for report in reports):
                     break
                 failed = any(report.failed for report in reports)
                 if failed:
@@ -92,20 +92,25 @@ class Exploration:
 
 
 @dataclass
-class _Tried:
+class Tried:
+    """How many examples a test tried, whether it failed, and whether its time was up before."""
+
     examples: int = 0
     failed: bool = False
+    cut_short: bool = False
 
 
 @contextmanager
-def _until(item: pytest.Item, end: float) -> Iterator[_Tried]:
+def until(test: Any, end: float) -> Iterator[Tried]:
     """Let a test try examples until its time is up, but one at least, and all after a failure.
 
-    What hypothesis draws up to a failure is the same as without this, so that the seed alone shows
-    the failure again. Tests of a state machine have no inner function: they are not cut short.
+    Where it ends it skips the test. Of one that draws as it goes, hypothesis then says that it does
+    not always draw the same, which is no failure: ``cut_short`` says so.
+    What hypothesis draws until then is the same as without this, so that the seed alone shows a
+    failure again. Tests of a state machine have no inner function: they are not cut short.
     """
-    tried = _Tried()
-    handle = getattr(getattr(item, "obj", None), "hypothesis", None)
+    tried = Tried()
+    handle = getattr(test, "hypothesis", None)
     if handle is None:
         yield tried
         return
@@ -114,7 +119,8 @@ def _until(item: pytest.Item, end: float) -> Iterator[_Tried]:
     @functools.wraps(inner)
     def timed(*args: Any, **kwargs: Any) -> Any:
         if time.time() >= end and tried.examples > 0 and not tried.failed:
-            return None
+            tried.cut_short = True
+            pytest.skip("the test's share of the time is up")
         tried.examples += 1
         try:
             return inner(*args, **kwargs)

@@ -6,8 +6,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.errors import FlakyStrategyDefinition
 
 from tests.explore import command_for, environment, explore, falsifying_example, summary
+from tests.explore_plugin import Tried, until
 
 DRAW = """
 import sys
@@ -101,3 +105,20 @@ def test_a_test_that_ends_its_process_is_a_failure(tmp_path: Path) -> None:
 def test_a_search_without_any_test_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match="No test ran"):
         explore(0.0, ["test_missing.py"], root=tmp_path)
+
+
+def test_a_test_whose_time_is_up_tries_one_example_and_fails_nowhere() -> None:
+    tried: list[int] = []
+
+    @given(st.data())
+    def draws_as_it_goes(data: st.DataObject) -> None:
+        tried.append(data.draw(st.integers()))
+        data.draw(st.lists(st.booleans()))
+
+    ends = (pytest.skip.Exception, FlakyStrategyDefinition)
+    with until(draws_as_it_goes, 0.0) as counted, pytest.raises(ends):
+        draws_as_it_goes()
+    assert tried == [0]
+    assert counted == Tried(examples=1, failed=False, cut_short=True)
+    draws_as_it_goes()
+    assert len(tried) > 50
