@@ -176,7 +176,7 @@ def summary(failures: list[Failure], tried: list[Tried]) -> str:
         lines += ["", f"{n}. {failure.test}", f"seed {failure.seed}"]
         lines += [falsifying_example(failure.said), "Shown again by:", command_for(failure)]
     examples = sum(one.examples for one in tried)
-    lines += ["", f"{len(failures)} tests failed; {examples} examples passed"]
+    lines += ["", f"{len(failures)} tests failed; {examples} examples tried"]
     return "\n".join(lines)
 
 

@@ -74,9 +74,9 @@ class Waits:
         """The most that one thread waited since `LOOKS` looks ago; of a new one, since it began."""
         now: dict[str, int] = {}
         self._add(self._pid, now)
-        before = self._before[0] if self._before else now
+        before = self._before[0] if self._before else now  # the first look has nothing before it
         self._before.append(now)
-        waited = [wait - before[thread] for thread, wait in now.items() if thread in before]
+        waited = [wait - before.get(thread, 0) for thread, wait in now.items()]
         return 1e-6 * max(waited, default=0)
 
     def _add(self, pid: int, found: dict[str, int]) -> None:
@@ -85,15 +85,23 @@ class Waits:
         except OSError:  # it has ended, or this system has no such files
             return
         for thread in threads:
-            try:
-                words = (thread / "schedstat").read_text().split()
-                children = (thread / "children").read_text().split()
-            except OSError:  # it has ended meanwhile, or Linux was built without
-                continue
-            found[thread.name] = int(words[1])
-            for child in children:
+            words = _words_of(thread / "schedstat")
+            if words:
+                found[thread.name] = int(words[1])
+            for child in _words_of(thread / "children"):
                 if int(child) != self._own:
                     self._add(int(child), found)
+
+
+def _words_of(file: Path) -> list[str]:
+    """Nothing where the thread has ended meanwhile, or where Linux was built without the file.
+
+    Children of a process that was killed have another parent then, and are not watched.
+    """
+    try:
+        return file.read_text().split()
+    except OSError:
+        return []
 
 
 def watch(pid: int, own: int) -> None:

@@ -51,9 +51,11 @@ class Evaluation:
         """The end of a run: how many were not evaluated, and the worst hold-up."""
         count, worst = len(self.held_ms), max(self.held_ms, key=self.held_ms.__getitem__)
         left_out = len(set(self.not_evaluated))
+        excused = sum(held > MOST_HELD_ms for held in self.held_ms.values())
         return [
             f"{count} tests in real time, {left_out} of them {NOT_EVALUATED}: a failure counts only"
-            f" where the machine held up no process for more than {MOST_HELD_ms:g} ms.",
+            f" where the machine held up no process for more than {MOST_HELD_ms:g} ms. It did"
+            f" during {excused} of them.",
             f"Worst hold-up: {self.held_ms[worst]:.1f} ms, during {worst}.",
         ]
 

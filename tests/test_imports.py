@@ -191,7 +191,7 @@ SERVED = {f"scissorcal.prototype.{name}" for name in ("guard", "server", "watche
 
 def test_no_module_imports_at_its_top_what_only_an_extra_installs() -> None:
     extras = {"pyarrow", "arviz", "pandas", "xarray", "distributed", "dask", "jax", "numpyro"}
-    extras |= {"aiohttp", "cryptography", "matplotlib"}
+    extras |= {"aiohttp", "cryptography", "matplotlib", "mpmath"}
     for path in MODULES:
         if module_of(path) in SERVED:
             continue

@@ -7,14 +7,14 @@ import pytest
 
 from scissorcal.recording import export_table, read_recording
 from scissorcal.workday.workspace import Workspace
-from tests.workday.made import fitted_workspace, quick_workspace, record_friction
+from tests.workday.made import fitted_copy, quick_workspace, record_friction
 
 from .conftest import Cli
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    return fitted_workspace(tmp_path_factory.mktemp("predict") / "paper", "friction")
+    return fitted_copy(tmp_path_factory, tmp_path_factory.mktemp("predict") / "paper", "friction")
 
 
 @pytest.fixture(scope="module")

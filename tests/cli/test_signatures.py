@@ -15,7 +15,7 @@ from scissorcal.package import open_package
 from scissorcal.package.archive import MANIFEST_FILE
 from scissorcal.package.review import stated_digest
 from scissorcal.workday.workspace import Workspace
-from tests.workday.made import quick_workspace, record_cut, record_friction
+from tests.workday.made import fitted_copy, record_cut
 
 from .conftest import Cli
 
@@ -28,10 +28,9 @@ needs_ssh_keygen = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def signed_day(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A workspace whose report is signed, and whose package carries the signature."""
-    workspace = quick_workspace(tmp_path_factory.mktemp("signed") / "paper")
-    record_friction(workspace)
-    record_cut(workspace)
-    for words in (("fit",), ("report",), SIGN, ("package", "build")):
+    folder = tmp_path_factory.mktemp("signed") / "paper"
+    workspace = fitted_copy(tmp_path_factory, folder, "friction", "cut")
+    for words in (("report",), SIGN, ("package", "build")):
         with pytest.raises(SystemExit) as ended:
             run([*words, "--workspace", str(workspace.root)])
         assert ended.value.code == 0, words

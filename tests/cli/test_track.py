@@ -344,8 +344,8 @@ def test_a_running_camera_and_a_rig_on_a_port(
 def test_a_camera_that_shows_no_target_ends_with_why(
     cli: Cli, workspace: Path, album: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    cli("import", album / "camera.yml")
     """It does so 50 times a second by the clock of its pictures, however late they are seen."""
+    cli("import", album / "camera.yml")
     monkeypatch.setattr("scissorcal.workday.runs.track.PATIENCE_S", 0.5)
     monkeypatch.setattr("scissorcal.workday.tracking.feeds.NO_PICTURE_S", GUARD_S)
     grey = np.full((1500, 2000, 3), 90, np.uint8)

@@ -8,14 +8,14 @@ import pytest
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.workspace import Workspace
 from tests.calibration.truth import Truth
-from tests.workday.made import fitted_workspace, quick_workspace, record_friction
+from tests.workday.made import fitted_copy, quick_workspace, record_friction
 
 from .conftest import Cli
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    return fitted_workspace(tmp_path_factory.mktemp("verify") / "paper", "friction")
+    return fitted_copy(tmp_path_factory, tmp_path_factory.mktemp("verify") / "paper", "friction")
 
 
 def test_it_prints_tables_and_verdicts(

@@ -3,6 +3,7 @@
 import fcntl
 import struct
 import termios
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -58,8 +59,10 @@ def opened(end: FarEnd) -> PortLink:
 
 def until_waiting(end: FarEnd, count: int) -> None:
     """Until so many bytes wait to be read by the host."""
-    waiting = 0
+    waiting, end_s = 0, time.monotonic() + GUARD_S
     while waiting < count:
+        assert time.monotonic() < end_s, f"{waiting} of {count} bytes wait"
+        time.sleep(1e-3)
         told = fcntl.ioctl(end._slave, termios.FIONREAD, struct.pack("i", 0))
         (waiting,) = struct.unpack("i", told)
 

@@ -278,7 +278,9 @@ def test_a_missing_heartbeat_means_damping_before_the_stop(device: Device) -> No
         device.exchange(k, 0.7 - 1e-4 * k)
     assert block.mode is Mode.RENDER
     k = 21
+    end_s = time.monotonic() + GUARD_S
     while block.mode is not Mode.DAMP and block.stop_reason is StopReason.NONE:
+        assert time.monotonic() < end_s
         device.exchange(k, 0.7 - 1e-4 * k)
         k += 1
     assert block.mode is Mode.DAMP
@@ -288,6 +290,7 @@ def test_a_missing_heartbeat_means_damping_before_the_stop(device: Device) -> No
         device.exchange(k, 0.7 - 1e-4 * k)
     assert device.commands[-1].torque == pytest.approx(0.01, rel=0.01)
     while block.stop_reason is StopReason.NONE:
+        assert time.monotonic() < end_s
         k += 1
         device.write(device.state(k))
         device.hear()

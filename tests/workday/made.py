@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import pytest
 
 from scissorcal.recording import write_recording
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import Workspace
 from tests.calibration.truth import Stroke, Truth, make_recording, sweep
+from tests.made_once import copied, made_once
 
 Kind = Literal["friction", "cut"]
 
@@ -71,6 +73,16 @@ def fitted_workspace(folder: Path, *kinds: Kind, **how: Any) -> Workspace:
         RECORD[kind](workspace)
     fit_workspace(workspace, kinds, **how)
     return workspace
+
+
+def fitted_copy(factory: pytest.TempPathFactory, target: Path, *kinds: Kind) -> Workspace:
+    """The same, fitted once in a run of the tests, as a copy at ``target``."""
+    made = made_once(
+        factory,
+        f"quick workspace with fits of {' and '.join(kinds)}",
+        lambda folder: fitted_workspace(folder / "paper", *kinds),
+    )
+    return Workspace(copied(made / "paper", target))
 
 
 def record_friction(

@@ -16,12 +16,14 @@ from scissorcal.workday.history import restore, versions
 from scissorcal.workday.runs.fit import fit_step, fit_workspace
 from scissorcal.workday.steps import BY_NAME
 from scissorcal.workday.workspace import Workspace
-from tests.workday.made import fitted_workspace
+from tests.workday.made import fitted_copy
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return fitted_workspace(tmp_path_factory.mktemp("elsewhere") / "paper", "friction").root
+    return fitted_copy(
+        tmp_path_factory, tmp_path_factory.mktemp("elsewhere") / "paper", "friction"
+    ).root
 
 
 @pytest.fixture

@@ -29,13 +29,15 @@ from scissorcal.workday.scene_choice import known_scene_choice
 from scissorcal.workday.states import WAITING
 from scissorcal.workday.steps import BY_NAME, STEPS
 from scissorcal.workday.workspace import Workspace
-from tests.workday.made import fitted_workspace, quick_workspace, record_friction
+from tests.workday.made import fitted_copy, quick_workspace, record_friction
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """Friction and a cut, recorded and fitted at draft effort."""
-    return fitted_workspace(tmp_path_factory.mktemp("engine") / "paper", "friction", "cut")
+    return fitted_copy(
+        tmp_path_factory, tmp_path_factory.mktemp("engine") / "paper", "friction", "cut"
+    )
 
 
 @pytest.fixture

@@ -37,9 +37,7 @@ def least_squares(
                 rows, slopes = evaluate(x)
                 known = all(bool(np.all(np.abs(a) < WORST)) for a in (rows, slopes))
                 if not known:
-                    rows, slopes = (
-                        np.clip(np.nan_to_num(a), -WORST, WORST) for a in (rows, slopes)
-                    )
+                    rows, slopes = _bounded(rows), _bounded(slopes)
             last[:] = [(x.tobytes(), rows, slopes, known)]
         return last[0][1:]
 

@@ -90,11 +90,8 @@ def open_pool(workers: int | None = None, cluster: str | None = None) -> Iterato
         return
     count = workers or len(os.sched_getaffinity(0))
     if count == 1:
-        gc.freeze()  # what is there before the first job is not searched again after each
-        try:
+        with _left_alone():
             yield Pool(_Here(), 1, ahead=1)
-        finally:
-            gc.unfreeze()
         return
     context = multiprocessing.get_context("spawn")
     with (
@@ -106,6 +103,19 @@ def open_pool(workers: int | None = None, cluster: str | None = None) -> Iterato
         except BaseException:
             executor.shutdown(wait=True, cancel_futures=True)
             raise
+
+
+@contextmanager
+def _left_alone() -> Iterator[None]:
+    """What is there before the first job is not searched again by the collection after each."""
+    is_first = not gc.get_freeze_count()  # what somebody else froze stays frozen
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        if is_first:
+            gc.unfreeze()
 
 
 class _End:

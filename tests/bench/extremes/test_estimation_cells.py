@@ -7,7 +7,7 @@ from scissorcal.bench.extremes.cells import try_cell
 from scissorcal.bench.extremes.inference_cells import cells as inference
 
 FITTED = [cell for module in (cut_cells, vision_cells) for cell in module.cells() if cell.slow]
-"""The longest cells; all others are tried where docs/extremes.md is held to them (test_page)."""
+"""The longest cells of these two rooms; test_page tries all cells that are not slow."""
 
 
 @pytest.mark.slow

@@ -33,7 +33,7 @@ def _rectangles(sheet: Sheet) -> list[str]:
     """One path for each shade: neighbours in one path have no seam between them."""
     drawn = []
     for level in sorted({shape.level for shape in sheet.rectangles}):
-        drawn.append(f"{level:g} g")
+        drawn.append(f"{level:.4f} g")
         drawn += [_rectangle(sheet, one) for one in sheet.rectangles if one.level == level]
         drawn.append("f")
     return drawn
