@@ -78,13 +78,13 @@ def test_fresh_recordings_of_the_same_system_lie_within() -> None:
 
 @pytest.mark.slow
 def test_a_new_recording_of_a_rig_whose_friction_scatters_lies_within() -> None:
-    """Coulomb friction scatters by 10 %; three recordings predict a fourth, 20 times.
+    """Coulomb friction scatters by 10 %; three recordings predict a fourth, 8 times.
 
-    Shares scatter by 0.17 each, so their mean stays above 0.9 - 4 * 0.04.
+    Shares scatter by 0.17 each, so their mean stays above 0.9 - 4 * 0.17 / sqrt(8) = 0.66.
     """
     rng = np.random.default_rng(8)
     shares = []
-    for _ in range(20):
+    for _ in range(8):
         truths = [
             dataclasses.replace(
                 Truth(),
@@ -97,7 +97,7 @@ def test_a_new_recording_of_a_rig_whose_friction_scatters_lies_within() -> None:
         band, found = predicted(tuple(train), (test,))
         assert band.unit == "recording"
         shares.append(found.share_inside)
-    assert np.mean(shares) > 0.74
+    assert np.mean(shares) > 0.66
 
 
 @each_split
