@@ -79,8 +79,9 @@ def test_a_failure_is_stated_with_the_command_that_shows_it_again(tmp_path: Path
     assert failure.test == "test_numbers.py::test_no_number_is_large"
     assert "number=1000," in falsifying_example(failure.said)
     assert [one.test for one in tried] == [failure.test]
+    _, *words = shlex.split(command_for(failure))  # a path from the checkout's own folder
     again = subprocess.run(
-        shlex.split(command_for(failure)),
+        [sys.executable, *words],
         cwd=tmp_path,
         env=environment(),
         capture_output=True,
