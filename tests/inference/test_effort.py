@@ -67,7 +67,9 @@ def two_hills(u: Array) -> float:
     )
 
 
-@pytest.mark.parametrize("effort", ["draft", "standard", "thorough"])
+@pytest.mark.parametrize(
+    "effort", ["draft", "standard", pytest.param("thorough", marks=pytest.mark.slow)]
+)
 def test_a_correlated_normal(effort: str) -> None:
     """4000 draws: an sd is known to 1.1 %, a correlation of 0.95 to 0.002."""
     found = infer(
@@ -260,6 +262,10 @@ def test_a_killed_run_goes_on_as_if_it_had_not_been(tmp_path: Path) -> None:
         return infer(target, "thorough", rng, checkpoint=checkpoint, budget=35_000)
 
     whole = run(None)
+    independent = whole.evaluations / (2.0 * whole.tau.max())
+    close = 4.0 / np.sqrt(2.0 * independent)  # an sd of n draws is known to 1 / sqrt(2 n)
+    assert close < 0.2
+    assert whole.draws.std(axis=0) == pytest.approx([1, 1, 2], rel=close)
     calls = 0
 
     def dying(u: Array) -> Array:

@@ -322,8 +322,10 @@ def test_a_capture_that_the_rig_cannot_follow_is_not_done(
 def captured(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """A whole capture of friction on the virtual rig, in virtual time."""
     workspace = quick_workspace(tmp_path_factory.mktemp("captured") / "paper")
-    recipe = workspace.recipe()
     text = workspace.recipe_path.read_text(encoding="utf-8")
+    text = text.replace("[0.1, 0.3, 0.8]", "[0.3, 0.6, 0.8]\nexcitation_s = 5.0")
+    workspace.recipe_path.write_text(text, encoding="utf-8")
+    recipe = workspace.recipe()
     link = LockstepLink("office-paper", np.random.default_rng(1))
     path = workspace.new_recording("friction")
     with open_writer(path, "friction", link, recipe, text) as writer:
@@ -372,7 +374,7 @@ def test_a_speed_that_the_fit_hardly_uses_is_named_in_plan_and_report(tmp_path: 
     [
         (
             0.5,
-            ("strokes at 0.1, 0.3, 0.8 rad/s: 1 of 2 recorded each", "excitation: 0.0 s of 10 s"),
+            ("strokes at 0.3, 0.6, 0.8 rad/s: 1 of 2 recorded each", "excitation: 0.0 s of 5 s"),
         ),
         (0.95, ("excitation:",)),
     ],

@@ -11,11 +11,14 @@ and Wittenmark, Computer-Controlled Systems, 1997, sections 2.3 and 3.2).
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Responses = tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.complex128]]
+"""Of the place, its rate and its integral, to a unit of gain each."""
 
 PHASE_MARGIN_deg = 45.0
 GAIN_MARGIN = 2.0
@@ -121,13 +124,7 @@ def loop_poles(axis: Axis, gains: Gains) -> NDArray[np.complex128]:
 
 def open_loop(axis: Axis, gains: Gains, omega: Array | float) -> NDArray[np.complex128]:
     """Response (n,) of the open loop at angular frequencies (n,), from error to place."""
-    z = np.exp(1j * omega * axis.tick_s)
-    turn, keep, fresh, stale, ticks = _sampled(axis)
-    forced = np.multiply.outer(fresh, z**-ticks) + np.multiply.outer(stale, z ** -(ticks + 1))
-    place = (forced[0] + turn * forced[1] / (z - keep)) / (z - 1.0)
-    weight = rate_weight(axis.rate_cutoff_Hz, axis.tick_s)
-    rate = weight * (1.0 - 1.0 / z) / axis.tick_s / (1.0 - (1.0 - weight) / z)
-    return np.asarray(place * (gains.kp + gains.kd * rate + gains.ki * axis.tick_s * z / (z - 1.0)))
+    return _combined(_responses(axis, omega), gains)
 
 
 def sag(axis: Axis, gains: Gains) -> float:
@@ -150,9 +147,8 @@ def spread_of_error(axis: Axis, gains: Gains) -> float:
 
     By Parseval's theorem, from the closed loop's response; it grows with sag and with duration.
     """
-    omega = _frequencies(axis)
-    push = open_loop(axis, Gains(1.0, 0.0, 0.0), omega)
-    moved = np.abs(push / (1.0 + open_loop(axis, gains, omega))) / omega
+    omega, responses = _on_grid(axis)
+    moved = np.abs(responses[0] / (1.0 + _combined(responses, gains))) / omega
     return float(np.sqrt(np.trapezoid(moved**2, omega) / math.pi))
 
 
@@ -207,8 +203,8 @@ def _loop(axis: Axis, gains: Gains) -> tuple[Array, Array]:
 
 def _margins(axis: Axis, gains: Gains) -> Margins:
     """Margins at the stated inertia, of a loop that settles."""
-    omega = _frequencies(axis)
-    loop = open_loop(axis, gains, omega)
+    omega, responses = _on_grid(axis)
+    loop = _combined(responses, gains)
     size, phase = np.abs(loop), np.unwrap(np.angle(loop))
     phase -= 2.0 * math.pi * np.ceil(phase[0] / (2.0 * math.pi))
     crossed = np.flatnonzero((size[:-1] >= 1.0) != (size[1:] >= 1.0))
@@ -231,8 +227,27 @@ def _settles(axis: Axis, gains: Gains) -> bool:
     return bool(np.abs(loop_poles(axis, gains)).max() < 1.0)
 
 
-def _frequencies(axis: Axis) -> Array:
-    return np.asarray(np.geomspace(LOWEST, 0.9999, GRID) * math.pi / axis.tick_s)
+@lru_cache(maxsize=64)  # a design looks at hundreds of gains of one axis
+def _on_grid(axis: Axis) -> tuple[Array, Responses]:
+    """Angular frequencies (n,), and the responses there."""
+    omega = np.asarray(np.geomspace(LOWEST, 0.9999, GRID) * math.pi / axis.tick_s)
+    return omega, _responses(axis, omega)
+
+
+def _responses(axis: Axis, omega: Array | float) -> Responses:
+    """What a unit of each gain makes of the open loop."""
+    z = np.exp(1j * omega * axis.tick_s)
+    turn, keep, fresh, stale, ticks = _sampled(axis)
+    forced = np.multiply.outer(fresh, z**-ticks) + np.multiply.outer(stale, z ** -(ticks + 1))
+    place = (forced[0] + turn * forced[1] / (z - keep)) / (z - 1.0)
+    weight = rate_weight(axis.rate_cutoff_Hz, axis.tick_s)
+    rate = weight * (1.0 - 1.0 / z) / axis.tick_s / (1.0 - (1.0 - weight) / z)
+    return place, place * rate, place * axis.tick_s * z / (z - 1.0)
+
+
+def _combined(responses: Responses, gains: Gains) -> NDArray[np.complex128]:
+    place, rate, integral = responses
+    return np.asarray(gains.kp * place + gains.kd * rate + gains.ki * integral)
 
 
 def _sampled(axis: Axis) -> tuple[float, float, Array, Array, int]:
