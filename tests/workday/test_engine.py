@@ -318,13 +318,20 @@ def test_a_capture_that_the_rig_cannot_follow_is_not_done(
     assert "lacks a plan that this rig can follow" in found.found
 
 
-@pytest.fixture(scope="module")
-def captured(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """A whole capture of friction on the virtual rig, in virtual time."""
-    workspace = quick_workspace(tmp_path_factory.mktemp("captured") / "paper")
+def brisk_workspace(folder: Path) -> Workspace:
+    """A quick workspace whose capture of friction takes half a minute."""
+    workspace = quick_workspace(folder)
     text = workspace.recipe_path.read_text(encoding="utf-8")
     text = text.replace("[0.1, 0.3, 0.8]", "[0.3, 0.6, 0.8]\nexcitation_s = 5.0")
     workspace.recipe_path.write_text(text, encoding="utf-8")
+    return workspace
+
+
+@pytest.fixture(scope="module")
+def captured(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    """A whole capture of friction on the virtual rig, in virtual time."""
+    workspace = brisk_workspace(tmp_path_factory.mktemp("captured") / "paper")
+    text = workspace.recipe_path.read_text(encoding="utf-8")
     recipe = workspace.recipe()
     link = LockstepLink("office-paper", np.random.default_rng(1))
     path = workspace.new_recording("friction")
@@ -384,7 +391,7 @@ def test_half_a_capture_is_incomplete_and_says_what_is_missing(
 ) -> None:
     (path,) = captured.recordings("friction")
     whole = read_recording(path)
-    workspace = quick_workspace(tmp_path / "half")
+    workspace = brisk_workspace(tmp_path / "half")
     count = int(kept * len(whole.samples))
     write_recording(
         replace(whole, samples=whole.samples[:count]), workspace.new_recording("friction")
@@ -402,7 +409,7 @@ def test_two_halves_make_a_whole_capture(captured: Workspace, tmp_path: Path) ->
     whole = read_recording(path)
     label = whole.samples["stroke"]
     cut = int(np.flatnonzero(label == label.max() // 2)[-1]) + 50
-    workspace = quick_workspace(tmp_path / "halves")
+    workspace = brisk_workspace(tmp_path / "halves")
     for samples in (whole.samples[:cut], whole.samples[cut:]):
         write_recording(replace(whole, samples=samples), workspace.new_recording("friction"))
     assert state(workspace, "capture friction") == "done"
