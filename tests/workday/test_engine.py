@@ -383,7 +383,7 @@ def test_a_speed_that_the_fit_hardly_uses_is_named_in_plan_and_report(tmp_path: 
             0.5,
             ("strokes at 0.3, 0.6, 0.8 rad/s: 1 of 2 recorded each", "excitation: 0.0 s of 5 s"),
         ),
-        (0.95, ("excitation:",)),
+        (0.9, ("excitation:",)),
     ],
 )
 def test_half_a_capture_is_incomplete_and_says_what_is_missing(
