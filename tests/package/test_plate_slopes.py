@@ -39,7 +39,7 @@ def compare(seed: int) -> Steepest:
 
 
 @pytest.mark.slow
-@settings(max_examples=150)
+@settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_no_slope_of_many_random_plates_is_above_its_bound(seed: int) -> None:
     compare(seed)

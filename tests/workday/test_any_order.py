@@ -96,7 +96,7 @@ class AnyOrder(RuleBasedStateMachine):
 assert SIGN in WHOLE_DAY
 TestAnyOrder = pytest.mark.slow(AnyOrder.TestCase)
 TestAnyOrder.settings = settings(
-    max_examples=5,
+    max_examples=3,
     stateful_step_count=6,
     suppress_health_check=list(HealthCheck),
 )

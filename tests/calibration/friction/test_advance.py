@@ -163,17 +163,17 @@ def test_a_sledge_of_another_rig_is_found(make, presliding_m, law):
 @pytest.mark.slow
 @pytest.mark.parametrize("rig", ["first", "second"])
 def test_intervals_hold_mass_and_friction_of_drawn_sledges(rig):
-    """Six sledges of a rig: of 18 intervals of 90 % at least 13 hold (fewer by chance in 0.6 % of
+    """Four sledges of a rig: of 12 intervals of 90 % at least 8 hold (fewer by chance in 0.4 % of
     such tests, were they exact), and no estimate is off by more than 1 %."""
     held, errors = [], []
-    for seed in range(700, 706):
+    for seed in range(700, 704):
         made = RIGS[rig](seed)
         found = fitted(made.recording, made.recipe.fit.advance)
         for name, truth in made.truth.items():
             row = found.parameter(name)
             held.append(row.q05 < truth < row.q95)
             errors.append(abs(row.mean / truth - 1.0))
-    assert sum(held) >= 13
+    assert sum(held) >= 8
     assert max(errors) < 0.01
 
 

@@ -62,26 +62,25 @@ class StrokeMoments:
                 return np.asarray(self._products[b, a].transpose(0, 2, 1))
             left, right = self._columns(a), self._columns(b)
             self._products[a, b] = np.stack(
-                [left[low:high].T @ right[low:high] for low, high in self._bounds]
+                [left[:, low:high] @ right[:, low:high].T for low, high in self._bounds]
             )
         return self._products[a, b]
 
     def squares(self, cell: Cell, factors: Array) -> Array:
         """Squares that factors (k, q) of a cell's columns leave in each stroke, (k, strokes)."""
-        left = np.zeros((len(self.measured), len(factors)))
-        used = 0
-        for block in _blocks(cell):
-            columns = self._columns(block)
-            left += columns @ factors[:, used : used + columns.shape[1]].T
-            used += columns.shape[1]
-        return np.add.reduceat(left**2, [low for low, _ in self._bounds], axis=0).T
+        rows = [self._columns(block) for block in _blocks(cell)]
+        found = np.empty((len(factors), len(self._bounds)))
+        for place, (low, high) in enumerate(self._bounds):  # a stroke at a time stays in the cache
+            left = factors @ np.concatenate([row[:, low:high] for row in rows])
+            found[:, place] = np.einsum("kn,kn->k", left, left)
+        return found
 
     def assembled(
         self, cell: Cell, products: Callable[[Block, Block], Array], shape: tuple[int, ...]
     ) -> Array:
         """Put a cell's ``products`` of two blocks, (*shape, columns, columns), together."""
         blocks = _blocks(cell)
-        ends = np.cumsum([0, *(self._columns(block).shape[1] for block in blocks)]).tolist()
+        ends = np.cumsum([0, *(len(self._columns(block)) for block in blocks)]).tolist()
         result = np.empty((*shape, ends[-1], ends[-1]))
         for i, left in enumerate(blocks):
             rows = slice(ends[i], ends[i + 1])
@@ -93,7 +92,7 @@ class StrokeMoments:
         return result
 
     def _columns(self, block: Block) -> Array:
-        """Columns of a block, stroke after stroke."""
+        """Columns of a block (columns, n), stroke after stroke."""
         if block not in self._sorted:
             kind, index, other = block
             if kind == "measured":
@@ -106,7 +105,9 @@ class StrokeMoments:
                 scaled = self.basis.stribeck if kind == "stribeck" else self.basis.lag
                 columns = scaled.node(index)
             in_order = bool(np.all(np.diff(self._order) == 1))
-            self._sorted[block] = columns if in_order else columns[self._order]
+            self._sorted[block] = np.ascontiguousarray(
+                columns.T if in_order else columns[self._order].T
+            )
         return self._sorted[block]
 
 
