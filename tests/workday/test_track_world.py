@@ -7,7 +7,7 @@ from scipy.stats import chi2
 from scissorcal.workday.tracking.sim_world import SimCamera
 from tests.workday.track_world import a_recipe, score, tracked
 
-SEEDS = 8
+SEEDS = 6
 MOVES = ("speed_mm_per_s = 5", "turn_deg_per_s = 1")
 
 
@@ -30,7 +30,7 @@ def test_contact_tells_the_height_that_pictures_leave_open() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("moves", [False, True])
 def test_tracks_are_consistent_with_and_without_contact(moves: bool) -> None:
-    """Mean NEES of 8 worlds below the 99.9 % quantile of its chi-square; the height better told.
+    """Mean NEES of 6 worlds below the 99.9 % quantile of its chi-square; the height better told.
 
     Each world has a camera and a rig frame of its own, off as their covariances say.
     """
