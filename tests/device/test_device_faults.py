@@ -120,7 +120,10 @@ def test_a_capture_of_a_cut_stops_by_name(name: str, tmp_path: Path) -> None:
     "name",
     [
         *ONE_OF_A_KIND,
-        *(pytest.param(n, marks=pytest.mark.slow) for n in sorted(UNNOTICED.difference(ONE_OF_A_KIND))),
+        *(
+            pytest.param(n, marks=pytest.mark.slow)
+            for n in sorted(UNNOTICED.difference(ONE_OF_A_KIND))
+        ),
     ],
 )
 def test_what_does_not_disturb_a_capture_raises_no_alarm(name: str, tmp_path: Path) -> None:
@@ -149,9 +152,7 @@ def test_a_piece_that_is_missing_is_told_by_its_number(tmp_path: Path) -> None:
     assert any("put in a fresh one" in note for note in said.recording.notes)
 
 
-@pytest.mark.parametrize(
-    "zero_N", [-2.0, pytest.param(0.5, marks=pytest.mark.slow), 3.0]
-)
+@pytest.mark.parametrize("zero_N", [-2.0, pytest.param(0.5, marks=pytest.mark.slow), 3.0])
 @pytest.mark.parametrize("missing", [False, True])
 def test_a_zero_of_the_force_sensor_hides_no_missing_piece(
     zero_N: float, missing: bool, tmp_path: Path
