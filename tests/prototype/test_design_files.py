@@ -48,7 +48,7 @@ def test_a_recipe_without_a_plate_is_the_uniform_sheet(bed: Bed, tmp_path: Path)
     assert bed.told[-1] == {"pieces": None, "applied": None}
     assert not box.is_checked()
     assert "mine.toml draws no plate: it is about the uniform sheet" in bed.said
-    assert bed.page.locator(".design .warning").count() == 0
+    expect(bed.page.locator(".design .warning")).to_have_count(0)
     box.check()
     assert spans(bed) == [(0, 120)]
     assert saved(bed, tmp_path).startswith("# as the lab wrote it")
@@ -157,7 +157,7 @@ holes_mm = [{f"[[{20 * i + 5}, -5], [{20 * i + 9}, -5], [{20 * i + 9}, 5]], " * 
         bed.page.locator(f"[data-key='{key.strip()}']").press("Enter")
         assert focus(bed) == wanted, key
     bed.page.keyboard.press("Control+z")
-    assert bed.page.locator(".design-layers li").count() == 1
+    expect(bed.page.locator(".design-layers li")).to_have_count(1)
 
 
 def test_the_focus_leaves_a_button_that_can_do_no_more(bed: Bed) -> None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import Scene
@@ -57,7 +57,7 @@ def test_one_force_has_one_name_and_a_rig_is_named_where_it_can_be_followed(
 ) -> None:
     names = ["time", "torque", "force along the cut"]
     assert opened.run(LEGEND) == names
-    assert opened.page.locator('[data-number="force along the cut"]').count() == 1
+    expect(opened.page.locator('[data-number="force along the cut"]')).to_have_count(1)
     served = tmp_path / "served.html"
     text = page_of(scene).replace('id="server">null', 'id="server">{"socket": "/rig"}')
     served.write_text(text, encoding="utf-8")
