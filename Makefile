@@ -21,6 +21,8 @@ PYTEST_ARGS ?=
 PYTEST := $(RUN)/pytest -n auto --dist loadfile
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
+# Test modules are compiled once, not in each worker of each run; the tree ignores what that writes.
+export PYTHONDONTWRITEBYTECODE =
 
 .PHONY: demo test test-slow test-realtime test-explore lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
 

@@ -8,7 +8,6 @@ import pytest
 from playwright.sync_api import Browser
 
 from tests.prototype.test_page_hand import (
-    WIDE,
     Open,
     close,
     file,
@@ -19,13 +18,17 @@ from tests.prototype.test_page_hand import (
 
 __all__ = ["file", "package", "scene"]
 
+SMALL = {"width": 360, "height": 640}
+"""Pictures in three dimensions are slow without a graphics card."""
 CAMERA = "() => scissorcal.view3d.orbit.camera.position.toArray()"
+HALF_A_TURN = """(canvas) => { for (let k = 0; k < 32; k += 1) canvas.dispatchEvent(
+  new KeyboardEvent("keydown", { key: "ArrowRight", bubbles: true, cancelable: true })); }"""
 WANTED = "() => scissorcal.rig.wanted"
 
 
 @pytest.fixture
 def solid(browser: Browser, file: Path) -> Iterator[Open]:
-    found = open_page(browser, file, viewport=WIDE, has_touch=True)
+    found = open_page(browser, file, viewport=SMALL, has_touch=True)
     found.page.get_by_label("3-D").check()
     found.page.locator(".solid canvas").wait_for(state="visible")
     yield found
@@ -48,7 +51,7 @@ def drag(solid: Open, dx: float, dy: float) -> None:
     x, y = middle(solid)
     solid.page.mouse.move(x, y)
     solid.page.mouse.down()
-    solid.page.mouse.move(x + dx, y + dy, steps=5)
+    solid.page.mouse.move(x + dx, y + dy, steps=2)
     solid.page.mouse.up()
 
 
@@ -88,8 +91,7 @@ def test_strokes_and_fresh_sheets_by_key_need_no_box(solid: Open) -> None:
 
 
 def test_right_is_right_from_behind_too(solid: Open) -> None:
-    for _ in range(32):  # half a turn
-        solid.page.locator(".solid canvas").press("ArrowRight")
+    solid.page.locator(".solid canvas").evaluate(HALF_A_TURN)
     tick(solid)
     advance = solid.run(WANTED)["advance"]
     drag(solid, 30, 0)
