@@ -24,6 +24,7 @@ from scissorcal.vision.sim.sim_camera import (
     render_plate_photographs,
 )
 from scissorcal.workday.tracking import sim_world
+from tests.made_once import copied
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,32 @@ def workspace(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
     """Make a workspace for paper and stand in it."""
     folder = tmp_path / "paper"
     assert cli("init", folder, "--recipe", "paper-80gsm").code == 0
+    monkeypatch.chdir(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def calibrated_once(album: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace for paper with a camera, which has no covariance, and the rig's frame."""
+    folder = tmp_path_factory.mktemp("calibrated") / "paper"
+    cards = sorted(album.glob("rig-*.jpg"))
+    with pytest.MonkeyPatch.context() as patch:
+        for words in (
+            ("init", folder, "--recipe", "paper-80gsm"),
+            ("import", album / "camera.yml"),
+            ("capture", "plate", "-i", *cards, "--stances", album / "stances.csv"),
+        ):
+            with pytest.raises(SystemExit) as ended:
+                run([str(word) for word in words])
+            assert ended.value.code == 0
+            patch.chdir(folder)
+    return folder
+
+
+@pytest.fixture
+def calibrated(calibrated_once: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the calibrated workspace; stand in it."""
+    folder = copied(calibrated_once, tmp_path / "paper")
     monkeypatch.chdir(folder)
     return folder
 

@@ -20,16 +20,6 @@ from tests.render.conftest import on_estimated_plate, package_for
 SIM = ("--device", "sim", "--camera", "sim")
 
 
-@pytest.fixture
-def calibrated(cli: Cli, workspace: Path, album: Path) -> Path:
-    """A workspace with a camera and the rig's frame."""
-    cli("import", album / "camera.yml")
-    cards = sorted(album.glob("rig-*.jpg"))
-    said = cli("capture", "plate", "-i", *cards, "--stances", album / "stances.csv")
-    assert said.code == 0
-    return workspace
-
-
 @pytest.fixture(scope="module")
 def packages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Packages whose plate's pose is known, or estimated between two moving blades."""

@@ -55,16 +55,6 @@ def video(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture
-def calibrated(cli: Cli, workspace: Path, album: Path) -> Path:
-    """A workspace with a camera, which has no covariance, and the rig's frame."""
-    cli("import", album / "camera.yml")
-    cards = sorted(album.glob("rig-*.jpg"))
-    said = cli("capture", "plate", "-i", *cards, "--stances", album / "stances.csv")
-    assert said.code == 0
-    return workspace
-
-
 def tracks(workspace: Path) -> list[str]:
     return sorted(path.name for path in (workspace / "captures").glob("track*"))
 

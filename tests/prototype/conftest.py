@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from tests.browser import open_browser
+from tests.browser import close_used, open_browser
 from tests.prototype.design_bed import Bed, open_bed
 
 
@@ -30,8 +30,7 @@ def browser(launched: tuple[Browser, asyncio.AbstractEventLoop]) -> Iterator[Bro
     found, loop = launched
     asyncio._set_running_loop(loop)
     yield found
-    for context in found.contexts:
-        context.close()
+    close_used(found)
     asyncio._set_running_loop(None)
 
 

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Page
 
 from scissorcal.kernel.tables import TABLE_NAMES
 from scissorcal.prototype.arrays import Numbers
-from tests.browser import PAGE, Seen, bundled, open_file
+from tests.browser import PAGE, Seen, bundled, open_file, put_back
 
 HARNESS = """
 import { View3d } from "./src/view3d";
@@ -161,7 +161,7 @@ def open_bed(
     write_page(file, moving_blades)
     page, seen = open_file(browser, file, **context)
     yield Bed(page, seen)
-    page.context.close()
+    put_back(page)
     # pictures for the test are read back from the graphics, which the browser remarks on
     errors = [error for error in seen.errors if "GPU stall due to ReadPixels" not in error]
     assert errors == [], errors

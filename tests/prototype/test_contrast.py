@@ -8,6 +8,7 @@ from playwright.sync_api import Browser
 
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import Scene
+from tests.browser import put_back
 from tests.prototype.test_page_hand import WIDE, open_page, package, scene
 
 __all__ = ["package", "scene"]
@@ -93,7 +94,7 @@ def test_every_text_has_the_contrast_that_reading_needs(
     page.locator(".design .warning").wait_for()
     page.locator("section.now .warning").wait_for(state="visible")
     found: list[list[Any]] = opened.run(CONTRASTS)
-    page.context.close()
+    put_back(page)
     texts = {kind for _, kind, _ in found}
     assert {"p.request", "button.stop", "button.primary", "p.note", "p.warning", "dt."} <= texts
     assert len(found) > 100

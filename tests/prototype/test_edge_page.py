@@ -20,7 +20,7 @@ from scissorcal.package.exact import FitDraws, central_model
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import scene_of
-from tests.browser import open_file
+from tests.browser import open_file, put_back
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.prototype.design_bed import EDGE, Bed
 
@@ -171,7 +171,7 @@ def shown(browser: Browser, built: tuple[ModelPackage, Any, Path]) -> Iterator[S
     page.wait_for_selector("canvas.plain")
     page.get_by_text("Draw plates and blades").click()
     yield Shown(built[0], page)
-    page.context.close()
+    put_back(page)
     assert seen.errors == []
 
 

@@ -15,7 +15,7 @@ from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.variations import central_values, variations
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import scene_of
-from tests.browser import Seen, open_file, wait_until
+from tests.browser import Seen, open_file, put_back, wait_until
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.prototype.test_scene import unpacked as read
 
@@ -80,7 +80,7 @@ def opened(browser: Browser, built: Any, **context: Any) -> Iterator[Shown]:
     page.wait_for_selector("canvas.plain")
     shown.until("a && a.frames.count > 2")
     yield shown
-    page.context.close()
+    put_back(page)
     assert seen.errors == []
 
 

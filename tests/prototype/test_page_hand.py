@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page
 from scissorcal.package import ModelPackage, build_package, open_package
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import Scene, scene_of
-from tests.browser import Seen, open_file, wait_until
+from tests.browser import Seen, open_file, put_back, wait_until
 from tests.package.fits import cut_fit, friction_fit, recipe
 
 WIDE = {"width": 1400, "height": 1000}
@@ -83,7 +83,7 @@ def open_page(browser: Browser, file: Path, **context: object) -> Open:
 
 
 def close(opened: Open) -> None:
-    opened.page.context.close()
+    put_back(opened.page)
     assert opened.seen.errors == []
     assert opened.seen.elsewhere == []
 

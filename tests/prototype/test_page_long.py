@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import pytest
+
 from tests.prototype.test_page_hand import Open, file, opened, package, scene
 
 __all__ = ["file", "opened", "package", "scene"]
@@ -47,6 +49,7 @@ def test_a_hidden_page_keeps_the_books_of_the_rig_that_it_follows(opened: Open) 
     assert not opened.run("() => scissorcal.rig.isFollowing")
 
 
+@pytest.mark.slow
 def test_ten_minutes_of_strokes_take_no_memory(opened: Open) -> None:
     chrome = opened.page.context.new_cdp_session(opened.page)
 

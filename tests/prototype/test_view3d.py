@@ -162,8 +162,8 @@ def test_it_takes_the_colours_of_the_theme(bed: Bed) -> None:
 
 
 def test_it_is_disposed_of_and_made_again(bed: Bed) -> None:
-    """Browsers keep some sixteen contexts alive: more views than that, one after the other."""
-    for _ in range(20):
+    """Browsers keep sixteen contexts alive: more views than that, one after the other."""
+    for _ in range(17):
         bed.run(
             "() => { const other = document.createElement('div'); other.style.height = '80px';"
             " document.body.append(other); const made = new View3d(other); made.draw(view);"
