@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -103,6 +104,7 @@ class Seen:
         return [url for url in self.requests if not url.startswith(inside)]
 
 
+@cache
 def bundled(source: str) -> str:
     """Script of a TypeScript text that imports the page's modules ("./src/kernel")."""
     done = node(
