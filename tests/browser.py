@@ -181,7 +181,7 @@ _windows: dict[Browser, list[_Window]] = {}
 def open_file(browser: Browser, path: Path, **context: Any) -> tuple[Page, Seen]:
     """Open a file from disk in a page that no other test uses and that reaches no network.
 
-    A new page takes 0.5 s of processor time, the next file in one a tenth of that: so a page that
+    A file in a new page takes 0.9 s of processor time, the next one there 0.2 s: so a page that
     was put back (:func:`put_back`) is used again where the same ``context`` is asked for.
     """
     opened = _windows.setdefault(browser, [])
