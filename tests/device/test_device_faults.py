@@ -14,7 +14,7 @@ from scissorcal.kernel import StopReason
 from scissorcal.package import ModelPackage
 from scissorcal.render.rig_facts import rig_facts, with_probe
 from tests.render.conftest import paper as paper
-from tests.strange_device import FAULTS, Faults, StrangeDevice, VirtualPort
+from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 from tests.strange_device.mechanics import Hand
 from tests.strange_device.trials import Outcome, capture_trial, render_trial, short_recipe
 
@@ -169,7 +169,8 @@ def test_the_probe_s_zero_of_the_force_sensor_is_taken_off_in_a_rendering(
 ) -> None:
     """A hand that rests on blades that rest, at a sensor that shows 3 N without it."""
     faults, hand = Faults(force_zero_N=3.0), Hand(strokes=0)
-    found = probe(VirtualPort(StrangeDevice(faults)), short_recipe(), confirm=lambda _: None)
+    device = StrangeDevice(faults)
+    found = probe(VirtualPort(device), short_recipe(), confirm=Person(device))
     assert found.rest.handle_zero_N == pytest.approx(3.0, abs=0.05)
     rig = with_probe(rig_facts(paper), found)
     said = render_trial("none", paper, tmp_path, faults, hand=hand, rig=rig)
@@ -191,7 +192,8 @@ def test_an_encoder_that_sticks_in_a_rendering_stops_it(
 ) -> None:
     """Told from what the probe measured; without the fault nothing stops."""
     sound, hand = Faults(encoder_noise_rad=noise_rad), Hand(period_s=period_s, strokes=20)
-    found = probe(VirtualPort(StrangeDevice(sound)), short_recipe(), confirm=lambda _: None)
+    device = StrangeDevice(sound)
+    found = probe(VirtualPort(device), short_recipe(), confirm=Person(device))
     assert found.rest.jitters == (noise_rad > 0.0)
     rig = with_probe(rig_facts(paper), found)
     stuck = replace(sound, encoder_stuck_at_s=2.0)

@@ -11,7 +11,8 @@ real time (`serve_on_pty`).
 
 from .device import StrangeDevice
 from .faults import FAULTS, Faults
+from .person import Person
 from .port import VirtualPort
 from .terminal import serve_on_pty
 
-__all__ = ["FAULTS", "Faults", "StrangeDevice", "VirtualPort", "serve_on_pty"]
+__all__ = ["FAULTS", "Faults", "Person", "StrangeDevice", "VirtualPort", "serve_on_pty"]

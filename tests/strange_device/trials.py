@@ -23,6 +23,7 @@ from scissorcal.verdicts import failed
 from .device import StrangeDevice
 from .faults import FAULTS, Faults
 from .mechanics import Hand
+from .person import Person
 from .port import VirtualPort
 
 SEED = 11
@@ -65,7 +66,7 @@ def probe_trial(name: str) -> Outcome:
     device = StrangeDevice(FAULTS[name], seed=SEED)
 
     def run() -> str:
-        found = probe(VirtualPort(device), builtin_recipe("paper-80gsm"), confirm=lambda _: None)
+        found = probe(VirtualPort(device), builtin_recipe("paper-80gsm"), confirm=Person(device))
         warned = [v.why for v in found.verdicts if v.status != "pass" and v.check not in STATED]
         return "; ".join(["done", *warned])
 

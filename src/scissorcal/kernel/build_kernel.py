@@ -33,6 +33,7 @@ HEADERS = (
     "sc_cut_fit.h",
     "sc_crack.h",
     "sc_presliding.h",
+    "sc_joint.h",
 )
 
 

@@ -74,15 +74,13 @@ class Probe(Section):
     """How far the probe may go before the first motor run, and how long it counts.
 
     The blades are pushed by growing torques up to ``largest_torque_Nm`` until they move, each push
-    no farther than ``largest_angle_deg`` nor faster than ``largest_rate_rad_per_s``. ``creep`` lets
-    it move slowly to both stops, which shows whether the encoder counts the whole range. A probe of
-    the same rig counts for ``max_age_h``.
+    no farther than ``largest_angle_deg`` nor faster than ``largest_rate_rad_per_s``. A probe of the
+    same rig counts for ``max_age_h``.
     """
 
-    largest_torque_Nm: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.05
-    largest_angle_deg: Annotated[float, Field(gt=0, le=30, allow_inf_nan=False)] = 2.0
+    largest_torque_Nm: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.15
+    largest_angle_deg: Annotated[float, Field(gt=0, le=30, allow_inf_nan=False)] = 3.5
     largest_rate_rad_per_s: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 1.5
-    creep: bool = False
     max_age_h: Annotated[float, Field(ge=0, le=168, allow_inf_nan=False)] = 4.0
 
 

@@ -10,7 +10,7 @@ from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, ConfigKey, decode
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.verdicts import Verdict
-from tests.strange_device import Faults, StrangeDevice, VirtualPort, wire
+from tests.strange_device import Faults, Person, StrangeDevice, VirtualPort, wire
 
 RECIPE = builtin_recipe("paper-80gsm")
 LATE_S = (0.0, 0.0005, 0.001, 0.0015)
@@ -23,7 +23,7 @@ def heavy(late_s: float = 0.0, *, clips: bool = True) -> Faults:
 
 
 def clipping_of(link: VirtualPort) -> Verdict:
-    found = probe(link, RECIPE, confirm=lambda request: None)
+    found = probe(link, RECIPE, confirm=Person(link.device))
     return next(verdict for verdict in found.verdicts if verdict.check == "clipping")
 
 

@@ -12,7 +12,7 @@ from scissorcal.device.probe.result import Estimate, ProbeResult, probe_from_dic
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.device.sim.truth import varied
 from scissorcal.recipe.library import builtin_recipe
-from tests.strange_device import FAULTS, Faults, StrangeDevice, VirtualPort
+from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 
 RECIPE = builtin_recipe("paper-80gsm")
 SYMPLECTIC_S = 2.5e-4
@@ -20,7 +20,8 @@ SYMPLECTIC_S = 2.5e-4
 
 
 def found(faults: Faults, seed: int) -> ProbeResult:
-    return probe(VirtualPort(StrangeDevice(faults, seed)), RECIPE, confirm=lambda request: None)
+    device = StrangeDevice(faults, seed)
+    return probe(VirtualPort(device), RECIPE, confirm=Person(device))
 
 
 def holds(estimate: Estimate | None, truth: float, widths: float = 2.0) -> bool:

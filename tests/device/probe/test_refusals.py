@@ -9,7 +9,7 @@ from scissorcal.device.probe.result import ProbeResult
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
-from tests.strange_device import FAULTS, Faults, StrangeDevice, VirtualPort
+from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 
 RECIPE = builtin_recipe("paper-80gsm")
 LARGEST_TORQUE = RECIPE.rig.probe.largest_torque_Nm * (1.0 + 1e-6)  # travels in 32 bits
@@ -64,13 +64,13 @@ WARNED = {
 
 def probed(faults: Faults, recipe: Recipe = RECIPE) -> tuple[ProbeResult, StrangeDevice]:
     device = StrangeDevice(faults, seed=1)
-    return probe(VirtualPort(device), recipe, confirm=lambda request: None), device
+    return probe(VirtualPort(device), recipe, confirm=Person(device)), device
 
 
 def refused(faults: Faults, recipe: Recipe = RECIPE) -> tuple[ProbeRefusedError, StrangeDevice]:
     device = StrangeDevice(faults, seed=1)
     with pytest.raises(ProbeRefusedError) as caught:
-        probe(VirtualPort(device), recipe, confirm=lambda request: None)
+        probe(VirtualPort(device), recipe, confirm=Person(device))
     return caught.value, device
 
 
@@ -123,7 +123,7 @@ def test_what_can_be_subtracted_or_only_worries_is_a_warning(fault: str) -> None
 def test_a_device_that_is_gone_is_a_device_error(fault: str) -> None:
     device = StrangeDevice(FAULTS[fault], seed=1)
     with pytest.raises(DeviceError):
-        probe(VirtualPort(device), RECIPE, confirm=lambda request: None)
+        probe(VirtualPort(device), RECIPE, confirm=Person(device))
 
 
 def test_motor_sign_cures_a_reversed_motor_whose_torque_is_measured_as_it_acts() -> None:

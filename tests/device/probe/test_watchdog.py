@@ -6,7 +6,7 @@ from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.probe.result import ProbeResult
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
-from tests.strange_device import FAULTS, Faults, StrangeDevice, VirtualPort
+from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 
 RECIPE = builtin_recipe("paper-80gsm")
 
@@ -17,7 +17,8 @@ def asking(brake_after_ms: float) -> Recipe:
 
 
 def probed(faults: Faults, recipe: Recipe = RECIPE) -> ProbeResult:
-    return probe(VirtualPort(StrangeDevice(faults, 1)), recipe, confirm=lambda request: None)
+    device = StrangeDevice(faults, 1)
+    return probe(VirtualPort(device), recipe, confirm=Person(device))
 
 
 def status(result: ProbeResult) -> dict[str, str]:

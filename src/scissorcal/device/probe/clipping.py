@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.device.probe.pulses import ATTEMPTS
 from scissorcal.device.probe.result import Estimate
 from scissorcal.device.probe.talk import RELEASE, Answer, Stage, StalledError, Talk
 from scissorcal.errors import DeviceError
@@ -13,6 +12,7 @@ from scissorcal.kernel import ConfigKey, StateFlag
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 CHECK = "clipping"
+ATTEMPTS = 3
 ABOVE = 1.02
 """Above the limit by so much: a device that does not clip gives no more than that either."""
 SHORTEST_BRAKE_MS = 1.0

@@ -15,6 +15,10 @@ Array = NDArray[np.float64]
 
 SETTLE_S = 0.1
 IDLE_S = 1.0
+LONGEST_SETTLING = 5
+"""Seconds for blades that were let go to come to rest."""
+REST_RAD = 2e-3
+"""At rest: a drift of 2 mrad/s is slower than anything that a probe measures."""
 CLEARINGS = 100
 """As in the protocol: a fault that remains after so many commands with CLEAR_FAULT stays."""
 CHUNKS = 16
@@ -64,9 +68,12 @@ class Idle:
 def idle(talk: Talk) -> Idle:
     """Listen for a second with the motors off; clears a fault that is latched from before."""
     faults = talk.play(_cleared(talk))
-    begin, garbled, duplicates = talk.mark(), talk.link.garbled, talk.duplicates
-    talk.play(_quiet(talk, IDLE_S))
-    heard = talk.heard(begin)
+    for _ in range(LONGEST_SETTLING):
+        begin, garbled, duplicates = talk.mark(), talk.link.garbled, talk.duplicates
+        talk.play(_quiet(talk, IDLE_S))
+        heard = talk.heard(begin)
+        if not np.ptp(_slow(heard["opening"])) > REST_RAD:
+            break
     names = ("opening", "advance", "motor_torque", "handle_force")
     not_finite = tuple(name for name in names if not np.isfinite(heard[name]).all())
     opening = heard["opening"][np.isfinite(heard["opening"])]

@@ -5,14 +5,11 @@ interval refuses nothing. Every limit has its reason beside it.
 """
 
 import math
-from dataclasses import dataclass
-
-import numpy as np
 
 from scissorcal.device.motion import STOP_MARGIN_RAD
-from scissorcal.device.probe.idle import Idle
-from scissorcal.device.probe.mechanics import Follow
-from scissorcal.device.probe.pulses import Axis, Stairs
+from scissorcal.device.probe.idle import REST_RAD, Idle
+from scissorcal.device.probe.lag import Lag
+from scissorcal.device.probe.measured_torque import Follow
 from scissorcal.device.probe.watchdog import Watchdog
 from scissorcal.kernel import Capability, Identity
 from scissorcal.verdicts import Verdict, judge, not_evaluated
@@ -34,48 +31,19 @@ FORCE_NOISE_N = 0.5
 TORQUE_ZERO_SHARE = 0.01
 """Of the motor's limit: what current sensors are specified for."""
 TORQUE_NOISE_SHARE = 0.05
-JITTER_STEPS = 5.0
-"""An encoder without noise stays within a step; five of them make a pulse look like a motion."""
+JITTER_RAD = 2e-3
+"""A rate over 10 ms then has a noise of 0.3 rad/s, a fifth of what a probe may reach: beyond it no
+push within rig.probe is told from noise."""
+JITTER_STEPS = 1.0
+"""An encoder without noise stays within a step."""
 STEP_RATIO = 1.5
 """Halfway, in ratio, to the next count of an encoder that is counted by half or double."""
-REST_RAD = 0.002
 DEFAULT_BRAKE_MS = 10.0
 """BRAKE_AFTER_MS of a device that was never told another (docs/protocol.md)."""
-LAG_LIMIT_MS = 10.0
-"""BRAKE_AFTER_MS by default: later commands brake the device each time."""
 GAIN_SD = 0.1
 GAIN_WARNING, GAIN_LIMIT = 0.05, 0.2
 """Torque in a fit errs as the gain does: 5 % is most of a recipe's tolerance of 7 %, 20 % is no
 calibration of any current sensor but a wrong scale."""
-
-
-@dataclass(frozen=True)
-class Sign:
-    """Which way an axis went when it was pushed, and the words for it."""
-
-    name: str
-    plus: str
-    minus: str
-    remedy: str
-    more: str
-
-
-OPENING = Sign(
-    "blades",
-    "opens",
-    "closes",
-    "the motor or the encoder is reversed. Set rig.motor_sign = {sign} in the recipe or swap the "
-    "motor's wires (or the encoder's channels, if the opening shrinks while the blades open)",
-    "Clear the blades, check the encoder's cable, or raise rig.probe.largest_torque_Nm.",
-)
-SLEDGE = Sign(
-    "sledge",
-    "advances",
-    "retracts",
-    "its motor or its encoder is reversed. Swap the motor's wires, or the encoder's channels if "
-    "the advance shrinks while the sledge moves along the cut",
-    "Clear its way, check its encoder's cable and its motor.",
-)
 
 
 def judge_idle(found: Idle, identity: Identity, radius_mm: float) -> list[Verdict]:
@@ -87,68 +55,15 @@ def judge_idle(found: Idle, identity: Identity, radius_mm: float) -> list[Verdic
     return [verdict for verdict in verdicts if verdict is not None]
 
 
-def judge_watchdog(found: Watchdog, tick_ms: float) -> list[Verdict]:
-    """Verdicts on ENABLE and on silence."""
-    if found.never_enabled:
-        why = (
-            "MOTOR_ENABLED did not show within 0.1 s of ENABLE: the device does not take commands. "
-            "Check its receive line, its emergency stop and its firmware."
-        )
-        return [Verdict(MOTORS, "enable", "fail", None, None, why)]
-    lag = float(np.median(found.lags)) * tick_ms
-    verdicts = [
-        judge(
-            MOTORS,
-            "lag",
-            lag,
-            LAG_LIMIT_MS,
-            f"Commands take effect after {lag:.3g} ms (median).",
-            f"Commands take effect only after {lag:.3g} ms (median): the device would brake by its "
-            "watchdog. Shorten the way (no hub or network adapter; 'scissorcal device doctor' "
-            "measures the port).",
-        )
-    ]
+def judge_watchdog(found: Watchdog, lag: Lag, tick_ms: float) -> list[Verdict]:
+    """Verdicts on silence."""
+    verdicts = []
     if found.refused:
         why = (
             f"{found.refused} What it does without commands was judged by this value all the same."
         )
         verdicts.append(not_evaluated(MOTORS, "watchdog value", why))
-    return verdicts + _brakes(found, tick_ms)
-
-
-def judge_signs(
-    found: Stairs, axis: Axis, sign: Sign, motor_sign: int, unit: str = "mN m"
-) -> list[Verdict]:
-    """Verdicts on which way an axis goes, and from which effort on."""
-    scale = 1e3 if unit == "mN m" else 1.0
-    most = f"{scale * axis.effort:.3g} {unit}"
-    pushed, pulled = found.pushed, found.pulled
-    if pushed is None or pulled is None:
-        what = (
-            "did not move either way"
-            if pushed is None and pulled is None
-            else f"moved only by {'negative' if pushed is None else 'positive'} efforts"
-        )
-        why = (
-            f"The {sign.name} {what}, up to {most}: an obstacle, a brake, a stuck or unplugged "
-            f"encoder, or more friction than that. {sign.more}"
-        )
-        return [Verdict(MOTORS, f"{sign.name} move", "fail", scale * axis.effort, None, why)]
-    share = 0.5 * (float(pushed.moved > 0.0) + float(pulled.moved < 0.0))
-    effort = "torque" if unit == "mN m" else "force"
-    good = (
-        f"Positive {effort} {sign.plus}, negative {effort} {sign.minus} the {sign.name}, from "
-        f"{scale * pushed.effort:.3g} and {-scale * pulled.effort:.3g} {unit} on."
-    )
-    bad = f"Positive {effort} {sign.minus} the {sign.name}: "
-    bad += sign.remedy.format(sign=-motor_sign) + "."
-    if 0.0 < share < 1.0:
-        bad = (
-            f"Pushes both ways move the {sign.name} the same way: something else does it (a hand, "
-            "a spring, gravity), or the encoder counts one way only. Let go of the handles and "
-            "start again."
-        )
-    return [judge(MOTORS, f"{sign.name} direction", share, 1.0, good, bad)]
+    return verdicts + _brakes(found, max(lag.ticks) * tick_ms, tick_ms)
 
 
 def judge_follow(found: Follow) -> Verdict:
@@ -286,13 +201,20 @@ def _lost(found: Idle) -> Verdict:
 
 
 def _jitter(found: Idle, identity: Identity) -> Verdict:
-    steps = found.jitter_rad / identity.opening_resolution if identity.opening_resolution else 0.0
-    good = f"The opening jitters by {steps:.2g} encoder steps (sd) at rest."
-    bad = (
-        f"The opening jitters by {steps:.3g} encoder steps (sd) with the motors off: shield the "
-        "encoder's cable, and check its supply and that nobody moves the handles."
+    step = identity.opening_resolution
+    steps = found.jitter_rad / step if step else 0.0
+    said = (
+        f"The opening jitters by {1e3 * found.jitter_rad:.2g} mrad (sd, {steps:.2g} encoder steps) "
+        "with the motors off"
     )
-    return judge(SENSORS, "encoder jitter", steps, JITTER_STEPS, good, bad)
+    remedy = "shield the encoder's cable, check its supply, or average its readings in the firmware"
+    if found.jitter_rad > JITTER_RAD:
+        why = f"{said}: {remedy}, and check that nobody moves the handles."
+        return Verdict(SENSORS, "encoder jitter", "fail", found.jitter_rad, JITTER_RAD, why)
+    if steps > JITTER_STEPS:
+        why = f"{said}. Rates are averaged for longer, and slow ones are not used: {remedy}."
+        return not_evaluated(SENSORS, "encoder jitter", why, JITTER_RAD, found.jitter_rad)
+    return Verdict(SENSORS, "encoder jitter", "pass", found.jitter_rad, JITTER_RAD, f"{said}.")
 
 
 def _rest(found: Idle) -> Verdict:
@@ -358,9 +280,8 @@ def _warned(check: str, value: float, limit: float, good: str, warn: str) -> Ver
     return not_evaluated(SENSORS, check, warn, limit, value)
 
 
-def _brakes(found: Watchdog, tick_ms: float) -> list[Verdict]:
+def _brakes(found: Watchdog, late: float, tick_ms: float) -> list[Verdict]:
     asked = max(found.brake_after_ms, DEFAULT_BRAKE_MS if found.refused else 0.0)
-    late = max(found.lags) * tick_ms
     most = 2.0 * asked + late
     if found.braked_ms is None:
         why = (

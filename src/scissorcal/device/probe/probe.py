@@ -8,31 +8,31 @@ from datetime import UTC, datetime
 from scissorcal.device.link import Link, PortLink
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.probe.clipping import clipping
-from scissorcal.device.probe.creep import count_scale_not_checked, creep
+from scissorcal.device.probe.hand_pass import (
+    HandPass,
+    hand_pass,
+    judge_hand_pass,
+    virtual_hand,
+)
 from scissorcal.device.probe.idle import Idle, idle, jitters, observed_step
-from scissorcal.device.probe.judge import (
-    OPENING,
+from scissorcal.device.probe.joint_fit import Prior
+from scissorcal.device.probe.judge import judge_follow, judge_idle, judge_step, judge_watchdog
+from scissorcal.device.probe.judge_push import (
+    BLADES,
     SLEDGE,
-    judge_follow,
-    judge_idle,
-    judge_signs,
-    judge_step,
-    judge_watchdog,
+    Outcome,
+    judge_joint,
+    judge_search,
+    judge_sense,
 )
-from scissorcal.device.probe.mechanics import follow, mechanics, swing_of
-from scissorcal.device.probe.pulses import (
-    Axis,
-    Stairs,
-    axis_of,
-    holds,
-    joined,
-    make_room,
-    stairs,
-    swings,
-)
+from scissorcal.device.probe.lag import judge_lag, lag
+from scissorcal.device.probe.measured_torque import follow
+from scissorcal.device.probe.pushes import axis_of, push
 from scissorcal.device.probe.result import REAL_TIME, Estimate, ProbeResult
+from scissorcal.device.probe.search import search, sense
+from scissorcal.device.probe.swings import Swung, swings
 from scissorcal.device.probe.talk import Bounds, RunawayError, Talk
-from scissorcal.device.probe.watchdog import Watchdog, lag_ticks, watchdog
+from scissorcal.device.probe.watchdog import watchdog
 from scissorcal.device.rig_record import identity_facts
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.identity import digest
@@ -43,14 +43,21 @@ from scissorcal.verdicts import Verdict, failed
 Progress = Callable[[float, str], None]
 
 REQUEST = (
-    "Take everything out from between the blades, let go of the handles and keep clear: the motors "
-    "move the blades by up to {degrees:.2g} degrees each push, both ways"
+    "Take everything out from between the blades, leave them half open, let go of the handles and "
+    "keep clear: the motors move the blades by up to {degrees:.2g} degrees each push, both ways"
 )
 REQUEST_SLEDGE = ", and the sledge by up to {millimetres:.2g} mm each push"
-REQUEST_CREEP = "; then the blades slowly to both stops ({degrees:.2g} degrees)"
-ROOM_PULSES = 40
-SWING_SHARE, SWING_MORE_NM = 1.35, 4e-3
-"""A swing's torque: so many times breakaway and a little more, which accelerates well."""
+PUSH_BRAKE_S, PUSH_BRAKE_TICKS = 3e-3, 1.6
+"""The watchdog while the motors push: a host that is away cannot make a push longer by more. Below
+1.6 ticks a command that arrives late in its tick would brake a sound device."""
+JITTER_SDS = 17.0
+"""Time over which rates are taken, in units of jitter over the bound of the rate: six standard
+deviations of the difference of two readings then are half of the bound."""
+FLAG_TO_DELAY_TICKS, DELAY_SD_TICKS = 0.25, 0.6
+"""A flag shows at the end of the tick in which a torque began; where in the tick it was measured
+and began is the device's affair."""
+GAIN_HOLD_S, HELD_SHARE, HELD_PAIRS = 0.1, 0.6, 1
+"""How long an effort is held for its gain, and its share of the one that moved the blades."""
 SLEDGE_FORCE_SHARE = 0.2
 """Of the recipe's and the device's force limit, for the sledge."""
 SLEDGE_WAY_M, SLEDGE_SPEED_M_PER_S = 2e-3, 0.05
@@ -79,6 +86,12 @@ class _Finding:
         if wrong:
             raise ProbeRefusedError(" ".join(verdict.why for verdict in wrong), self.result)
 
+    def take(self, outcome: Outcome, **found: object) -> None:
+        """As `add`; ProbeRefusedError as well where the outcome leaves it undetermined."""
+        self.add(list(outcome.verdicts), **found)
+        if outcome.undetermined:
+            raise ProbeRefusedError(outcome.undetermined, self.result)
+
 
 def probe(
     link: Link,
@@ -90,35 +103,46 @@ def probe(
 ) -> ProbeResult:
     """Check a rig before its motors run: sensors, clock, line, watchdog, signs, gains, mechanics.
 
-    Nothing moves in the first second and a half; then pulses of torque grow until the blades move
-    by a few encoder steps each way, and small swings follow. Torque, rate and the angle of each
-    push stay within ``rig.probe``. ``confirm`` asks a person to clear the blades; a simulator
-    clears them itself.
+    First a person moves the blades to both stops, motors off, so that scale, sign and zero of the
+    encoder show without torque. Then pushes of torque grow until the blades move each way, pairs of
+    pushes tell which way, and swings are planned until a model of inertia, friction, load and delay
+    is known. Torque, rate and the angle of each push stay within ``rig.probe``. ``confirm`` asks
+    the person; a simulator moves and clears the blades itself. Where nobody follows the requests,
+    pushes stay so small that light blades behind a stuck encoder keep within the bound of the rate.
 
-    Raises ProbeRefusedError (a DeviceError), with the cause and the remedy, at the first stage
-    that finds something wrong, before the next one moves anything; InputError where nobody can be
-    asked; DeviceError where the link fails. The motors are off afterwards in every case.
+    Raises ProbeRefusedError (a DeviceError) at the first stage that finds something wrong or cannot
+    determine it, with the cause or what to do, before the next one moves anything; InputError where
+    nobody can be asked; DeviceError where the link fails. The motors are off afterwards in every
+    case.
     """
     identity = link.identity
     tell = progress or (lambda done, sentence: None)
-    _clear(link, confirm, request_of(recipe, identity))
+    if confirm is None and not is_simulator(identity):
+        raise InputError(
+            "The probe must ask a person to clear the blades first: pass a confirm callback that "
+            "shows a sentence and returns when that is done."
+        )
     made = (now or datetime.now(UTC)).astimezone(UTC).isoformat(timespec="seconds")
     finding = _Finding(
         ProbeResult(rig_name(identity), identity_digest(identity), made, recipe.rig.motor_sign)
     )
     with Talk(link, bounds_of(recipe, identity), recipe.rig.motor_sign) as talk:
         try:
-            _stages(talk, finding, recipe, tell)
+            _stages(talk, finding, recipe, confirm, tell)
         except RunawayError as error:
             raise ProbeRefusedError(str(error), finding.result) from error
     tell(1.0, "done")
     return finding.result
 
 
-def _stages(talk: Talk, finding: _Finding, recipe: Recipe, tell: Progress) -> None:
-    """Everything from listening to the last motion; ends at the first verdict that fails."""
-    identity, limits = talk.identity, recipe.rig.probe
-    tell(0.0, "listening with the motors off")
+def _stages(
+    talk: Talk, finding: _Finding, recipe: Recipe, confirm: Confirm | None, tell: Progress
+) -> None:
+    """Everything from the pass by hand to the last motion; ends at the first that stops it."""
+    identity = talk.identity
+    tell(0.0, "the blades by hand, motors off")
+    hand = _by_hand(talk, finding, recipe, confirm)
+    tell(0.1, "listening with the motors off")
     quiet = idle(talk)
     finding.add(
         judge_idle(quiet, identity, recipe.rig.handle_radius_mm), **_of_idle(quiet, identity)
@@ -126,22 +150,23 @@ def _stages(talk: Talk, finding: _Finding, recipe: Recipe, tell: Progress) -> No
     finding.add(
         [], facts={REAL_TIME: float(isinstance(talk.link, PortLink)), **recipe_facts(recipe)}
     )
-    tell(0.4, "watchdog, at zero torque")
+    jitter_s = JITTER_SDS * quiet.jitter_rad / talk.bounds.rate_rad_per_s
+    talk.rate_over_s = max(talk.rate_over_s, jitter_s)
+    tell(0.2, "lag, lost commands and watchdog, at zero torque")
+    late = lag(talk)
+    lag_facts = {"command_lag_ticks": late.median} if late.ticks else {}
+    finding.add(judge_lag(late, identity.tick_us * 1e-3), facts=lag_facts)
     watched = watchdog(talk, recipe.rig.line.brake_after_ms)
-    finding.add(judge_watchdog(watched, identity.tick_us * 1e-3), **_of_watchdog(watched, talk))
-    tell(0.5, "small pulses of torque")
-    _push(talk, finding, quiet, recipe)
-    if _pushes_sledge(identity):
-        tell(0.85, "small pulses of force on the sledge")
-        _push_sledge(talk, finding, recipe)
-    brake_after_ms = recipe.rig.line.brake_after_ms
-    finding.add([clipping(talk, finding.result.inertia_kg_m2, brake_after_ms)])
-    if limits.creep:
-        tell(0.9, "creeping to the stops")
-        verdicts, facts = creep(talk, finding.result.facts["breakaway_Nm"], tell)
-        finding.add(verdicts, facts=facts)
-    else:
-        finding.add([count_scale_not_checked()])
+    talk.expiry_s = 1e-3 * watched.brake_after_ms
+    finding.add(judge_watchdog(watched, late, identity.tick_us * 1e-3))
+    expiry_ms = 1e3 * max(PUSH_BRAKE_S, PUSH_BRAKE_TICKS * talk.tick_s)
+    with talk.braking_after(min(expiry_ms, recipe.rig.line.brake_after_ms)):
+        tell(0.35, "pushes that grow until the blades move")
+        _push(talk, finding, quiet, recipe, hand=hand, tell=tell)
+        if _pushes_sledge(identity):
+            tell(0.85, "small pushes on the sledge")
+            _push_sledge(talk, finding, recipe)
+    finding.add([clipping(talk, finding.result.inertia_kg_m2, recipe.rig.line.brake_after_ms)])
     finding.add(
         [],
         facts={
@@ -189,9 +214,6 @@ def request_of(recipe: Recipe, identity: Identity) -> str:
     request = REQUEST.format(degrees=recipe.rig.probe.largest_angle_deg)
     if _pushes_sledge(identity):
         request += REQUEST_SLEDGE.format(millimetres=1e3 * SLEDGE_WAY_M)
-    if recipe.rig.probe.creep:
-        apart = math.degrees(identity.opening_max - identity.opening_min)
-        request += REQUEST_CREEP.format(degrees=apart)
     return request + "."
 
 
@@ -199,17 +221,23 @@ def _pushes_sledge(identity: Identity) -> bool:
     return bool(identity.capabilities & Capability.ADVANCE_MOTOR) and identity.force_limit > 0.0
 
 
-def _clear(link: Link, confirm: Confirm | None, request: str) -> None:
-    if is_simulator(link.identity):
-        link.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
-        link.configure(ConfigKey.MATERIAL, 0.0)
-        return
-    if confirm is None:
-        raise InputError(
-            "The probe must ask a person to clear the blades first: pass a confirm callback that "
-            "shows a sentence and returns when that is done."
-        )
-    confirm(request)
+def _by_hand(talk: Talk, finding: _Finding, recipe: Recipe, confirm: Confirm | None) -> bool:
+    """The pass by hand and its verdicts; whether the encoder was seen to move."""
+    identity = talk.identity
+    if is_simulator(identity):
+        talk.link.configure(ConfigKey.MATERIAL, 0.0)
+        return virtual_hand(talk)
+    assert confirm is not None
+    passed = hand_pass(talk, confirm)
+    finding.add(judge_hand_pass(passed, identity), facts=_of_hand(passed, identity))
+    with talk.paused():
+        confirm(request_of(recipe, identity))
+    return passed.alive
+
+
+def _of_hand(passed: HandPass, identity: Identity) -> dict[str, float]:
+    stated = identity.opening_max - identity.opening_min
+    return {"range_ratio": passed.ranges[-1] / stated} if passed.alive else {}
 
 
 def _of_idle(found: Idle, identity: Identity) -> dict[str, object]:
@@ -231,82 +259,75 @@ def _of_idle(found: Idle, identity: Identity) -> dict[str, object]:
     }
 
 
-def _of_watchdog(found: Watchdog, talk: Talk) -> dict[str, object]:
-    """The delay as far as flags show it: somewhere in the tick before the one that shows it.
-
-    Swings replace it by what the blades show.
-    """
-    if not found.lags:
-        return {}
-    lag = lag_ticks(found.lags)
-    delay = Estimate((lag - 0.5) * talk.tick_s, talk.tick_s / math.sqrt(12.0))
-    return {"delay_s": delay, "facts": {"command_lag_ticks": lag}}
-
-
-def _push(talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe) -> None:
-    """Pulses on the blades: signs, breakaway, gain; then swings: inertia, friction, delay."""
+def _push(
+    talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe, *, hand: bool, tell: Progress
+) -> None:
+    """Pushes on the blades: what moves them, which way, how the torque follows; then swings."""
     identity = talk.identity
     axis = axis_of(talk, "opening", quiet.jitter_rad, identity.opening_resolution)
-    found = _both_ways(talk, axis, quiet)
-    finding.add(judge_signs(found, axis, OPENING, recipe.rig.motor_sign))
-    pushed, pulled = found.pushed, found.pulled
-    assert pushed is not None
-    assert pulled is not None
-    most = axis.effort
-    push = min(most, SWING_SHARE * pushed.effort + SWING_MORE_NM)
-    pull = -min(most, SWING_SHARE * -pulled.effort + SWING_MORE_NM)
-    held = holds(talk, axis, pushed.effort, pulled.effort)
-    swung = swings(talk, axis, push, pull)
-    zero = finding.result.torque_zero_Nm
-    parts = joined(talk, (*found.pulses, *held, *swung), disturbed=True)
-    answered = follow(parts, zero.mean if zero is not None else 0.0)
+    found = search(talk, axis, alive=hand)
+    finding.take(judge_search(found, axis, BLADES, hand=hand))
+    sensed = sense(talk, axis, found)
+    finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand=hand))
+    held = [
+        push(talk, axis, sign * HELD_SHARE * found.effort, GAIN_HOLD_S, hold=found.hold)
+        for sign in (1, -1) * HELD_PAIRS
+    ]
+    tell(0.5, "swings, planned by what the last ones taught")
+    lag_ticks = finding.result.facts["command_lag_ticks"]
+    prior = Prior(
+        (lag_ticks - 1.0 + FLAG_TO_DELAY_TICKS) * talk.tick_s,
+        DELAY_SD_TICKS * talk.tick_s,
+        found.effort,
+    )
     step = observed_step(talk.heard()["opening"])
-    moving = [swing_of(part, axis.moved) for part in joined(talk, swung)]
-    resolution = step if math.isfinite(step) else identity.opening_resolution
-    noise = max(quiet.jitter_rad, resolution / math.sqrt(12.0))
-    fitted = mechanics([swing for swing in moving if swing is not None], noise)
+    noise = math.hypot(quiet.jitter_rad, identity.opening_resolution / math.sqrt(12.0))
+    swung = swings(talk, axis, (*found.pushes, *sensed.pushes, *held), prior, noise, found.hold)
+    zero = finding.result.torque_zero_Nm
+    whole = talk.heard()
+    parts = [whole[one.begin : one.end] for one in swung.pushes]
+    answered = follow(parts, zero.mean if zero is not None else 0.0)
     facts = {
-        "breakaway_Nm": max(pushed.effort, -pulled.effort),
-        "breakaway_opening_Nm": pushed.effort,
-        "breakaway_closing_Nm": -pulled.effort,
+        "breakaway_Nm": found.effort,
+        "breakaway_opening_Nm": abs(found.pushed.effort) if found.pushed else math.nan,
+        "breakaway_closing_Nm": abs(found.pulled.effort) if found.pulled else math.nan,
         "encoder_step_rad": step,
         "measured_torque_lag_s": answered.lag_s,
     }
-    estimates: dict[str, object] = {"torque_gain": _finite(answered.gain)}
-    if fitted is not None:
-        facts["coulomb_opening_Nm"] = fitted.coulomb_opening
-        facts["coulomb_closing_Nm"] = fitted.coulomb_closing
-        estimates |= {
-            "inertia_kg_m2": fitted.inertia,
-            "coulomb_Nm": fitted.coulomb,
-            "viscous_Nm_s_per_rad": fitted.viscous,
-            "delay_s": fitted.delay,
-        }
     verdicts = [judge_follow(answered), judge_step(step, identity.opening_resolution)]
-    finding.add(verdicts, **estimates, facts=facts)
+    finding.add(verdicts, torque_gain=_finite(answered.gain), facts=facts)
+    finding.take(judge_joint(swung, axis, talk.tick_s, lag_ticks), **_of_swings(swung))
 
 
-def _both_ways(talk: Talk, axis: Axis, quiet: Idle) -> Stairs:
-    """Push the axis both ways, first away from the nearer stop."""
-    identity = talk.identity
-    low, high = identity.opening_min, identity.opening_max
-    middle = 0.5 * (low + high)
-    sign = 1 if quiet.opening_high < middle else -1
-    found = stairs(talk, axis, sign)
-    moved = found.pushed or found.pulled
-    if moved is None or (found.pushed and found.pulled):
-        return found
-    make_room(talk, axis, moved.effort, ROOM_PULSES)
-    return stairs(talk, axis, -1 if moved.effort > 0.0 else 1)
+def _of_swings(swung: Swung) -> dict[str, object]:
+    """Estimates and facts of the joint."""
+    fit = swung.fit
+    joint = fit.joint
+    return {
+        "inertia_kg_m2": fit.inertia,
+        "coulomb_Nm": fit.coulomb,
+        "viscous_Nm_s_per_rad": fit.viscous,
+        "delay_s": fit.delay,
+        "facts": {
+            "coulomb_opening_Nm": joint.opening,
+            "coulomb_closing_Nm": joint.closing,
+            "stribeck_Nm": joint.rise,
+            "stribeck_rate_rad_per_s": joint.rise_rate,
+            "presliding_rad": joint.fine,
+            "carrying_Nm": joint.carrying,
+            "log_inertia_sd": fit.sd("log_inertia"),
+            "misfit": fit.misfit,
+        },
+    }
 
 
 def _push_sledge(talk: Talk, finding: _Finding, recipe: Recipe) -> None:
     axis = axis_of(talk, "advance", 0.0, talk.identity.advance_resolution)
-    found = stairs(talk, axis, 1)
-    finding.add(judge_signs(found, axis, SLEDGE, recipe.rig.motor_sign, "N"))
-    assert found.pushed is not None
-    assert found.pulled is not None
-    finding.add([], facts={"sledge_breakaway_N": max(found.pushed.effort, -found.pulled.effort)})
+    found = search(talk, axis, alive=True)
+    finding.take(judge_search(found, axis, SLEDGE, hand=False))
+    sensed = sense(talk, axis, found)
+    finding.take(judge_sense(found, sensed, SLEDGE, recipe.rig.motor_sign, hand=False))
+    finding.add([], facts={"sledge_breakaway_N": found.effort})
 
 
 def _finite(estimate: Estimate) -> Estimate | None:

@@ -96,6 +96,12 @@ class Talk(AbstractContextManager["Talk"]):
         self.bounds = bounds
         self.largest_torque = self.largest_rate = 0.0
         self.duplicates = 0
+        self.late_ticks = 1
+        """Ticks from a state to what its answer does, as `lag` found them."""
+        self.expiry_s = 0.01
+        """Silence after which the device brakes; as set."""
+        self.rate_over_s = RATE_OVER_S
+        """Time over which rates are taken; longer for an encoder that jitters."""
         self._sign = motor_sign
         self._virtual = link if isinstance(link, Exchanging) else None
         self._rows: list[tuple[float, ...]] = []
@@ -112,6 +118,11 @@ class Talk(AbstractContextManager["Talk"]):
     def ticks(self, seconds: float) -> int:
         """Give the number of ticks in a time, at least one."""
         return max(1, round(seconds / self.tick_s))
+
+    @property
+    def sequence(self) -> int:
+        """Ticks that the device has counted, unwrapped, as of the newest state."""
+        return int(self._rows[-1][0])
 
     def mark(self) -> int:
         """Where `heard` may begin later."""
@@ -149,6 +160,28 @@ class Talk(AbstractContextManager["Talk"]):
             yield
         finally:
             self.bounds = before
+
+    @contextmanager
+    def braking_after(self, milliseconds: float) -> Iterator[None]:
+        """Set the device's watchdog for some stages; a device that refuses keeps its own."""
+        before = self.expiry_s
+        try:
+            self.expiry_s = 1e-3 * self.link.configure(ConfigKey.BRAKE_AFTER_MS, milliseconds)
+        except DeviceError:
+            yield
+            return
+        try:
+            yield
+        finally:
+            self.expiry_s = 1e-3 * self.link.configure(ConfigKey.BRAKE_AFTER_MS, 1e3 * before)
+
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Motors and stream off, while a person is asked for something."""
+        self.release()
+        self.link.configure(ConfigKey.STREAM, 0.0)
+        yield
+        self.link.configure(ConfigKey.STREAM, 1.0)
 
     def release(self) -> None:
         """Switch the motors off, three times, in case a command is lost.
@@ -327,7 +360,7 @@ class Talk(AbstractContextManager["Talk"]):
     def _rates(self) -> tuple[float, float]:
         """Magnitudes of the rates (rad/s, m/s) over the last few ticks."""
         now = self._rows[-1]
-        span = max(2, self.ticks(RATE_OVER_S))
+        span = max(2, self.ticks(self.rate_over_s))
         then = self._rows[-1 - span] if len(self._rows) > span else self._rows[0]
         time_s = (now[0] - then[0]) * self.tick_s
         if time_s <= 0.0:

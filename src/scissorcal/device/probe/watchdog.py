@@ -1,18 +1,12 @@
-"""Do the motors answer, how late, and do they brake when commands stop? All at zero torque."""
+"""Does the device brake when commands stop? At zero torque."""
 
 from dataclasses import dataclass
-
-import numpy as np
 
 from scissorcal.device.probe.idle import CLEARINGS
 from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import ConfigKey, StateFlag
 
-TOGGLES = 12
-LONGEST_TICKS_S = 0.1
-PAUSES = (7, 11, 5, 13, 9, 6)
-"""Ticks between toggles: of different lengths, so that nothing periodic in the host aligns."""
 LATER_S = 0.05
 LONGEST_BRAKE_MS = 1000.0
 """As in the protocol: no device has a longer BRAKE_AFTER_MS, whatever it refuses."""
@@ -20,16 +14,13 @@ LONGEST_BRAKE_MS = 1000.0
 
 @dataclass(frozen=True)
 class Watchdog:
-    """What ENABLE and silence do.
+    """What silence does.
 
-    ``lags`` (ticks): from the state that a command answers to the first state that shows it.
     ``brake_after_ms`` is the value in force, as asked for where the device refuses it; ``refused``
     is why, empty where it takes the value. Commands were withheld for at most ``withheld_ms``;
     ``braked_ms`` is the silence after which it braked, None where it did not.
     """
 
-    lags: tuple[int, ...]
-    never_enabled: bool
     brake_after_ms: float
     refused: str
     withheld_ms: float
@@ -41,14 +32,11 @@ class Watchdog:
 
 
 def watchdog(talk: Talk, brake_after_ms: float) -> Watchdog:
-    """Enable and release the motors at zero torque, then withhold commands.
+    """Enable the motors at zero torque, then withhold commands.
 
     ``brake_after_ms`` is set as BRAKE_AFTER_MS, and stays. A device that refuses it keeps another
     value, so commands are withheld for longer than any that the protocol allows.
     """
-    lags = talk.play(_toggled(talk))
-    if not lags:
-        return Watchdog((), True, brake_after_ms, "", 0.0, None, False, False, False, False)
     refused, in_force = "", brake_after_ms
     try:
         in_force = talk.link.configure(ConfigKey.BRAKE_AFTER_MS, brake_after_ms)
@@ -58,8 +46,6 @@ def watchdog(talk: Talk, brake_after_ms: float) -> Watchdog:
     braked, latched, shown = talk.play(_silenced(talk, withheld_s))
     lost_cleared, fault_cleared = talk.play(_recovered(talk))
     return Watchdog(
-        tuple(lags),
-        False,
         in_force,
         refused,
         1e3 * withheld_s,
@@ -69,30 +55,6 @@ def watchdog(talk: Talk, brake_after_ms: float) -> Watchdog:
         lost_cleared,
         fault_cleared,
     )
-
-
-def _toggled(talk: Talk) -> Stage[list[int]]:
-    """Switch ENABLE on and off; return after how many ticks each showed, [] where one never did."""
-    lags: list[int] = []
-    on = False
-    state = yield RELEASE
-    for toggle in range(TOGGLES):
-        answer = RELEASE if on else Answer()
-        on = not on
-        asked = state.sequence
-        disturbed = False
-        for _ in range(talk.ticks(LONGEST_TICKS_S)):
-            faulty = bool(state.flags & StateFlag.FAULT_LATCHED)
-            disturbed = disturbed or faulty  # this computer was late, and the device braked
-            state = yield answer._replace(clear=faulty)
-            if bool(state.flags & StateFlag.MOTOR_ENABLED) is on:
-                lags += [] if disturbed else [(state.sequence - asked) % 2**32]
-                break
-        else:
-            return []
-        for _ in range(PAUSES[toggle % len(PAUSES)]):
-            state = yield answer._replace(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
-    return lags
 
 
 def _silenced(talk: Talk, longest_s: float) -> Stage[tuple[float | None, bool, bool]]:
@@ -125,8 +87,3 @@ def _recovered(talk: Talk) -> Stage[tuple[bool, bool]]:
             break
         state = yield RELEASE._replace(clear=True)
     return lost_cleared, not state.flags & StateFlag.FAULT_LATCHED
-
-
-def lag_ticks(lags: tuple[int, ...]) -> float:
-    """The mean lag in ticks."""
-    return float(np.mean(lags))

@@ -1,0 +1,162 @@
+"""Verdicts on pushes: what moves, which way, and whether a joint's law explains it.
+
+Each is right, wrong with its name, or not determined with what to do. `Undetermined` ends a probe
+as a verdict that fails does, without accusing anything.
+"""
+
+import math
+from dataclasses import dataclass
+
+from scissorcal.device.probe.pushes import Axis
+from scissorcal.device.probe.search import LEAST_INERTIA, Search, Sense
+from scissorcal.device.probe.swings import Swung
+from scissorcal.verdicts import Verdict, judge, not_evaluated
+
+MOTORS = "probe.motors"
+MISFIT_LIMIT = 15.0
+"""Mean square of the residuals over their errors. Joints of another friction law stay below it, a
+loose coupling or blades that touch something do not (figures in decision 175)."""
+WIDEST_SD = 0.3
+"""Of ln inertia: gains that hold at both ends of its interval of 90 % then lose half of their
+margin, which is what a gain margin of 2 allows."""
+LATE_S = 6e-3
+"""What motor and driver may add to the delay that flags show: 3 ms of lag, and 3 of filters."""
+
+
+@dataclass(frozen=True)
+class Words:
+    """The words for an axis: its name, what each sign does, and the remedies."""
+
+    name: str
+    plus: str
+    minus: str
+    effort: str
+    unit: str
+    scale: float
+    reversed: str
+    reversed_alone: str
+    more: str
+
+
+BLADES = Words(
+    "blades", "opens", "closes", "torque", "mN m", 1e3,
+    "the motor or the encoder is reversed. Set rig.motor_sign = {sign} in the recipe or swap the "
+    "motor's wires (or the encoder's channels, if the opening shrinks while the blades open)",
+    "the motor is reversed (the encoder counts rightly, as the pass by hand showed). Set "
+    "rig.motor_sign = {sign} in the recipe or swap the motor's wires",
+    "Clear the blades, check the encoder's cable and the motor's supply, or raise "
+    "rig.probe.largest_torque_Nm",
+)  # fmt: skip
+SLEDGE = Words(
+    "sledge", "advances", "retracts", "force", "N", 1.0,
+    "its motor or its encoder is reversed. Swap the motor's wires, or the encoder's channels if "
+    "the advance shrinks while the sledge moves along the cut",
+    "",
+    "Clear its way, check its encoder's cable and its motor",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Verdicts, and the sentence that ends the probe undetermined; empty where it goes on."""
+
+    verdicts: tuple[Verdict, ...]
+    undetermined: str = ""
+
+
+def judge_search(found: Search, axis: Axis, words: Words, *, hand: bool) -> Outcome:
+    """Whether the axis moved both ways; ``hand``: a pass by hand has shown the encoder alive."""
+    if found.pushed is not None and found.pulled is not None:
+        return Outcome(())
+    check = f"{words.name} move"
+    if found.bounded_at is not None:
+        why = (
+            f"Not determined: no push up to {words.scale * found.bounded_at:.3g} {words.unit} "
+            f"moved the {words.name}, and behind a stuck encoder a larger one could make light "
+            f"ones ({1e6 * LEAST_INERTIA:.0f} kg mm^2) faster than rig.probe allows. Probe again "
+            "and move the blades to both stops by hand when asked: that shows that the encoder is "
+            "alive, and larger pushes are allowed."
+        )
+        return _open(check, why, words.scale * axis.effort)
+    most = f"{words.scale * axis.effort:.3g} {words.unit}"
+    moved = found.pushed or found.pulled
+    if moved is None:
+        cause = "an obstacle, a brake, a motor without supply, or more friction than that"
+        if not hand:
+            cause = f"a stuck or unplugged encoder, {cause}"
+        why = f"The {words.name} did not move either way, up to {most}: {cause}. {words.more}."
+        return Outcome((Verdict(MOTORS, check, "fail", words.scale * axis.effort, None, why),))
+    sign = "positive" if moved.effort > 0.0 else "negative"
+    why = (
+        f"Not determined: the {words.name} moved only by {sign} efforts, up to {most}: they stand "
+        "at a stop or at something between them, or gravity or a spring carries them. Leave the "
+        f"blades half open, balance what carries them, and probe again. {words.more}."
+    )
+    return _open(check, why, words.scale * axis.effort)
+
+
+def judge_sense(
+    found: Search, sensed: Sense, words: Words, motor_sign: int, *, hand: bool
+) -> Outcome:
+    """Which way the axis goes when it is pushed."""
+    assert found.pushed is not None
+    assert found.pulled is not None
+    check = f"{words.name} direction"
+    share = 0.5 + 0.5 * sensed.votes / max(sensed.pairs, 1)
+    if sensed.direction == "not determined":
+        why = (
+            f"Not determined: {sensed.pairs} pairs of pushes did not agree on which way the "
+            f"{words.name} go (votes {sensed.votes:+d}): something else moves them (a hand, a "
+            "spring, gravity), or the encoder counts one way only. Let go of the handles, clear "
+            "the blades, and probe again."
+        )
+        return _open(check, why, share)
+    up, down = found.pushed.effort, -found.pulled.effort
+    good = (
+        f"Positive {words.effort} {words.plus}, negative {words.effort} {words.minus} the "
+        f"{words.name}, from {words.scale * up:.3g} and {words.scale * down:.3g} {words.unit} on."
+    )
+    remedy = words.reversed_alone if hand and words.reversed_alone else words.reversed
+    bad = f"Positive {words.effort} {words.minus} the {words.name}: "
+    bad += remedy.format(sign=-motor_sign) + "."
+    right = float(sensed.direction == "right")
+    return Outcome((judge(MOTORS, check, right, 1.0, good, bad),))
+
+
+def judge_joint(swung: Swung, axis: Axis, tick_s: float, lag_ticks: float) -> Outcome:
+    """Whether inertia and friction explain the pushes, and are known well enough."""
+    check, fit = "inertia", swung.fit
+    sd = fit.sd("log_inertia")
+    spread = math.exp(1.645 * sd)
+    inertia = 1e6 * fit.inertia.mean
+    if not fit.misfit <= MISFIT_LIMIT:
+        why = (
+            "Not determined: no inertia and friction explain how the blades move (misfit "
+            f"{fit.misfit:.3g}, at most {MISFIT_LIMIT:g}): a loose coupling between blades and "
+            "encoder, or blades that touch something. Clear them, tighten the coupling, and probe "
+            "again."
+        )
+        return _open(check, why, sd)
+    late, doubt = fit.delay.mean, 2.0 * fit.delay.sd
+    least, most = (lag_ticks - 2.0) * tick_s - doubt, (lag_ticks + 1.0) * tick_s + LATE_S + doubt
+    if fit.strange or not least <= late <= most:
+        what = ", ".join(fit.strange) or f"a delay of {1e3 * late:.3g} ms"
+        why = (
+            f"Not determined: the pushes fit only with {what}, which no such rig has. Check that "
+            "nothing touches the blades and that the motor's supply stands, and probe again."
+        )
+        return _open(check, why, sd)
+    if not sd <= WIDEST_SD:
+        steps = max(abs(one.went) for one in swung.pushes) / max(axis.seen / 3.0, 1e-12)
+        why = (
+            f"Not determined: the inertia is known to a factor of {spread:.2g} only. At "
+            f"{1e3 * tick_s:.3g} ms ticks the largest swing within rig.probe is {steps:.2g} "
+            "encoder steps. Use a finer encoder, a shorter tick, or larger limits in rig.probe."
+        )
+        return _open(check, why, sd)
+    why = f"Inertia {inertia:.3g} kg mm^2, known to a factor of {spread:.3g} (90 %)."
+    return Outcome((Verdict(MOTORS, check, "pass", sd, WIDEST_SD, why),))
+
+
+def _open(check: str, why: str, value: float) -> Outcome:
+    return Outcome((not_evaluated(MOTORS, check, why, None, value),), why)

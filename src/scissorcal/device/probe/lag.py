@@ -1,0 +1,142 @@
+"""Do the motors answer, how late, and do commands get lost? At zero torque."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
+from scissorcal.kernel import StateFlag
+from scissorcal.verdicts import Verdict, not_evaluated
+
+MOTORS, LINE = "probe.motors", "probe.line"
+TOGGLES, ASKED = 12, 200
+LONGEST_TICKS_S = 0.1
+PAUSES = (7, 11, 5, 13, 9, 6)
+"""Ticks between toggles: of different lengths, so that nothing periodic in the host aligns."""
+WITHHELD_TICKS = 3
+"""After the longest lag of the toggles: a single command has shown by then, or never will."""
+LAG_LIMIT_MS = 25.0
+"""A loop that is so late holds a bandwidth of pi / 4 / 25 ms = 31 rad/s at a phase margin of 45
+degrees: blades then stay behind by 30 mrad at 1 rad/s, and no sweep is steady."""
+LOST_LIMIT = 0.005
+"""Share of commands. One in 200 lost lets two in a row go missing once a minute at 1 kHz."""
+FEWEST_LOST = 4
+"""Of ASKED: below it the interval of 95 % (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404)
+reaches below LOST_LIMIT; of 5 % of commands lost fewer are seen in 1 of 100 probes."""
+
+
+@dataclass(frozen=True)
+class Lag:
+    """``ticks``: from the state that a command answers to the first that shows it; empty where
+    ENABLE never showed. ``lost`` of ``asked`` single commands did not arrive."""
+
+    ticks: tuple[int, ...]
+    asked: int
+    lost: int
+
+    @property
+    def median(self) -> float:
+        return float(np.median(self.ticks)) if self.ticks else math.nan
+
+
+def lag(talk: Talk) -> Lag:
+    """Toggle ENABLE with repeated commands for the lag, then with single ones for losses."""
+    toggled = talk.play(_toggled(talk))
+    if not toggled:
+        return Lag((), 0, 0)
+    longest = max(toggled)
+    talk.late_ticks = longest
+    silence_ms = (longest + WITHHELD_TICKS + 2) * talk.tick_s * 1e3
+    with talk.braking_after(max(silence_ms, 10.0)):
+        asked, lost = talk.play(_singles(talk, longest))
+    return Lag(tuple(toggled), asked, lost)
+
+
+def judge_lag(found: Lag, tick_ms: float) -> list[Verdict]:
+    """Verdicts on ENABLE, on the lag and on commands that do not arrive."""
+    if not found.ticks:
+        why = (
+            "MOTOR_ENABLED did not show within 0.1 s of ENABLE: the device does not take commands. "
+            "Check its receive line, its emergency stop and its firmware."
+        )
+        return [Verdict(MOTORS, "enable", "fail", None, None, why)]
+    late = found.median * tick_ms
+    said = f"Commands take effect after {late:.3g} ms (median)"
+    bad = (
+        f"{said}: no loop through it follows a sweep. Shorten the way (no hub or network adapter; "
+        "'scissorcal device doctor' measures the port)."
+    )
+    status = "pass" if late <= LAG_LIMIT_MS else "fail"
+    why = f"{said}." if status == "pass" else bad
+    verdicts = [Verdict(MOTORS, "lag", status, late, LAG_LIMIT_MS, why)]  # type: ignore[arg-type]
+    share = found.lost / found.asked
+    said = f"{found.lost} of {found.asked} single commands did not arrive"
+    if found.lost >= FEWEST_LOST:
+        why = (
+            f"{said}: what the host sends is lost on its way. Check the host's transmit line, its "
+            "ground and the device's receive buffer; 'scissorcal device doctor' measures the port."
+        )
+        verdicts.append(Verdict(LINE, "lost commands", "fail", share, LOST_LIMIT, why))
+    elif found.lost:
+        why = f"{said}, too few to tell how many are lost in general."
+        verdicts.append(not_evaluated(LINE, "lost commands", why, LOST_LIMIT, share))
+    else:
+        verdicts.append(Verdict(LINE, "lost commands", "pass", share, LOST_LIMIT, f"{said}."))
+    return verdicts
+
+
+def _toggled(talk: Talk) -> Stage[list[int]]:
+    """Switch ENABLE on and off; return after how many ticks each showed, [] where one never did."""
+    lags: list[int] = []
+    on = False
+    state = yield RELEASE
+    for toggle in range(TOGGLES):
+        answer = RELEASE if on else Answer()
+        on = not on
+        asked, begin = talk.sequence, talk.mark()
+        disturbed = shown = False
+        while talk.sequence - asked < talk.ticks(LONGEST_TICKS_S) and not shown:
+            faulty = bool(state.flags & StateFlag.FAULT_LATCHED)
+            disturbed = disturbed or faulty  # this computer was late, and the device braked
+            state = yield answer._replace(clear=faulty)
+            found = _first(talk, begin, on=on)
+            shown = found is not None
+            if found is not None and not disturbed:
+                lags.append(found - asked)
+        if not shown:
+            return []
+        for _ in range(PAUSES[toggle % len(PAUSES)]):
+            state = yield answer._replace(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
+    return lags
+
+
+def _singles(talk: Talk, longest: int) -> Stage[tuple[int, int]]:
+    """ENABLE once, and nothing for some ticks: it shows if and only if that command arrived."""
+    state = yield RELEASE
+    asked = lost = 0
+    for _ in range(ASKED):
+        cleared = talk.sequence
+        while state.flags & (StateFlag.MOTOR_ENABLED | StateFlag.FAULT_LATCHED) or (
+            talk.sequence - cleared <= longest + 1
+        ):
+            if talk.sequence - cleared > talk.ticks(LONGEST_TICKS_S) + 2 * longest:
+                return asked, lost
+            off = not state.flags & (StateFlag.MOTOR_ENABLED | StateFlag.FAULT_LATCHED)
+            faulty = bool(state.flags & StateFlag.FAULT_LATCHED)
+            state = yield None if off else RELEASE._replace(clear=faulty)
+        begin, since = talk.mark(), talk.sequence
+        state = yield Answer()
+        while talk.sequence - since < longest + WITHHELD_TICKS:
+            state = yield None
+        asked += 1
+        lost += _first(talk, begin, on=True) is None
+        state = yield RELEASE
+    return asked, lost
+
+
+def _first(talk: Talk, begin: int, *, on: bool) -> int | None:
+    """Sequence of the first state since ``begin`` in which the motors are on, or off."""
+    heard = talk.heard(begin)
+    showing = ((heard["flags"] & int(StateFlag.MOTOR_ENABLED)) != 0) == on
+    return int(heard["sequence"][int(np.argmax(showing))]) if showing.any() else None

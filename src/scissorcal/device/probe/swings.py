@@ -1,0 +1,134 @@
+"""Planned swings: each is aimed by what the last ones taught, until the inertia is known."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from scissorcal.device.probe.joint_fit import (
+    NAMES,
+    JointFit,
+    Prior,
+    Push,
+    fit_joint,
+    perturbed,
+    travel_of,
+)
+from scissorcal.device.probe.pushes import MOVED_STEPS, Axis, Pushed, push
+from scissorcal.device.probe.talk import Talk
+from scissorcal.kernel import CommandFlag
+
+AIM_RAD, AIM_STEPS = 20e-3, 15.0
+"""A swing shall go so far: beyond what most joints yield, and 15 steps are known to 2 %."""
+MOST_WAY_RAD, MOST_RATE = 60e-3, 1.0
+FACTORS = (1.1, 1.25, 1.4, 1.6, 1.8, 2.0, 2.2)
+LONGEST_S = 0.12
+ENOUGH_SD = 0.11
+"""Of ln inertia: an interval of 90 % within +- 20 %, which a gain margin of 2 bears five times."""
+BEYOND = 1.5
+"""The strongest push over the fitted friction: below it, all of the motion may be presliding."""
+MOST_PAIRS = 10
+TELLING = 0.3
+"""Pushes below this share of breakaway move within the encoder's error: they only cost time."""
+LIGHT_SDS = 2.0
+AIM_SHARE, WAY_SHARE, RATE_SHARE = 0.6, 0.8, 0.7
+"""Of the bounds: what the model aims at, and what it may reach with the lightest blades."""
+
+
+@dataclass(frozen=True)
+class Swung:
+    """All pushes of the blades and what the model says of them."""
+
+    pushes: tuple[Pushed, ...]
+    fit: JointFit
+    strongest_Nm: float
+
+
+def swings(
+    talk: Talk,
+    axis: Axis,
+    before: tuple[Pushed, ...],
+    prior: Prior,
+    noise_rad: float,
+    hold: float,
+) -> Swung:
+    """Swing both ways by turns, planned by the fit to all pushes so far, until ENOUGH_SD."""
+    pushes = list(before)
+    least = TELLING * prior.breakaway_Nm
+    strongest = max(abs(one.effort) for one in pushes)
+    fit = fit_joint(pushes_of(talk, pushes, least), prior, noise_rad)
+    for _ in range(MOST_PAIRS):
+        if known(fit, strongest):
+            break
+        for sign in (1, -1):
+            effort, seconds = _planned(talk, axis, fit, sign, prior.breakaway_Nm, strongest)
+            one = push(talk, axis, effort, seconds, hold=hold, way=_most_way(axis), rate=MOST_RATE)
+            pushes.append(one)
+            if not one.disturbed:
+                strongest = max(strongest, abs(effort))
+        fit = fit_joint(pushes_of(talk, pushes, least), prior, noise_rad, starts=[fit.values])
+    starts = [fit.values, *perturbed(fit.values)]
+    fit = fit_joint(pushes_of(talk, pushes, least), prior, noise_rad, starts=starts)
+    return Swung(tuple(pushes), fit, strongest)
+
+
+def known(fit: JointFit, strongest: float) -> bool:
+    """Whether the inertia is known well enough, from more than presliding."""
+    return fit.sd("log_inertia") <= ENOUGH_SD and strongest >= BEYOND * math.exp(
+        fit.value("log_coulomb")
+    )
+
+
+def pushes_of(talk: Talk, pushed: list[Pushed] | tuple[Pushed, ...], least: float) -> list[Push]:
+    """What was heard of each push of ``least`` and more that nothing disturbed, for the fit."""
+    whole = talk.heard()
+    stood = [True, *(one.rested for one in pushed[:-1])]
+    return [
+        _push_of(whole[one.begin : one.end], talk.tick_s, rested)
+        for one, rested in zip(pushed, stood, strict=True)
+        if not one.disturbed and abs(one.effort) >= least
+    ]
+
+
+def _push_of(heard: np.ndarray, tick_s: float, rested: bool) -> Push:
+    times = heard["sequence"] * tick_s
+    answered = heard["answer_flags"] >= 0
+    on = (heard["answer_flags"][answered] & int(CommandFlag.ENABLE)) != 0
+    torque = np.where(on, heard["torque"][answered], 0.0)
+    at = times[answered]
+    changes = np.flatnonzero(np.diff(torque, prepend=np.nan) != 0.0)
+    return Push(times, heard["opening"].copy(), at[changes], torque[changes], rested)
+
+
+def _most_way(axis: Axis) -> float:
+    return min(MOST_WAY_RAD, axis.way)
+
+
+def _planned(
+    talk: Talk, axis: Axis, fit: JointFit, sign: int, breakaway: float, strongest: float
+) -> tuple[float, float]:
+    """Torque and time of the next swing: the safe one that goes farthest towards the aim.
+
+    While nothing stronger than BEYOND times the friction was tried, such torques go first. Light
+    blades (LIGHT_SDS below the mean of ln inertia) bound way and rate.
+    """
+    aim = min(max(AIM_RAD, AIM_STEPS * axis.seen / MOVED_STEPS), AIM_SHARE * _most_way(axis))
+    needed = BEYOND * math.exp(fit.value("log_coulomb"))
+    lightest = fit.values.copy()
+    lightest[NAMES.index("log_inertia")] -= LIGHT_SDS * min(fit.sd("log_inertia"), 0.7)
+    rate_limit, way_limit = RATE_SHARE * min(MOST_RATE, axis.rate), WAY_SHARE * _most_way(axis)
+    safe: list[tuple[bool, float, float, float]] = []
+    for factor in FACTORS:
+        effort = factor * max(breakaway, needed / BEYOND)
+        seconds = LONGEST_S
+        while effort <= axis.effort and seconds > 0.5 * talk.tick_s:
+            way, rate = travel_of(lightest, sign * effort, seconds)
+            if rate <= rate_limit and way <= way_limit:
+                reached = min(travel_of(fit.values, sign * effort, seconds)[0] / aim, 1.0)
+                safe.append((effort >= needed and strongest < needed, reached, effort, seconds))
+                break
+            seconds *= 0.6
+    if not safe:
+        return sign * min(FACTORS[0] * breakaway, axis.effort), talk.tick_s
+    _, _, effort, seconds = max(safe)
+    return sign * effort, seconds
