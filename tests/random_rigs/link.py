@@ -79,7 +79,8 @@ class RigLink:
             inertia=rig.inertia, opening=rig.coulomb_opening, closing=rig.coulomb_closing,
             rise=rig.rise_share * dry, rise_rate=rig.rise_rate, viscous=rig.viscous,
             fine=rig.fine_rad, slow=rig.slow_rad, slow_share=rig.slow_share,
-            bristle_damping=0.2 * math.sqrt(dry / rig.fine_rad * rig.inertia),
+            bristle_damping=rig.bristle_damping_share
+            * math.sqrt(dry / rig.fine_rad * rig.inertia),
             gravity=rig.gravity, gravity_phase=rig.gravity_phase,
             cogging=rig.cogging, cogging_periods=rig.cogging_periods,
             motor_lag=rig.motor_lag, motor_gain=rig.motor_sign * rig.motor_gain, brake=0.03,

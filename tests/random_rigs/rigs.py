@@ -22,7 +22,7 @@ class RigParameters:
     fine_rad: float = 5e-4
     slow_rad: float = 5e-3
     slow_share: float = 0.0
-    bristle_damping: float = 0.0
+    bristle_damping_share: float = 0.7
     gravity: float = 0.0
     gravity_phase: float = 0.5
     cogging: float = 0.0
@@ -91,6 +91,7 @@ def healthy(seed: int) -> RigParameters:
         fine_rad=min(fine, slow) if two else fine,
         slow_rad=max(fine, slow),
         slow_share=rng.uniform(0.15, 0.6) if two else 0.0,
+        bristle_damping_share=log(0.4, 1.5),
         gravity=gravity,
         gravity_phase=rng.uniform(-0.5, 1.5),
         cogging=rng.uniform(0.0, 0.05) * dry if rng.random() < 0.5 else 0.0,

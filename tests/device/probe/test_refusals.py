@@ -16,7 +16,11 @@ LARGEST_TORQUE = RECIPE.rig.probe.largest_torque_Nm * (1.0 + 1e-6)  # travels in
 LARGEST_RATE = RECIPE.rig.probe.largest_rate_rad_per_s
 
 STILL = {
-    "encoder counted double": "beyond the stops that the device states",
+    "encoder counted double": "are wrong by a factor 2",
+    "encoder counted by half": "are wrong by a factor 0.5",
+    "encoder reversed": "the encoder is reversed",
+    "motor and encoder reversed": "the encoder is reversed",
+    "encoder zero off by 0.1 rad": "the zero of the encoder is wrong",
     "encoder noisy": "The opening jitters by",
     "force sensor dead": "handle_force never changed",
     "tick twice as long as stated": "so tick_us is wrong",
@@ -31,8 +35,7 @@ STILL = {
 """Refused before a torque was commanded."""
 
 MOVED = {
-    "motor reversed": "Positive torque closes the blades",
-    "encoder reversed": "Set rig.motor_sign = -1 in the recipe or swap the motor's wires",
+    "motor reversed": "the motor is reversed (the encoder counts rightly",
     "encoder step misstated": "correct opening_resolution",
     "measured torque reversed": "motor_torque has the opposite sign of the command",
     "measured torque half": "its scale or the motor's torque constant is wrong",
@@ -40,6 +43,9 @@ MOVED = {
     "sledge motor reversed": "Positive force retracts the sledge",
     "sledge encoder reversed": "Positive force retracts the sledge",
 }
+
+PUSHING_S = 4.5
+"""By then the blades are pushed: pass by hand, idle second, lag and watchdog are over."""
 
 LATER = {
     "clock stands": "its clock (device_us) stood still",
@@ -54,6 +60,9 @@ LATER = {
     "fault that stays": "latched a fault that does not clear",
 }
 """Faults that begin while the probe moves the blades."""
+
+DIES_UNSEEN = ("encoder stuck", "measurements frozen")
+"""An encoder that dies after the pass by hand showed it alive: the pushes go on growing."""
 
 WARNED = {
     "measured torque zero off by 20 mN m": "motor_torque shows 20",
@@ -91,25 +100,24 @@ def test_signs_and_scales_are_refused_by_small_motions(fault: str) -> None:
     assert device.largest_rate < LARGEST_RATE
 
 
-@pytest.mark.parametrize("fault", ["motor reversed", "encoder reversed"])
-def test_a_reversed_motor_is_stopped_within_a_few_encoder_steps(fault: str) -> None:
-    _, device = refused(FAULTS[fault])
-    assert device.largest_torque < 0.02
-    assert device.largest_rate < 0.05
-    assert abs(device.blades.place - 0.6) < 0.002
+def test_a_reversed_motor_is_found_by_small_motions() -> None:
+    _, device = refused(FAULTS["motor reversed"])
+    assert device.largest_torque < 2.0 * device.faults.dry_Nm
+    assert device.largest_rate < 0.5
 
 
 @pytest.mark.parametrize("fault", LATER)
 def test_what_goes_wrong_during_the_probe_is_named(fault: str) -> None:
     later = {
-        name: 1.45
+        name: PUSHING_S
         for name, value in vars(FAULTS[fault]).items()
         if name.endswith("_at_s") and value == 2.0
     }
     error, device = refused(replace(FAULTS[fault], **later))
     assert LATER[fault] in str(error)
     assert device.largest_torque <= LARGEST_TORQUE
-    assert device.largest_rate < LARGEST_RATE
+    if fault not in DIES_UNSEEN:
+        assert device.largest_rate < LARGEST_RATE
 
 
 @pytest.mark.parametrize("fault", WARNED)
@@ -137,23 +145,17 @@ def test_motor_sign_cures_a_reversed_motor_whose_torque_is_measured_as_it_acts()
     assert "Set rig.motor_sign = 1" in str(error)
 
 
-def test_an_encoder_counted_by_half_shows_where_creeping_is_allowed() -> None:
-    probing = RECIPE.rig.probe.model_copy(update={"creep": True})
-    rig = RECIPE.rig.model_copy(update={"probe": probing})
-    recipe = RECIPE.model_copy(update={"rig": rig})
-    error, device = refused(FAULTS["encoder counted by half"], recipe)
-    assert "wrong by a factor 0.5" in str(error)
-    assert device.largest_torque <= LARGEST_TORQUE
-    assert device.largest_rate < LARGEST_RATE
-    result, _ = probed(FAULTS["none"], recipe)
-    assert result.facts["range_ratio"] == pytest.approx(1.0, abs=0.01)
-
-
-def test_without_creeping_the_count_scale_is_stated_as_not_checked() -> None:
-    result, _ = probed(FAULTS["encoder counted by half"])
+def test_nobody_who_moves_the_blades_leaves_the_encoder_unchecked() -> None:
+    """Pushes then stay so small that light blades behind a dead encoder keep within the bound."""
+    device = StrangeDevice(Faults(dry_Nm=0.008), seed=1)
+    result = probe(VirtualPort(device), RECIPE, confirm=lambda request: None)
     verdict = next(item for item in result.verdicts if item.check == "count scale")
     assert (verdict.status, verdict.value) == ("not_evaluated", None)
-    assert verdict.why.startswith("Not checked: whether the encoder counts")
+    assert "either nobody moved them or the encoder is stuck" in verdict.why
+    dead = StrangeDevice(Faults(dry_Nm=0.008, inertia=1e-4, encoder_stuck_at_s=0.0), seed=1)
+    with pytest.raises(ProbeRefusedError, match="Not determined: no push up to"):
+        probe(VirtualPort(dead), RECIPE, confirm=lambda request: None)
+    assert dead.largest_rate < LARGEST_RATE
 
 
 def test_nobody_to_ask_is_refused_before_anything_is_sent() -> None:

@@ -31,6 +31,8 @@ ZERO_RAD = 0.05
 give. At an edge of 60 mm it is 1.5 mm at the tip."""
 AGREE_SHARE = 0.05
 """Two passes of a person who pressed on both stops agree so closely."""
+FELL_RAD = 0.05
+"""As near to a stop as its place is known (ZERO_RAD)."""
 HAND_RATE, HAND_S = 0.5, 3.0
 
 
@@ -67,6 +69,21 @@ def hand_pass(talk: Talk, confirm: Confirm) -> HandPass:
             break
         before = AGAIN.format(what=_what(found, identity))
     return found
+
+
+def let_go(talk: Talk, confirm: Confirm, request: str) -> Verdict | None:
+    """Ask a person to leave the blades half open; a verdict where they then stand at a stop."""
+    place = _held(talk, confirm, request)
+    identity = talk.identity
+    for name, stop in (("closed", identity.opening_min), ("open", identity.opening_max)):
+        if abs(place - stop) <= FELL_RAD:
+            why = (
+                f"Not determined: the blades stand at their {name} stop although they were to be "
+                "left half open: gravity or a spring carries them there, or nobody moved them. "
+                "Balance them or leave them half open, and probe again."
+            )
+            return not_evaluated(SENSORS, "left half open", why, FELL_RAD, abs(place - stop))
+    return None
 
 
 def virtual_hand(talk: Talk) -> bool:

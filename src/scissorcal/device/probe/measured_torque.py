@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 
 LAGS = np.linspace(0.0, 20e-3, 101)
 HELD_S = 0.01
+"""After the delay: five time constants of a motor of 2 ms."""
 LEAST_HELD = 40
 
 
@@ -26,11 +27,11 @@ class Follow:
     constant: bool
 
 
-def follow(parts: list[NDArray[np.void]], zero: float) -> Follow:
+def follow(parts: list[NDArray[np.void]], zero: float, late_s: float) -> Follow:
     """Compare the measured torque with the commanded one: gain where it is held, lag everywhere.
 
-    The gain takes only states before which the command stood for 10 ms, so that no lag of the motor
-    bends it.
+    The gain takes only states before which the command stood for HELD_S and the delay ``late_s``,
+    so that no lag of the motor bends it.
     """
     measured = np.concatenate([part["motor_torque"] for part in parts]) - zero
     usable = np.isfinite(measured)
@@ -41,7 +42,7 @@ def follow(parts: list[NDArray[np.void]], zero: float) -> Follow:
         power = max(float(command @ command), 1e-30)
         gain = float(command @ measured[usable]) / power
         costs.append(float(np.sum((measured[usable] - gain * command) ** 2)))
-    held = np.concatenate([_held(part) for part in parts])
+    held = np.concatenate([_held(part, HELD_S + late_s) for part in parts])
     command = np.concatenate([_commanded(part, 0.0) for part in parts])
     inside = usable & held & (command != 0.0)
     if np.count_nonzero(inside) < LEAST_HELD:
@@ -62,8 +63,8 @@ def _commanded(part: NDArray[np.void], lag: float) -> Array:
     return np.asarray(command, dtype=np.float64)
 
 
-def _held(part: NDArray[np.void]) -> NDArray[np.bool_]:
-    """Where the motors were on and the command had stood for HELD_S."""
+def _held(part: NDArray[np.void], held_s: float) -> NDArray[np.bool_]:
+    """Where the motors were on and the command had stood for ``held_s``."""
     on = (part["flags"] & int(StateFlag.MOTOR_ENABLED)) != 0
     t = part["device_us"] * 1e-6
     answered = np.flatnonzero(part["answer_flags"] >= 0)  # of several at once only the newest is
@@ -74,4 +75,4 @@ def _held(part: NDArray[np.void]) -> NDArray[np.bool_]:
         return np.asarray(on)
     before = np.searchsorted(changes, np.arange(len(t)), side="right") - 1
     since = np.where(before >= 0, t - t[changes[np.maximum(before, 0)]], np.inf)
-    return np.asarray(on & (since > HELD_S))
+    return np.asarray(on & (since > held_s))

@@ -12,6 +12,7 @@ from scissorcal.device.probe.hand_pass import (
     HandPass,
     hand_pass,
     judge_hand_pass,
+    let_go,
     virtual_hand,
 )
 from scissorcal.device.probe.idle import Idle, idle, jitters, observed_step
@@ -230,8 +231,9 @@ def _by_hand(talk: Talk, finding: _Finding, recipe: Recipe, confirm: Confirm | N
     assert confirm is not None
     passed = hand_pass(talk, confirm)
     finding.add(judge_hand_pass(passed, identity), facts=_of_hand(passed, identity))
-    with talk.paused():
-        confirm(request_of(recipe, identity))
+    fell = let_go(talk, confirm, request_of(recipe, identity))
+    if fell is not None and passed.alive:
+        finding.take(Outcome((fell,), fell.why))
     return passed.alive
 
 
@@ -286,7 +288,9 @@ def _push(
     zero = finding.result.torque_zero_Nm
     whole = talk.heard()
     parts = [whole[one.begin : one.end] for one in swung.pushes]
-    answered = follow(parts, zero.mean if zero is not None else 0.0)
+    answered = follow(
+        parts, zero.mean if zero is not None else 0.0, (lag_ticks + 1.0) * talk.tick_s
+    )
     facts = {
         "breakaway_Nm": found.effort,
         "breakaway_opening_Nm": abs(found.pushed.effort) if found.pushed else math.nan,

@@ -176,19 +176,18 @@ def _pushed(
             break
         if state.flags & StateFlag.FAULT_LATCHED:
             break
-    rested = yield from _rests(talk, axis, hold, start)
+    rested = yield from _rests(talk, axis, hold, start, state)
     return start_sequence, rested
 
 
-def _rests(talk: Talk, axis: Axis, hold: float, start: float) -> Stage[bool]:
+def _rests(talk: Talk, axis: Axis, hold: float, start: float, state: State) -> Stage[bool]:
     """Wait until the axis rests; False where it does not within LONGEST_REST_S."""
     ended = since = talk.sequence
     low = high = None
     needed = REST_S
     while talk.sequence - ended < talk.ticks(LONGEST_REST_S):
-        state = yield RELEASE if hold == 0.0 else axis.answer(hold)
-        if state.flags & StateFlag.FAULT_LATCHED:
-            return False
+        answer = RELEASE if hold == 0.0 else axis.answer(hold)
+        state = yield answer._replace(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
         place = axis.place(state)
         low = place if low is None else min(low, place)
         high = place if high is None else max(high, place)

@@ -24,6 +24,9 @@ PAIRS = (1.1, 1.3, 1.55)
 VOTES = 2
 CALM = 0.5
 """Share of the rate that means motion times 1 / 0.4 up to which the efforts of the pairs grow."""
+LARGEST_IMPULSE_NM_S = 2.25e-3
+"""N m s of a push: it brings blades of 3e-3 kg m^2 to 0.75 rad/s. What does not move by it sticks,
+and needs a larger torque, not a longer one."""
 LEAST_INERTIA = 5e-5
 """kg m^2 of the opening: two halves of 10 g at 70 mm, smaller than any scissors with finger rings.
 What bounds the rate of blades that an encoder does not show."""
@@ -84,6 +87,9 @@ def search(talk: Talk, axis: Axis, *, alive: bool) -> Search:
     signs = _away_first(talk, axis)
     while effort <= axis.effort:
         for seconds in PUSH_S:
+            too_long = axis.name == "opening" and effort * seconds > LARGEST_IMPULSE_NM_S
+            if too_long and seconds > PUSH_S[0]:
+                continue
             if not alive and _could_reach(talk, axis, effort, seconds) > axis.rate:
                 if seconds == PUSH_S[0]:
                     return Search(found[1], found[-1], tuple(pushes), effort)

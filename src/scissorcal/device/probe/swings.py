@@ -82,11 +82,12 @@ def known(fit: JointFit, strongest: float) -> bool:
 def pushes_of(talk: Talk, pushed: list[Pushed] | tuple[Pushed, ...], least: float) -> list[Push]:
     """What was heard of each push of ``least`` and more that nothing disturbed, for the fit."""
     whole = talk.heard()
-    stood = [True, *(one.rested for one in pushed[:-1])]
+    kept = [not one.disturbed and abs(one.effort) >= least for one in pushed]
+    stood = [True, *(one.rested or not known for one, known in zip(pushed, kept, strict=True))]
     return [
         _push_of(whole[one.begin : one.end], talk.tick_s, rested)
-        for one, rested in zip(pushed, stood, strict=True)
-        if not one.disturbed and abs(one.effort) >= least
+        for one, rested, known in zip(pushed, stood[:-1], kept, strict=True)
+        if known
     ]
 
 
