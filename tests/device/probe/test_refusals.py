@@ -147,12 +147,12 @@ def test_motor_sign_cures_a_reversed_motor_whose_torque_is_measured_as_it_acts()
 
 def test_nobody_who_moves_the_blades_leaves_the_encoder_unchecked() -> None:
     """Pushes then stay so small that light blades behind a dead encoder keep within the bound."""
-    device = StrangeDevice(Faults(dry_Nm=0.008), seed=1)
+    device = StrangeDevice(Faults(dry_Nm=0.003, inertia=1e-4), seed=1)
     result = probe(VirtualPort(device), RECIPE, confirm=lambda request: None)
     verdict = next(item for item in result.verdicts if item.check == "count scale")
     assert (verdict.status, verdict.value) == ("not_evaluated", None)
     assert "either nobody moved them or the encoder is stuck" in verdict.why
-    dead = StrangeDevice(Faults(dry_Nm=0.008, inertia=1e-4, encoder_stuck_at_s=0.0), seed=1)
+    dead = StrangeDevice(Faults(dry_Nm=0.003, inertia=1e-4, encoder_stuck_at_s=0.0), seed=1)
     with pytest.raises(ProbeRefusedError, match="Not determined: no push up to"):
         probe(VirtualPort(dead), RECIPE, confirm=lambda request: None)
     assert dead.largest_rate < LARGEST_RATE

@@ -163,6 +163,7 @@ def _stages(
     expiry_ms = 1e3 * max(PUSH_BRAKE_S, PUSH_BRAKE_TICKS * talk.tick_s)
     with talk.braking_after(min(expiry_ms, recipe.rig.line.brake_after_ms)):
         tell(0.35, "pushes that grow until the blades move")
+        talk.pushing = True
         _push(talk, finding, quiet, recipe, hand=hand, tell=tell)
         if _pushes_sledge(identity):
             tell(0.85, "small pushes on the sledge")

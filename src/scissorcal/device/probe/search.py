@@ -99,9 +99,9 @@ def search(talk: Talk, axis: Axis, *, alive: bool) -> Search:
                     continue
                 one = push(talk, axis, sign * effort, seconds)
                 pushes.append(one)
+                alive = alive or abs(one.went) >= axis.seen
                 if not one.disturbed and one.moved(axis):
                     found[sign] = one
-                    alive = True
                     if found[-sign] is None:
                         pushes += _make_room(talk, axis, one)
         if found[1] is not None and found[-1] is not None:

@@ -100,6 +100,8 @@ class Talk(AbstractContextManager["Talk"]):
         """Ticks from a state to what its answer does, as `lag` found them."""
         self.expiry_s = 0.01
         """Silence after which the device brakes; as set."""
+        self.pushing = False
+        """Whether the motors have begun to push: sensors are then watched between pushes, too."""
         self.rate_over_s = RATE_OVER_S
         """Time over which rates are taken; longer for an encoder that jitters."""
         self._sign = motor_sign
@@ -145,6 +147,8 @@ class Talk(AbstractContextManager["Talk"]):
             while True:
                 state = self._next_state()
                 answer = stage.send(state)
+                if self.pushing or (answer is not None and answer.enable):
+                    self._check(state)
                 if answer is not None and answer.enable:
                     self._guard(state, free)
                 self._answer(state, answer)
@@ -291,13 +295,16 @@ class Talk(AbstractContextManager["Talk"]):
         else:
             self._frame = encode(command)
 
-    def _guard(self, state: State, free: bool) -> None:
-        """Raise where the blades or the sledge move more than the probe may move them."""
-        place = (state.opening, state.advance)
+    def _check(self, state: State) -> None:
+        """Raise where sensors or clock show what no motor may run with."""
         wrong = self._what_is_wrong(state)
         if wrong:
             self.release()
             raise RunawayError(f"{self.name}: {wrong} The motors are off.")
+
+    def _guard(self, state: State, free: bool) -> None:
+        """Raise where the blades or the sledge move more than the probe may move them."""
+        place = (state.opening, state.advance)
         if self._origin is None:
             self._origin = place
         if state.flags & StateFlag.FAULT_LATCHED:
