@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -83,16 +84,16 @@ def test_poles_and_sag_are_those_of_a_simulated_loop(delay_s: float) -> None:
     assert np.abs(steps_of(axis, swinging, 400)).max() > 10.0 * sag(axis, gains)
 
 
-@settings(max_examples=10)
-@given(
-    delay_ms=st.floats(0.0, 6.0),
-    tick_us=st.sampled_from([250, 500, 1000, 2000]),
-    inertia=st.floats(5e-5, 1e-3),
-    size=st.floats(0.05, 0.6),
-)
-def test_margins_are_where_poles_reach_the_unit_circle(
-    delay_ms: float, tick_us: int, inertia: float, size: float
-) -> None:
+AXES = {
+    "delay_ms": st.floats(0.0, 6.0),
+    "tick_us": st.sampled_from([250, 500, 1000, 2000]),
+    "inertia": st.floats(5e-5, 1e-3),
+    "size": st.floats(0.05, 0.6),
+}
+
+
+def compare_margins(delay_ms: float, tick_us: int, inertia: float, size: float) -> None:
+    """Margins are where poles reach the unit circle."""
     axis = replace(AXIS, delay_s=1e-3 * delay_ms, tick_s=1e-6 * tick_us, inertia=inertia)
     omega = size / (axis.delay_s + 1.5 * axis.tick_s + 1.3e-3)
     shape = Gains(omega / 3.0, 1.0, omega**2 / 40.0)
@@ -116,6 +117,19 @@ def test_margins_are_where_poles_reach_the_unit_circle(
     assert grown
     assert fallen
     assert not (settles(1.1 * margins.gain) and settles(0.9 / margins.gain))
+
+
+@settings(max_examples=10)
+@given(**AXES)
+def test_margins_are_where_poles_reach_the_unit_circle(**of: Any) -> None:
+    compare_margins(**of)
+
+
+@pytest.mark.slow
+@settings(max_examples=25)
+@given(**AXES)
+def test_margins_of_more_axes_are_where_poles_reach_the_unit_circle(**of: Any) -> None:
+    compare_margins(**of)
 
 
 @pytest.mark.parametrize(
