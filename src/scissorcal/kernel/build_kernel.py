@@ -25,6 +25,7 @@ HEADERS = (
     "sc_plate.h",
     "sc_pieces.h",
     "sc_lag.h",
+    "sc_stamp.h",
     "sc_watch.h",
     "sc_servo.h",
     "sc_block.h",

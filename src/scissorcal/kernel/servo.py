@@ -27,8 +27,8 @@ SAMPLE_DTYPE = dtype_of("sc_sample")
 
 U32 = 0xFFFFFFFF
 
-STUCK_FRAMES = int(lib.SC_STUCK_UNTIL_STOP)
-"""States in a row at which the device's clock stands still, until it is taken for stuck."""
+STUCK_FRAMES = int(lib.SC_RECENT_STATES)
+"""The newest states over which the servo counts what is wrong with clock and places."""
 LEAP_RATES = int(lib.SC_LEAP_RATES)
 """Times the limit of the rate: no motion between two states is taken for one if it is faster."""
 

@@ -74,11 +74,14 @@ _STOP_SENTENCES = {
         "recipe's limits and rig.control."
     ),
     StopReason.IMPLAUSIBLE: (
-        "4 frames in a row had an opening beyond the device's stops, or an opening or advance that "
-        "was not finite or leapt farther than any motion; check the encoders and their cables."
+        "4 of the last 20 frames had an opening beyond the device's stops, or an opening or advance "
+        "that was not finite or leapt farther than any motion; check the encoders and their cables."
     ),
     StopReason.DEVICE_CLOCK: (
-        "The device's clock (device_us) stood still for 20 frames; restart the device."
+        "The device's clock (device_us) contradicted its sequence numbers in 8 of the last 20 "
+        "frames: it stood still, counted down or leapt, or the sequence leapt. device_us must grow "
+        "by tick_us with each number; restart the device, and correct its firmware if that does "
+        "not help."
     ),
     StopReason.OVERSPEED: (
         "Above 30 rad/s (or 5 m/s): the blades moved faster than any capture or hand moves "
@@ -165,7 +168,7 @@ _STOP_SENTENCES = {
         "tick_us."
     ),
     StopReason.UNREADABLE: (
-        "20 frames in a row had a motor torque or handle force that was not finite. Check the "
+        "8 of the last 20 frames had a motor torque or handle force that was not finite. Check the "
         "sensors and their cables."
     ),
 }

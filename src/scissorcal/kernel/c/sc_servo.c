@@ -205,27 +205,6 @@ static way way_since(const sc_servo_config *config, sc_servo *servo, const sc_mo
     return since;
 }
 
-static void count_frame(sc_servo *servo, const sc_state *state)
-{
-    const uint32_t passed = state->sequence - servo->sequence;
-    servo->frames++;
-    if (servo->started && passed > 1 && passed < 0x80000000u) {
-        servo->misses += passed - 1;
-        servo->sample.flags |= SC_SAMPLE_AFTER_GAP;
-    } else if (servo->started && passed >= 0x80000000u) {
-        sc_servo_stop(servo, SC_STOP_RESTARTED); /* the reference counts by sequence numbers */
-    }
-    servo->sequence = state->sequence;
-    servo->started = 1;
-    if (servo->begins) {
-        servo->engaged_at = servo->sequence;
-        servo->begins = 0;
-    }
-    if (state->flags & SC_STATE_TORQUE_SATURATED) {
-        servo->device_saturated++;
-    }
-}
-
 static void begin_sample(sc_servo *servo, const sc_state *state)
 {
     sc_sample *sample = &servo->sample;
@@ -321,23 +300,25 @@ static int step(const sc_servo_config *config, const sc_model *model,
         repeat_command(config, servo, command);
         return 0;
     }
-    const uint32_t passed_us = sc_servo_time_since(config, servo, state);
     begin_sample(servo, state);
-    count_frame(servo, state);
+    sc_servo_count_frame(config, servo, state);
     servo->stale_us = 0;
     sc_lag_state(&servo->lag, servo->mode, state->sequence);
-    const int valid = sc_servo_is_plausible(config, servo, state, passed_us);
+    const int valid = sc_servo_is_plausible(config, servo, state);
     way since = {0.0, 0.0, 0.0, 0.0f};
     if (valid) {
         const sc_motion before = servo->motion;
-        float dt = sc_motion_update(&servo->motion, config->rate_cutoff_Hz, config->tick_us,
-                              state->device_us, state->opening, state->advance);
+        float dt = sc_motion_update(&servo->motion, config->rate_cutoff_Hz,
+                                    servo->unused_us + servo->stamps.passed_us, state->opening,
+                                    state->advance);
+        servo->unused_us = 0;
         dt = fminf(dt, LONGEST_TICK_S); /* a gap neither ends the ramp nor fills an integral */
         since = way_since(config, servo, &before, state, dt);
         servo->engaged_s += dt;
         sc_servo_move_plate(config, servo, dt);
         sc_servo_watch_speed(config, servo);
     } else {
+        sc_servo_pass_unused(servo);
         servo->invalid_frames++;
         servo->sample.flags |= SC_SAMPLE_INVALID;
     }

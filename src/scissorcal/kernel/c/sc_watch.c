@@ -1,4 +1,5 @@
 #include "sc_watch.h"
+#include "sc_stamp.h"
 
 #include <math.h>
 
@@ -24,10 +25,11 @@ static const float REVERSED_ABOVE = -3.0f; /* ... and this has the wrong sign an
 static const float AT_LIMIT = 0.999f;
 static const float BRIEFLY = 0.99f;
 static const float RESTS = 0.05f; /* rad/s; motors that are off and turn give a torque */
-static const uint32_t CLOCK_US = 250000;  /* by ticks: 1 us of jitter is 4 ppm of it */
+static const int64_t CLOCK_US = 250000;  /* by ticks: 1 us of jitter is 4 ppm of it */
 static const uint32_t HOST_US = 2000000;  /* by this computer's clock: 20 ms of jitter are 1 % */
 static const uint32_t OFF_UNTIL_STOP = 3; /* windows in a row */
 static const uint32_t STATES_UNTIL_STOP = 20; /* in a row */
+static const uint32_t UNREADABLE_UNTIL_STOP = 8; /* among SC_RECENT_STATES, as for stamps */
 
 enum { LONGEST_US = 0x40000000 };
 
@@ -265,52 +267,39 @@ static int compare_torques(const sc_watch_config *config, sc_watch *watch, const
                                                                            : SC_WATCH_NOTHING;
 }
 
-static void begin_clock(sc_watch *watch, const sc_watch_input *in)
-{
-    watch->has_clock = 1;
-    watch->clock_sequence = in->sequence;
-    watch->clock_us = watch->host_from_us = in->device_us;
-    watch->host_us = watch->off_ticks = watch->off_host = 0;
-}
-
 /* Count the windows in a row in which a clock is off by more than allowed. */
-static int is_off(sc_watch *watch, uint32_t clock_us, uint32_t passed_us, float allowed,
+static int is_off(sc_watch *watch, int64_t clock_us, int64_t passed_us, float allowed,
                   uint32_t *windows)
 {
     if (!(allowed > 0.0f)) {
         return 0;
     }
-    const float share = fabsf((float)clock_us / (float)passed_us - 1.0f) / allowed;
+    const float share = fabsf((float)(clock_us - passed_us) / (float)passed_us) / allowed;
     *windows = share >= 1.0f ? *windows + 1 : 0;
     return over_for_long(watch, SC_WATCH_CLOCK, share, *windows >= OFF_UNTIL_STOP);
 }
 
-/* Time by the device's clock against what its sequence numbers, or this computer, say passed. A unit
- * that is wrong shows within a few states. */
+/* Time by the device's clock against what its sequence numbers, or this computer, say passed. Every
+ * stamp counts, also one that no rate is taken from. */
 static int clock_is_off(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
 {
-    const uint32_t ticks = in->sequence - watch->clock_sequence;
-    const uint32_t clock_us = in->device_us - watch->clock_us;
-    if (!watch->has_clock || ticks >= LONGEST_US / in->tick_us || clock_us >= LONGEST_US) {
-        begin_clock(watch, in);
-        return 0;
-    }
-    const uint32_t ticks_us = ticks * in->tick_us;
-    if (config->clock_share > 0.0f && ticks >= STATES_UNTIL_STOP &&
-        (clock_us > 2 * ticks_us || 2 * clock_us < ticks_us)) {
-        keep(watch, SC_WATCH_CLOCK, 1.0f);
-        return 1;
-    }
     int off = 0;
-    if (ticks_us >= CLOCK_US) {
-        off = is_off(watch, clock_us, ticks_us, config->clock_share, &watch->off_ticks);
-        watch->clock_sequence = in->sequence;
-        watch->clock_us = in->device_us;
+    if (!watch->has_clock) {
+        watch->has_clock = 1;
+        watch->host_us = 0;
+    }
+    watch->ticks_us += in->ticks_us;
+    watch->clock_us += in->stated_us;
+    watch->host_clock_us += in->stated_us;
+    if (watch->ticks_us >= CLOCK_US) {
+        off = is_off(watch, watch->clock_us, watch->ticks_us, config->clock_share,
+                     &watch->off_ticks);
+        watch->ticks_us = watch->clock_us = 0;
     }
     if (watch->host_us >= HOST_US) {
-        off |= is_off(watch, in->device_us - watch->host_from_us, watch->host_us,
-                      config->host_clock_share, &watch->off_host);
-        watch->host_from_us = in->device_us;
+        off |= is_off(watch, watch->host_clock_us, watch->host_us, config->host_clock_share,
+                      &watch->off_host);
+        watch->host_clock_us = 0;
         watch->host_us = 0;
     }
     return off;
@@ -320,9 +309,9 @@ static int unreadable(const sc_watch_config *config, sc_watch *watch, const sc_w
 {
     const int readable = isfinite(in->measured) &&
                          (isfinite(in->handle_force) || !(config->handle_radius > 0.0f));
-    watch->unreadable = readable ? 0 : watch->unreadable + 1;
-    return config->ratio_torque > 0.0f && over(watch, SC_WATCH_UNREADABLE, (float)watch->unreadable,
-                                               (float)STATES_UNTIL_STOP);
+    const uint32_t count = sc_count_recent(&watch->unreadable, !readable);
+    return config->ratio_torque > 0.0f &&
+           over(watch, SC_WATCH_UNREADABLE, (float)count, (float)UNREADABLE_UNTIL_STOP);
 }
 
 /* Begin again what counts over a time in which motors drive. */

@@ -70,9 +70,8 @@ typedef struct {
     float aim_opening;   /* of the reference, as its rate and the advance */
     float aim_rate;
     float aim_advance;
-    uint32_t sequence;
-    uint32_t device_us;
-    uint32_t tick_us;
+    uint32_t ticks_us;   /* ticks since the last state, usable or not ... */
+    int32_t stated_us;   /* ... and what the device's clock says to that */
 } sc_watch_input;
 
 /* Of one axis: since when its effort has one sign, and how fast it was once that could act. */
@@ -103,13 +102,13 @@ typedef struct {
     float sum_cc, sum_cm;   /* of smooth torques, forgetting */
     float differs_s;
     int32_t has_clock;
-    uint32_t clock_sequence;
-    uint32_t clock_us;
+    int64_t ticks_us;       /* of the window by ticks ... */
+    int64_t clock_us;       /* ... and the device's clock over it */
     uint32_t off_ticks;     /* windows in a row in which the clock was off its ticks */
-    uint32_t host_from_us;
-    uint32_t host_us;       /* this computer's time since */
+    int64_t host_clock_us;  /* the device's clock over the window by this computer's ... */
+    uint32_t host_us;       /* ... time */
     uint32_t off_host;      /* windows in a row in which it was off this computer's */
-    uint32_t unreadable;    /* states in a row */
+    uint32_t unreadable;    /* history of states: sc_count_recent */
 } sc_watch;
 
 /* 1 if every threshold is a finite number >= 0. */
