@@ -74,8 +74,9 @@ _STOP_SENTENCES = {
         "recipe's limits and rig.control."
     ),
     StopReason.IMPLAUSIBLE: (
-        "4 of the last 20 frames had an opening beyond the device's stops, or an opening or advance "
-        "that was not finite or leapt farther than any motion; check the encoders and their cables."
+        "4 of the last 20 frames had an opening beyond the device's stops, or an opening or "
+        "advance that was not finite or leapt farther than any motion; check the encoders and "
+        "their cables."
     ),
     StopReason.DEVICE_CLOCK: (
         "The device's clock (device_us) contradicted its sequence numbers in 8 of the last 20 "
