@@ -179,11 +179,15 @@ def test_tracking_that_is_lost_stops() -> None:
     servo = Servo(None, replace(CONFIG, opening_error_limit=0.2))
     servo.set_reference([0.6], [0.0], [-0.02], [0])
     servo.engage(Mode.TRACK)
-    servo.step(state(1, 0.42))
+    for tick in range(1, 100):
+        held = servo.step(state(tick, 0.42)).torque
     assert servo.stop_reason is StopReason.NONE
-    command = servo.step(state(2, 0.395))
+    torques = [servo.step(state(tick, 0.395)).torque for tick in range(100, 400)]
     assert servo.stop_reason is StopReason.TRACKING_LOST
-    assert command == Command(0, 2, 0.0, 0.0)
+    assert held > 0.4
+    assert np.all(np.diff(torques) <= 0.0)
+    assert torques[125] == pytest.approx(0.5 * held, rel=0.05), "half of it after 0.125 s"
+    assert torques[251:] == [0.0] * 49
 
 
 def test_the_stop_latches() -> None:

@@ -26,6 +26,7 @@ HEADERS = (
     "sc_pieces.h",
     "sc_lag.h",
     "sc_stamp.h",
+    "sc_swing.h",
     "sc_watch.h",
     "sc_servo.h",
     "sc_block.h",

@@ -38,6 +38,7 @@ class StopReason(IntEnum):
     UNREADABLE = 40
     RUNAWAY_ADVANCE = 41
     STOP_ELSEWHERE = 42
+    HELD_UP = 43
 
     @property
     def sentence(self) -> str:
@@ -130,6 +131,11 @@ _STOP_SENTENCES = {
         "gains or the rendered stiffness are too high for it, or the encoder is noisy. Run "
         "'scissorcal device doctor' to find what is late, or lower the gains in the recipe's "
         "rig.control."
+    ),
+    StopReason.HELD_UP: (
+        "The blades swung to and fro because commands came late: this computer was held up by "
+        "other work, or the device held its states back. Close programs that load this computer, "
+        "then start again; 'scissorcal device doctor' measures how late answers are."
     ),
     StopReason.RUNAWAY: (
         "The blades sped up against the torque of their motor: motor or encoder has the wrong "

@@ -1,4 +1,5 @@
 #include "sc_servo.h"
+#include "sc_servo_end.h"
 #include "sc_servo_plate.h"
 #include "sc_servo_control.h"
 #include "sc_servo_watch.h"
@@ -36,6 +37,7 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
     return is_level(config->torque_limit) && is_level(config->torque_slew) &&
            is_level(config->force_limit) && is_level(config->force_slew) &&
            is_level(config->ramp_s) && is_level(config->damping_Nm_s_per_rad) &&
+           is_level(config->let_go_damping_Nm_s_per_rad) &&
            is_level(config->rate_cutoff_Hz) && is_level(config->opening_kp) &&
            is_level(config->opening_kd) && is_level(config->opening_ki) &&
            is_level(config->advance_kp) && is_level(config->advance_kd) &&
@@ -107,7 +109,7 @@ static effort track(const sc_servo_config *config, const sc_reference *reference
     const float advance_error = reference->advance[at] - motion->advance;
     if (fabsf(opening_error) > config->opening_error_limit ||
         fabsf(advance_error) > config->advance_error_limit) {
-        sc_servo_stop(servo, SC_STOP_TRACKING_LOST);
+        sc_servo_let_go(servo, SC_STOP_TRACKING_LOST);
         return wanted;
     }
     const sc_pid_gains opening = {config->opening_kp, config->opening_kd, config->opening_ki,
@@ -315,6 +317,7 @@ static int step(const sc_servo_config *config, const sc_model *model,
         dt = fminf(dt, LONGEST_TICK_S); /* a gap neither ends the ramp nor fills an integral */
         since = way_since(config, servo, &before, state, dt);
         servo->engaged_s += dt;
+        sc_servo_follow_mean(servo, dt);
         sc_servo_move_plate(config, servo, dt);
         sc_servo_watch_speed(config, servo);
     } else {
@@ -337,8 +340,7 @@ static int step(const sc_servo_config *config, const sc_model *model,
     }
     sc_servo_watch_state(config, servo, state, since.dt, valid);
     if (servo->ending) {
-        const effort none = {0.0f, 0.0f};
-        wanted = none;
+        sc_servo_ending(config, servo, &wanted.torque, &wanted.force);
         sc_servo_finish_ending(servo, valid && !faulty && servo->mode != SC_MODE_IDLE);
     }
     answer(config, servo, valid, faulty, wanted, command);

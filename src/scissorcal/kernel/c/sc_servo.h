@@ -77,6 +77,7 @@ typedef struct {
     float force_slew;          /* [N/s] */
     float ramp_s;              /* from engaging RENDER to its full force */
     float damping_Nm_s_per_rad; /* of DAMP */
+    float let_go_damping_Nm_s_per_rad; /* while the servo ends gently */
     float rate_cutoff_Hz;      /* of the rate estimator; 0: none */
     float opening_kp, opening_kd, opening_ki;
     float advance_kp, advance_kd, advance_ki;
@@ -162,6 +163,9 @@ typedef struct {
     uint32_t stop_reason;
     uint32_t ending;     /* reason for which torque and force fall to zero before it stops, or 0 */
     uint32_t ending_us;
+    uint32_t fall_us;    /* over which they fall; 0: as fast as the slews let them */
+    float held_torque, held_force; /* from which they fall */
+    float mean_torque, mean_force; /* of the commands that were sent lately */
     uint32_t sequence;
     uint32_t begins;     /* the next frame is the first of its mode */
     uint32_t engaged_at; /* sequence at which the mode engaged, less the time in faults */

@@ -1,4 +1,5 @@
 #include "sc_servo_watch.h"
+#include "sc_servo_end.h"
 
 #include <math.h>
 #include <string.h>
@@ -8,24 +9,8 @@ static const float WIDEST_OPENING = 3.14159274f; /* rad; no scissors open wider 
 enum {
     SILENCE_UNTIL_STOP = 5,
     LONGEST_US = 0x40000000,
-    IMPLAUSIBLE_UNTIL_STOP = 4, /* among SC_RECENT_STATES: in a row, or every fifth one */
-    LONGEST_END_US = 100000
+    IMPLAUSIBLE_UNTIL_STOP = 4 /* among SC_RECENT_STATES: in a row, or every fifth one */
 };
-
-void sc_servo_stop(sc_servo *servo, uint32_t reason)
-{
-    if (servo->stop_reason == SC_STOP_NONE) {
-        servo->stop_reason = servo->ending != SC_STOP_NONE ? servo->ending : reason;
-    }
-}
-
-void sc_servo_end(sc_servo *servo, uint32_t reason)
-{
-    if (servo->stop_reason == SC_STOP_NONE && servo->ending == SC_STOP_NONE) {
-        servo->ending = reason;
-        servo->ending_us = 0;
-    }
-}
 
 void sc_servo_engage(sc_servo *servo, uint32_t mode)
 {
@@ -102,10 +87,7 @@ void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_se
     }
     sc_watch_pass(&servo->watch, elapsed_us);
     sc_plate_pass(&servo->plate, elapsed_us);
-    servo->ending_us = longer(servo->ending_us, elapsed_us);
-    if (servo->ending && servo->ending_us >= LONGEST_END_US) {
-        sc_servo_stop(servo, servo->ending); /* also where the device only repeats itself */
-    }
+    sc_servo_pass_ending(servo, elapsed_us);
     servo->stale_us = longer(servo->stale_us, elapsed_us);
     servo->slew_us = longer(servo->slew_us, elapsed_us);
     if (servo->slew_us > config->tick_us) {
@@ -217,6 +199,7 @@ static sc_watch_input watched(const sc_servo_config *config, const sc_servo *ser
         servo->aim_opening,
         servo->aim_rate,
         servo->aim_advance,
+        (float)servo->lag.late,
         servo->stamps.ticks * config->tick_us,
         servo->stamps.stated_us};
     return input;
@@ -227,17 +210,20 @@ void sc_servo_watch_state(const sc_servo_config *config, sc_servo *servo, const 
 {
     const sc_watch_input input = watched(config, servo, state, time_s, usable);
     const int seen = sc_watch_take(&config->watch, &servo->watch, &input);
-    if (seen == SC_WATCH_RUNAWAY || seen == SC_WATCH_RUNAWAY_ADVANCE || seen == SC_WATCH_CLOCK) {
-        sc_servo_stop(servo, SC_STOP_WATCHED + (uint32_t)seen);
-    } else if (seen != SC_WATCH_NOTHING) {
-        sc_servo_end(servo, SC_STOP_WATCHED + (uint32_t)seen);
-    }
-}
-
-void sc_servo_finish_ending(sc_servo *servo, int driven)
-{
-    const int let_go = servo->sent_torque == 0.0f && servo->sent_force == 0.0f;
-    if (servo->ending && (!driven || let_go)) {
-        sc_servo_stop(servo, servo->ending);
+    const uint32_t reason = SC_STOP_WATCHED + (uint32_t)seen;
+    switch (seen) {
+    case SC_WATCH_NOTHING:
+        break;
+    case SC_WATCH_SWING:
+    case SC_WATCH_HELD_UP:
+        sc_servo_let_swings_go(servo, reason);
+        break;
+    case SC_WATCH_HELD:
+    case SC_WATCH_DIFFERS:
+    case SC_WATCH_UNREADABLE:
+        sc_servo_let_go(servo, reason);
+        break;
+    default: /* with a motor, an encoder or a clock that is wrong torque and damping may drive */
+        sc_servo_stop(servo, reason);
     }
 }

@@ -25,12 +25,9 @@ void sc_servo_pass_unused(sc_servo *servo);
 /* Stop where the blades move faster than allowed while a mode drives them. */
 void sc_servo_watch_speed(const sc_servo_config *config, sc_servo *servo);
 
-/* Have the watches take a state, after the command for it is known; what they see ends the servo. A
- * motor that turns the wrong way stops it at once. */
+/* Have the watches take a state, after the command for it is known; what they see ends the servo: at
+ * once where torque and damping may drive the blades, else gently. */
 void sc_servo_watch_state(const sc_servo_config *config, sc_servo *servo, const sc_state *state,
                           float time_s, int usable);
-
-/* Stop a servo that is ending, once nothing is left to let go of. */
-void sc_servo_finish_ending(sc_servo *servo, int driven);
 
 #endif

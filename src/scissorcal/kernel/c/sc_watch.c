@@ -3,12 +3,6 @@
 
 #include <math.h>
 
-/* A limit cycle has repeated itself three times over; a jolt has not. One that grows to ten times the
- * amplitude has shown itself after two halves. */
-static const uint32_t SWINGS_UNTIL_STOP = 6;
-static const float WIDE = 4.0f;  /* times the amplitude: such a half of a swing counts as two ... */
-static const float WILD = 10.0f; /* ... and such a one as three */
-static const float NOISE_SHARE = 0.25f; /* of a swing's amplitude, within which it has no sign */
 /* An effort acts on the rate after wire, motor and filter: in less than this at delays that can be
  * controlled. Blades that speed up against it from then on are driven the wrong way. */
 static const float EFFORT_ACTS_S = 0.008f;
@@ -41,7 +35,8 @@ int sc_watch_config_is_sound(const sc_watch_config *config)
         config->rest_torque,  config->rest_share,   config->jitter_s,
         config->least_ratio,  config->most_ratio,   config->ratio_torque,     config->clock_share,
         config->host_clock_share, config->handle_radius, config->runaway_speed,
-        config->stop_margin};
+        config->stop_margin, config->swing_inertia,
+        config->swing_delay_ticks, config->held_up_ticks};
     for (unsigned i = 0; i < sizeof levels / sizeof levels[0]; i++) {
         if (!isfinite(levels[i]) || levels[i] < 0.0f) {
             return 0;
@@ -93,44 +88,21 @@ static int held(const sc_watch_config *config, sc_watch *watch, const sc_watch_i
     return over(watch, SC_WATCH_HELD, watch->held_s, config->held_s);
 }
 
-static void begin_half_swing(sc_watch *watch, int32_t sign, float torque)
-{
-    watch->swing_sign = sign;
-    watch->swing_s = 0.0f;
-    watch->swing_peak = 0.0f;
-    watch->swing_low = watch->swing_high = torque;
-}
-
-static uint32_t weight(float amplitude)
-{
-    return amplitude >= WILD ? 3 : amplitude >= WIDE ? 2 : 1;
-}
-
-/* Halves of swings in a row that are fast, wide and change the torque. The rate is taken from the
- * reference's, where there is one. */
 static int swings(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
 {
-    const float rate = in->opening_rate - (in->tracking ? in->aim_rate : 0.0f);
-    const float noise = NOISE_SHARE * config->swing_rate;
-    if (!(config->swing_rate > 0.0f && config->swing_Hz > 0.0f)) {
-        return 0;
+    const sc_swing_config level = {config->swing_rate,    config->swing_torque,
+                                   config->swing_Hz,      config->swing_inertia,
+                                   config->swing_delay_ticks, config->held_up_ticks};
+    const sc_swing_input now = {in->time_s, in->opening, in->opening_rate,
+                                in->tracking ? in->aim_rate : 0.0f, in->torque, in->late};
+    float share;
+    const int found = sc_swing_take(&level, &watch->swing, &now, &share);
+    if (found == SC_SWING_HELD_UP) {
+        keep(watch, SC_WATCH_HELD_UP, share);
+        return SC_WATCH_HELD_UP;
     }
-    if (watch->swing_sign == 0 || (float)watch->swing_sign * rate < -noise) {
-        const int counts = watch->swing_sign != 0 &&
-                           watch->swing_s * 2.0f * config->swing_Hz <= 1.0f &&
-                           watch->swing_peak >= config->swing_rate &&
-                           watch->swing_high - watch->swing_low >= config->swing_torque;
-        watch->swings = counts ? watch->swings + weight(watch->swing_peak / config->swing_rate) : 0;
-        begin_half_swing(watch, fabsf(rate) <= noise ? 0 : rate > 0.0f ? 1 : -1, in->torque);
-    }
-    watch->swing_s += in->time_s;
-    watch->swing_peak = fmaxf(watch->swing_peak, fabsf(rate));
-    watch->swing_low = fminf(watch->swing_low, in->torque);
-    watch->swing_high = fmaxf(watch->swing_high, in->torque);
-    if (watch->swing_s * 2.0f * config->swing_Hz > 1.0f) {
-        watch->swings = 0;
-    }
-    return over(watch, SC_WATCH_SWING, (float)watch->swings, (float)SWINGS_UNTIL_STOP);
+    keep(watch, SC_WATCH_SWING, share);
+    return found == SC_SWING_FED ? SC_WATCH_SWING : SC_WATCH_NOTHING;
 }
 
 /* How fast an axis is against an effort of one sign, and got since that effort could act. */
@@ -318,8 +290,7 @@ static int unreadable(const sc_watch_config *config, sc_watch *watch, const sc_w
 static void rest(sc_watch *watch)
 {
     watch->held_s = 0.0f;
-    watch->swing_sign = 0;
-    watch->swings = 0;
+    sc_swing_rest(&watch->swing);
     watch->torque.sign = watch->force.sign = 0;
     watch->has_still = 0;
     watch->smooth_torque = watch->smooth_measured = 0.0f;
@@ -350,8 +321,9 @@ int sc_watch_take(const sc_watch_config *config, sc_watch *watch, const sc_watch
     if (is_elsewhere(config, watch, in)) {
         return SC_WATCH_STOP;
     }
-    if (swings(config, watch, in)) {
-        return SC_WATCH_SWING;
+    const int swinging = swings(config, watch, in);
+    if (swinging != SC_WATCH_NOTHING) {
+        return swinging;
     }
     const int differing = compare_torques(config, watch, in);
     if (differing != SC_WATCH_NOTHING) {
