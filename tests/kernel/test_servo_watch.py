@@ -361,7 +361,7 @@ def test_a_watch_needs_sound_thresholds() -> None:
 
 
 def test_what_is_seen_while_it_ends_does_not_take_the_first_reasons_place() -> None:
-    """A measured torque that is no number ends it gently, an encoder that fails meanwhile at once."""
+    """A torque that is no number ends it gently, an encoder that fails meanwhile at once."""
     servo, joint = tracking(), Joint(measured=lambda torque: math.nan)
     joint.run(servo, 60)
     assert servo.stop_reason is StopReason.NONE

@@ -87,8 +87,7 @@ def closing(config: ServoConfig, speed: float = 0.6, seconds: float = 1.0) -> Se
 
 
 def cotton(seed: int) -> Sheet:
-    """Teeth of 0.08 to 0.3 N m, of stiffnesses from a soft to a stiff sheet's, on rigs that are late
-    by no tick and by one."""
+    """Teeth of 0.08 to 0.3 N m in sheets from soft to stiff; every second rig is a tick late."""
     rng = np.random.default_rng(seed)
     return Sheet(
         late=1 + seed % 2,

@@ -12,8 +12,8 @@ SWING_HZ = 8.0
 """No hand makes strokes that fast: voluntary to and fro of a joint ends at 5 to 6 Hz."""
 
 DELAY_MORE_S = 0.00025
-"""The work of a torque is taken with this delay more than the probe's, which makes the errors of
-0.5 ms that both sides bear equal: loops are found and teeth are not taken for one (decision 176)."""
+"""The work of a torque is taken at so much more than the probe's delay. Both sides then bear an
+error of 0.5 ms either way: loops are found, and teeth are not taken for one (decision 176)."""
 
 HELD_UP_S = 0.002
 """Captures keep 45 degrees at a crossover of 45 Hz at most, which 2.8 ms use up."""

@@ -72,9 +72,9 @@ class ServoConfig:
 
     Commands stay within ``torque_limit`` (N m) and ``force_limit`` (N; 0 switches the advance
     motor off) and the slews (N m/s, N/s). ``ramp_s``: from engaging RENDER to its
-    full force. ``damping_Nm_s_per_rad`` acts in DAMP,
-    ``let_go_damping_Nm_s_per_rad`` while torque and force fall to zero at a gentle end. ``rate_cutoff_Hz``: low-pass of the rate
-    estimator, 0 for none. TRACK stops when an error exceeds its limit (rad, m).
+    full force. ``damping_Nm_s_per_rad`` acts in DAMP, ``let_go_damping_Nm_s_per_rad`` while torque
+    and force fall to zero at a gentle end. ``rate_cutoff_Hz``: low-pass of the rate estimator, 0
+    for none. TRACK stops when an error exceeds its limit (rad, m).
     A motion beyond ``opening_rate_limit`` (rad/s) or ``advance_rate_limit`` (m/s) stops while a
     mode drives the blades. Openings (rad) outside ``opening_low`` to ``opening_high`` are not
     usable, nor are places that would need twice as fast a motion.
