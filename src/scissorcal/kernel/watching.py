@@ -20,8 +20,8 @@ class WatchConfig:
     ``swing_torque``, ``swing_Hz``: three swings in a row of at least this amplitude (rad/s), change
     of torque (N m) and frequency, that the motor's torque feeds; of a tracked reference, its own
     rate is subtracted. ``swing_inertia`` (kg m^2) and ``swing_delay_ticks``, until a command acts,
-    are the rig's: with inertia 0 swings count whoever drives them. Swings while a command was
-    later than usual by ``held_up_ticks`` have a reason of their own.
+    are the rig's: with inertia 0 all such swings count. Where a command was later than usual by
+    ``held_up_ticks`` meanwhile, the stop is HELD_UP.
     ``runaway_rate``, ``runaway_speed``: blades (rad/s) or sledge (m/s) speed up by so much against
     their motor's effort. ``stop_margin``: the device says it is at a stop, so far (rad) from
     ``stop_low`` and ``stop_high``. ``still_rad``, ``still_m``: the reference moves so far while the
