@@ -28,14 +28,16 @@ uint32_t sc_count_recent(uint32_t *recent, int wrong)
     return count;
 }
 
-/* Time and ticks where the two contradict each other: by the sequence, and by the clock only where a
- * leap of the sequence would be a gap longer than any that is taken. */
+/* Time and ticks where the two contradict each other: by the sequence, but by the clock where that says
+ * less, and a tick or more: then the sequence leapt. */
 static void decide(sc_stamps *stamps, uint32_t tick_us, uint32_t ticks)
 {
-    if (ticks <= SC_LONGEST_GAP_US / tick_us) {
+    const int64_t stated_us = stamps->stated_us;
+    if (TOLERANCE * stated_us >= tick_us && stated_us < (int64_t)ticks * tick_us &&
+        stated_us <= SC_LONGEST_GAP_US) {
+        stamps->ticks = ((uint32_t)stated_us + tick_us / 2) / tick_us;
+    } else if (ticks <= SC_LONGEST_GAP_US / tick_us) {
         stamps->ticks = ticks;
-    } else if (stamps->stated_us > 0 && stamps->stated_us <= SC_LONGEST_GAP_US) {
-        stamps->ticks = ((uint32_t)stamps->stated_us + tick_us / 2) / tick_us;
     } else {
         stamps->ticks = 1;
     }
