@@ -11,7 +11,7 @@ from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, Motion
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.rig_record import rig_facts
-from scissorcal.device.watching import watches_of
+from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import Capability, ConfigKey, Identity, PlateConfig, ServoConfig
 from scissorcal.package import ModelPackage
@@ -255,6 +255,7 @@ def _servo_config(
         force_slew=applied.force_slew_N_per_s,
         ramp_s=applied.engagement_ramp_s,
         damping_Nm_s_per_rad=FALLBACK_DAMPING,
+        let_go_damping_Nm_s_per_rad=let_go_damping(identity, rest),
         rate_cutoff_Hz=RATE_CUTOFF_HZ,
         opening_low=identity.opening_min - STOP_MARGIN_RAD,
         opening_high=identity.opening_max + STOP_MARGIN_RAD,
