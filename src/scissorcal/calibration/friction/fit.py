@@ -130,7 +130,7 @@ def fit_friction(
             start_verdict(law, chosen.optimum.point),
             _bandwidth(again, law, chosen, posterior, effort),
             sensors.verdict,
-            steady.verdict(),
+            *((steady.verdict(),) if steady.rows else ()),
             *zero_verdicts("fit.friction", zero, recordings, _rms(law.observed)),
             *((between.verdict(),) if between else ()),
         ),

@@ -70,11 +70,10 @@ class Steadiness:
     def verdict(self) -> Verdict:
         """Whether friction was measured at every speed that was swept."""
         scope, check = "fit.friction", "steady sweeps"
-        if not self.rows:
-            return not_evaluated(scope, check, "No stroke was recorded at a stated speed.")
-        worst = max(row.at_rest for row in self.rows)
-        good = f"The joint slid in every sweep, from {self.rows[0].speed:.2g} {self._unit} on."
+        worst = max((row.at_rest for row in self.rows), default=0.0)
         if not self.stuck:
+            from_speed = min((row.speed for row in self.rows), default=float("nan"))
+            good = f"The joint slid in every sweep, from {from_speed:.2g} {self._unit} on."
             return judge(scope, check, worst, STUCK, good)
         told = "; ".join(
             f"{row.at_rest:.0%} at rest: friction at {row.speed:.2g} {self._unit} is not measured"
@@ -97,7 +96,9 @@ class Steadiness:
 
 
 def steadiness(recordings: tuple[Recording, ...]) -> Steadiness:
-    """Judge every stroke with a stated speed by how long the joint rested in it.
+    """Judge every stroke that a capture planned at a speed by how long the joint rested in it.
+
+    Imported motion has no planned speed and is not judged.
 
     It rests while it makes less than a quarter of the stroke's mean way, over a time in which that
     way is eight times the error of a difference of two readings (a step of the encoder, or three
@@ -108,7 +109,7 @@ def steadiness(recordings: tuple[Recording, ...]) -> Steadiness:
     offset = 0
     for recording in recordings:
         label = np.asarray(recording.samples["stroke"])
-        for place, stroke in enumerate(recording.strokes):
+        for place, stroke in enumerate(recording.strokes if recording.device else ()):
             if np.isfinite(stroke.speed) and stroke.speed > 0.0:
                 share = _rest_share(recording, np.flatnonzero(label == stroke.index), stroke)
                 if np.isfinite(share):
