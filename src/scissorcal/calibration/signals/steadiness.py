@@ -6,14 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.weak_form import Windows
+from scissorcal.recipe.pace import ADVANCE_ACCELERATION, TURN_ACCELERATION, ramp_time
 from scissorcal.recording.recording import Joint, Recording, Stroke
 from scissorcal.recording.resolution import noise_of, resolution_of
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 Array = NDArray[np.float64]
 
-INNER = (0.1, 0.9)
-"""Part of a stroke's time that is judged: at its ends blades speed up, or wait for the torque."""
+ENDS = 0.1
+"""Share of a stroke's time at either end that is not judged, or the time of its ramp: there blades
+speed up, or wait for the torque."""
 RESTS_BELOW = 0.25
 """A joint that makes less than this share of its stroke's mean way counts as resting."""
 CERTAIN = 8.0
@@ -59,9 +61,10 @@ class Steadiness:
     def kept(self, every: Windows) -> Windows:
         """The windows without those of stuck strokes that are slower than ``steady_from``.
 
-        What such strokes show at slower rates is the end of a slip, not sliding.
+        What such strokes show at slower rates is the end of a slip, not sliding. Where no speed was
+        steady, all windows are kept, and the verdict fails.
         """
-        if not self.stuck:
+        if not self.stuck or np.isinf(self.steady_from):
             return every
         bins = every.bins
         slips = np.isin(bins.stroke, self.stuck) & (np.abs(bins.rate) < self.steady_from)
@@ -86,7 +89,7 @@ class Steadiness:
         )
         if np.isinf(self.steady_from):
             why = f"{told}; no faster sweep was steady. {remedy}, and sweep faster."
-            return judge(scope, check, worst, STUCK, good, why)
+            return judge(scope, check, worst, STUCK, why)
         why = f"{told}; steady from {self.steady_from:.2g}. {remedy}."
         return not_evaluated(scope, check, why)
 
@@ -132,8 +135,12 @@ def _rest_share(recording: Recording, inside: NDArray[np.intp], stroke: Stroke) 
     step = resolution_of(opening)
     error = max(step if np.isfinite(step) else 0.0, 3.0 * np.sqrt(2.0) * noise_of(opening))
     lasting = max(LEAST_S, CERTAIN * error / stroke.speed)
-    apart = max(1, int(np.ceil(lasting / tick))) if tick > 0.0 else len(inside)
-    low, high = (round(share * len(inside)) for share in INNER)
+    if tick <= 0.0:
+        return float("nan")
+    apart = max(1, int(np.ceil(lasting / tick)))
+    acceleration = TURN_ACCELERATION if recording.joint.kind == "rotary" else ADVANCE_ACCELERATION
+    left_out = max(ENDS * len(inside), ramp_time(stroke.speed, acceleration) / tick)
+    low, high = round(left_out), len(inside) - round(left_out)
     if high - low <= 2 * apart:
         return float("nan")
     sense = 1.0 if opening[-1] >= opening[0] else -1.0
