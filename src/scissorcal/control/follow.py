@@ -100,7 +100,8 @@ def control(
     identity = link.identity
     if not job.tracked:
         refuse_nobody(identity, confirm)
-    gains = capture_gains(recipe, identity, "friction", Probed.of(probe))
+    # Stiff ones, without material: sweeps of friction give up stiffness for damping.
+    gains = capture_gains(recipe, identity, "friction-advance", Probed.of(probe))
     tell = progress or _silent
     now_s = link.virtual_time if isinstance(link, Exchanging) else time.monotonic()
     pose = _pose_now(job.source, now_s, "nothing was moved")
