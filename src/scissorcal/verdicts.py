@@ -84,6 +84,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "fit physical": ("at most", "signs of levels: sds by which one is below zero"),
     "fit start": ("at least", f"{_SEARCH}: least way from its start, in prior sds"),
     "fit bandwidth": ("at most", f"{_INTERVALS}: sds by which a parameter moves with the cutoff"),
+    "fit steady sweeps": (
+        "at most",
+        "friction at the slowest rates: share of time at rest in the sweeps that rested most",
+    ),
     "fit sensors": ("at most", "what was measured: share of samples that a sensor spoilt"),
     "fit sensor zeros": (
         "at most",
@@ -210,6 +214,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "at least",
         "whether the rig follows a capture without swinging: phase margin of its controller, "
         "degrees",
+    ),
+    "device steady sweeps": (
+        "at most",
+        "friction at the slowest rates: rate in rad/s below which blades stick and slip",
     ),
     "device drift": (
         "at most",

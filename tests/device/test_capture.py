@@ -94,7 +94,7 @@ def test_friction_is_swept_as_planned_and_recorded_whole(tmp_path: Path) -> None
     dones = [done for done, _, _ in told]
     assert dones == sorted(dones)
     assert dones[-1] == pytest.approx(1.0, abs=0.02)
-    assert any("closing at 1.5 rad/s (stroke 3 of 5)" in sentence for _, sentence, _ in told)
+    assert any("closing at 1.5 rad/s (stroke 3 of 6)" in sentence for _, sentence, _ in told)
 
 
 @pytest.mark.parametrize("name", ["paper-80gsm", "cotton-cloth"])

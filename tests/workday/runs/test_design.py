@@ -91,7 +91,7 @@ def test_a_designed_capture_is_whole_by_its_own_list(
     (path,) = workspace.recordings("friction")
     recording = read_recording(path)
     assert 'plan = "designed"' in recording.recipe_toml
-    assert len(recording.strokes) == 7
+    assert len(recording.strokes) == 8
 
     from scissorcal.device.counting import count_recorded
 
