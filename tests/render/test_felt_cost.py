@@ -10,7 +10,7 @@ from scissorcal.render.admission import admit, rendered_tables
 from scissorcal.render.derating import softened
 from scissorcal.render.felt_cost import felt_change, plate_strokes
 from tests.kernel.zoo import make_tables
-from tests.render.test_admission import HAND, LIMIT, RATE, RIG
+from tests.render.test_admission import ASKED, LIMIT, RIG
 
 FACE, ENERGY = 5e-5, 0.6
 TABLES = make_tables()
@@ -54,8 +54,8 @@ def test_a_plate_that_is_not_cut_is_pressed_at_each_of_its_edges() -> None:
     strokes = plate_strokes(TABLES, pads)
     middle = 0.5 * (TABLES.contact_min + TABLES.contact_max)
     assert [advance[-1] for _, advance, _ in strokes] == pytest.approx([-middle, 0.1 - middle])
-    pad = replace(TABLES, fracture_energy=0.0)
-    soft = replace(SOFT, fracture_energy=0.0)
+    there = {"fracture_energy": 0.0, "contact_min": middle, "contact_max": middle}
+    pad, soft = (replace(each, **there) for each in (TABLES, SOFT))
     assert felt_change(TABLES, SOFT, LIMIT, pads) == pytest.approx(
         felt_change(pad, soft, LIMIT), rel=1e-3
     )
@@ -105,7 +105,7 @@ def test_the_cost_is_what_the_core_renders_less_of_it() -> None:
 
 def test_admission_states_the_plates_own_cost() -> None:
     plate = (long_piece(3.0),)
-    found = admit(TABLES, RIG, HAND, LIMIT, RATE, plate)
+    found = admit(TABLES, RIG, ASKED, plate)
     soft = rendered_tables(TABLES, found)
     assert found.derated
     assert found.felt_share == pytest.approx(felt_change(TABLES, soft, LIMIT, plate))
@@ -116,6 +116,6 @@ def test_admission_states_the_plates_own_cost() -> None:
     assert f"{found.felt_sheet_share:.1%}" in said
     assert "drawn plate" in said
     assert "drawn plate" in found.summary
-    sheet = admit(TABLES, RIG, HAND, LIMIT, RATE)
+    sheet = admit(TABLES, RIG, ASKED)
     assert sheet.felt_share == sheet.felt_sheet_share
     assert "drawn plate" not in sheet.summary + sheet.reasons[1]

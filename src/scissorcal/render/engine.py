@@ -27,7 +27,12 @@ from scissorcal.render.admission import (
 from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
 from scissorcal.render.plate_pose import EVERY_S, PlatePlacer, plate_config
 from scissorcal.render.plate_source import plate_placer
-from scissorcal.render.result import AppliedLimits, RenderResult, render_verdicts
+from scissorcal.render.result import (
+    AppliedLimits,
+    RenderResult,
+    felt_verdict,
+    render_verdicts,
+)
 from scissorcal.render.rig_facts import RigFacts
 from scissorcal.render.watch import LOOK_EVERY_S, Progress, Watch
 from scissorcal.tracking.plate_pose import PoseSource
@@ -73,6 +78,7 @@ def render(
     confirm: Confirm | None = None,
     rig: RigFacts | None = None,
     plate: PoseSource | None = None,
+    accept_derated: bool = False,
 ) -> RenderResult:
     """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
 
@@ -96,7 +102,9 @@ def render(
     Before any force, `admission.admit_package` compares the package's stiffness with what the rig
     renders stably, and softens it where that is less; ``rig`` is what is known of friction,
     inertia, delay and the force sensor's zero, by default the package's friction fit. The result's
-    ``admission`` states it.
+    ``admission`` states it. Where the felt torque then differs from the package's by more than the
+    scene's tolerance, the verdict *felt torque* fails, unless a person wants it so
+    (``accept_derated``), which result and recording then state.
 
     Raises InputError, before anything moves, where package and device do not match, where the rig
     cannot render the package stably, or nobody can be asked; MissingError where an estimated plate
@@ -113,9 +121,12 @@ def render(
     placed = plate_config(tables) if follower else PlateConfig()
     config = _servo_config(applied, admission, identity, seconds, rig, placed)
     config = replace(config, motor_sign=motor_sign)
+    accepted = accept_derated and admission.is_felt
     if writer:
         for sentence in warnings:
             writer.note(sentence)
+        if admission.is_felt:
+            writer.note(felt_verdict(admission, accepted=accepted).why)
     watch = Watch(_travel(package), writer, progress or _silent, seconds)
     every_s, pieces = EVERY_S if follower else BLOCK_S, package.pieces or None
     with open_motion(link, config, tables, every_s=every_s, pieces=pieces) as motion:
@@ -133,7 +144,9 @@ def render(
             watch.record(samples)
         if is_simulator(identity):
             motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
-    result = _result(motion, watch, package, applied, admission, warnings, follower)
+    result = _result(
+        motion, watch, package, applied, admission, warnings, follower, accepted=accepted
+    )
     if writer:
         _note(writer, result, result.warnings[len(warnings) :])
     return result
@@ -147,6 +160,8 @@ def _result(
     admission: Admission,
     warnings: tuple[str, ...],
     follower: PlatePlacer | None,
+    *,
+    accepted: bool,
 ) -> RenderResult:
     """Figures of a rendering that has ended; ``warnings`` are those known at its start."""
     report = motion.report()
@@ -175,9 +190,12 @@ def _result(
         ledger=report.ledger,
         limits=applied,
         admission=admission,
+        accepted_derated=accepted,
         plate=plate,
         package_hash=package.manifest.content_hash,
-        verdicts=render_verdicts(report, latency, motion.identity.tick_us, admission, plate),
+        verdicts=render_verdicts(
+            report, latency, motion.identity.tick_us, admission, plate, accepted=accepted
+        ),
         warnings=warnings
         + _limited_warning(limited, applied)
         + _still_warning(watch.still_s)

@@ -57,6 +57,7 @@ def render_workspace(
     plate: "PoseSource | None" = None,
     camera: str = NONE,
     taps_s: float = 0.0,
+    accept_derated: bool = False,
 ) -> Rendered:
     """Render the workspace's package (or another) on ``device``, within the recipe's limits.
 
@@ -66,9 +67,11 @@ def render_workspace(
     probed first (`ensure_probed`), and ``say`` tells so. ``plate`` tracks a plate whose pose the
     scene estimates, or ``camera`` does (a camera's number, or "sim" with the device "sim"); without
     them the pose fitted to photographs is taken. Before the rendering a person taps the tracked
-    plate with the blade's tip for ``taps_s``, motors off. Raises MissingError where there is no
-    package or no pose, InputError where a camera is named for a known pose or does not go with the
-    device, and what opening them and the rendering raise.
+    plate with the blade's tip for ``taps_s``, motors off. ``accept_derated``: a person wants what
+    is felt to differ by more than the scene's tolerance, see `scissorcal.render.render`.
+
+    Raises MissingError where there is no package or no pose, InputError where a camera is named for
+    a known pose or does not go with the device, and what opening them and the rendering raise.
     """
     from scissorcal.package import open_package
     from scissorcal.render import open_writer, render
@@ -110,6 +113,7 @@ def render_workspace(
                 confirm=confirm,
                 rig=with_probe(_known_rig(workspace, package), probe),
                 plate=plate,
+                accept_derated=accept_derated,
             )
     if package_path is None:
         _write_admission(workspace.package_path(recipe), done, rig)
@@ -190,6 +194,7 @@ def _write_admission(package_path: Path, done: "RenderResult", rig: str) -> None
         "rig": rig,
         "derated": done.admission.derated,
         "factor": done.admission.factor,
+        "accepted_derated": done.accepted_derated,
         **plain,
     }
     with replacing(package_path.with_suffix(".admission.json")) as part:
