@@ -50,11 +50,12 @@ class FeltTorque:
         """Relative rms difference of the felt torque where ``other`` is rendered instead.
 
         With a ``friction_width`` (rad) friction builds up over it after the blades turn round, as
-        in the loop (`sc_port_friction`). A bin counts where either is felt; zero where none is.
+        in the loop (`sc_port_friction`). A bin counts where either opens the blades; zero where
+        none does.
         """
         one, two = self._whole, self._binned(other, friction_width)
-        felt = np.maximum(np.abs(one), np.abs(two)) > LEAST_SHARE * np.abs(one).max()
-        if not felt.any() or not np.abs(one).max() > 0.0:
+        felt = np.maximum(one, two) > LEAST_SHARE * one.max()
+        if not felt.any() or not one.max() > 0.0:
             return 0.0
         return float(np.sqrt(np.mean((two - one)[felt] ** 2) / np.mean(one[felt] ** 2)))
 

@@ -19,8 +19,11 @@ from scissorcal.render.cures import stated_cures
 from scissorcal.render.derating import Needs, derate, limited, needs_of, stiffness_on
 from scissorcal.render.felt_cost import FeltTorque, felt_rates
 
-HALVINGS = 7
-"""Of a range in which a cure is sought: to 1 % of it, finer than its figure is said."""
+HALVINGS = 5
+"""Of a range in which a cure is sought: to 3 % of it, and what is found is enough."""
+
+SHARES = (0.1, 0.2, 0.3, 0.4, 0.5)
+"""Of a scene's openings or contacts, without which it is tried."""
 
 
 @dataclass(frozen=True)
@@ -142,30 +145,38 @@ def _least(is_enough: Callable[[float], bool], most: float) -> float:
 def _softer_scenes(tables: ModelTables, facts: LoopFacts, asked: Asked) -> tuple[str, ...]:
     """Narrower scenes that are within the tolerance: from a wider opening on, up to a contact."""
     found = []
-    low, high = tables.opening_min, tables.opening_max
-    span = high - low
+    low, far = tables.opening_min, tables.contact_max
+    span, reach = tables.opening_max - low, far - tables.contact_min
 
     def opened(share: float) -> bool:
         return _is_within(replace(tables, opening_min=low + share * span), facts, asked)
 
-    if opened(0.75):
-        from_deg = math.ceil(math.degrees(low + _least(opened, 0.75) * span))
+    def nearer(share: float) -> bool:
+        return _is_within(replace(tables, contact_max=far - share * reach), facts, asked)
+
+    share = _first(opened)
+    if share is not None:
+        from_deg = math.ceil(math.degrees(low + share * span))
         found.append(
             f"A softer scene: openings from {from_deg} deg on (scene.opening_deg, now "
             f"{math.degrees(low):.0f})."
         )
-    near, far = tables.contact_min, tables.contact_max
-    reach = far - near
-
-    def nearer(share: float) -> bool:
-        return _is_within(replace(tables, contact_max=far - share * reach), facts, asked)
-
-    if nearer(0.75):
-        to_mm = math.floor(1e3 * (far - _least(nearer, 0.75) * reach))
+    share = _first(nearer)
+    if share is not None:
+        to_mm = math.floor(1e3 * (far - share * reach))
         found.append(
             f"A softer scene: contacts up to {to_mm} mm (scene.contact_mm, now {far * 1e3:.0f})."
         )
     return tuple(found)
+
+
+def _first(is_enough: Callable[[float], bool]) -> float | None:
+    """About the least share of a scene without which it is soft enough; None up to half of it."""
+    found = next((share for share in SHARES if is_enough(share)), None)
+    if found is None:
+        return None
+    before = found - SHARES[0]
+    return before + _least(lambda more: is_enough(before + more), SHARES[0])
 
 
 def _is_within(tables: ModelTables, facts: LoopFacts, asked: Asked) -> bool:
