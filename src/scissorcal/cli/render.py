@@ -58,6 +58,14 @@ def render(
             "tolerance; result and recording state that a person accepted it.",
         ),
     ] = False,
+    allow_mismatch: Annotated[
+        bool,
+        typer.Option(
+            "--allow-mismatch",
+            help="Render a package of another rig (radius, joint, limits, serial number) or a "
+            "stale one; what differs is said and recorded.",
+        ),
+    ] = False,
     trusted_key: TrustedKey = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
     realtime: Realtime = False,
@@ -111,6 +119,7 @@ def render(
             camera=camera,
             taps_s=taps,
             accept_derated=accept_derated,
+            allow_mismatch=allow_mismatch,
         )
     result = asdict(rendered.result)
     verdicts = rendered.result.verdicts

@@ -225,6 +225,15 @@ class Provenance(Section):
     friction: FrictionRecord | None
 
 
+class RigRecord(Section):
+    """The rig of the recordings that a package is made from, as it stated itself."""
+
+    name: Annotated[str, Field(max_length=40)]
+    serial: Annotated[str, Field(max_length=40)]
+    torque_limit_Nm: NonNegative
+    force_limit_N: NonNegative
+
+
 class PlateRecord(Section):
     """Where the plate stands, where the scene asks for it: T_rig_plate, or T_camera_plate.
 
@@ -262,7 +271,8 @@ class Manifest(Section):
     own: structure, parameters and draws are of the law that is rendered. It is null in packages
     that were built before there was such a choice. ``plate_pose`` is the scene's: "estimated" makes
     a rendering follow the plate, from ``plate`` where no tracker does. ``pieces`` are a drawn plate
-    along the line of the cut, null for the uniform sheet that was calibrated.
+    along the line of the cut, null for the uniform sheet that was calibrated. ``rig`` is the rig of
+    the recordings, null where they do not state one, as imported ones, and in older packages.
     """
 
     format: Literal["scissorcal-package/1"]
@@ -278,6 +288,7 @@ class Manifest(Section):
     plate: PlateRecord | None = None
     pieces: Pieces | None = None
     simplification: Simplification | None = None
+    rig: RigRecord | None = None
     review: Review | None
     content_hash: Digest
 

@@ -4,8 +4,6 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, Motion
@@ -13,7 +11,7 @@ from scissorcal.device.open_motion import open_motion
 from scissorcal.device.rig_record import rig_facts
 from scissorcal.device.watching import watches_of
 from scissorcal.errors import InputError
-from scissorcal.kernel import Capability, ConfigKey, Identity, PlateConfig, ServoConfig
+from scissorcal.kernel import ConfigKey, Identity, PlateConfig, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter
@@ -25,6 +23,7 @@ from scissorcal.render.admission import (
     rendered_tables,
 )
 from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
+from scissorcal.render.mismatch import find_mismatch, refuse_other_rig
 from scissorcal.render.plate_pose import EVERY_S, PlatePlacer, plate_config
 from scissorcal.render.plate_source import plate_placer
 from scissorcal.render.result import (
@@ -79,6 +78,7 @@ def render(
     rig: RigFacts | None = None,
     plate: PoseSource | None = None,
     accept_derated: bool = False,
+    allow_mismatch: bool = False,
 ) -> RenderResult:
     """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
 
@@ -92,6 +92,7 @@ def render(
     blades before any force.
     ``writer`` records every sample; see `open_writer`. What is wrong with the package or does not
     match the device becomes a note of the recording at the start, and ``warnings`` of the result.
+    A package of another rig (`mismatch`) is refused unless ``allow_mismatch``.
 
     Where the package's scene has ``plate_pose = "estimated"``, the torque is that of the plate
     where ``plate`` has it, or without one where the package's fitted pose has it. The force falls
@@ -113,9 +114,12 @@ def render(
     identity = link.identity
     _refuse_impossible(identity, seconds, confirm)
     applied = _applied(package, limits, identity)
-    mismatches = _mismatches(package, identity)
+    mismatch = find_mismatch(package, identity)
+    if not allow_mismatch:
+        refuse_other_rig(package, identity)
     admission = admit_package(package, identity, rig, applied.torque_Nm)
-    warnings = package.warnings + mismatches + _admitted(admission)
+    differs = mismatch.other_rig + mismatch.notes
+    warnings = package.warnings + differs + _admitted(admission)
     tables = rendered_tables(package.tables, admission)
     follower = plate_placer(package, plate, tables, applied.torque_Nm, writer)
     placed = plate_config(tables) if follower else PlateConfig()
@@ -291,50 +295,6 @@ def _admitted(admission: Admission) -> tuple[str, ...]:
         return ()
     cures = f" What would cure it: {' '.join(admission.cures)}" if admission.cures else ""
     return (f"{' '.join(admission.reasons)}{cures}",)
-
-
-def _mismatches(package: ModelPackage, identity: Identity) -> tuple[str, ...]:
-    """Sentences on how the device differs from what the package was built for.
-
-    Raises InputError where the scene and the device have no opening in common.
-    """
-    manifest = package.manifest
-    render = manifest.mechanics.render
-    has_motor = bool(identity.capabilities & Capability.ADVANCE_MOTOR) and identity.force_limit > 0
-    if render == ("translation_force",) and not has_motor:
-        raise InputError(
-            f"The package {manifest.name} renders the translation force alone, and this device has "
-            'no advance motor: nothing would be felt. Add "torque" to scene.render, or use a rig '
-            "with an advance motor."
-        )
-    low, high = manifest.ranges.opening_rad
-    if identity.opening_max <= low or identity.opening_min >= high:
-        raise InputError(
-            f"The package {manifest.name} is for openings of {np.degrees(low):.0f} to "
-            f"{np.degrees(high):.0f} degrees, and this device moves between "
-            f"{np.degrees(identity.opening_min):.0f} and {np.degrees(identity.opening_max):.0f}: "
-            "build a package for this rig."
-        )
-    found = []
-    if "translation_force" in render and not has_motor:
-        found.append(
-            "The package renders a translation force, and this device has no advance motor "
-            "(capability ADVANCE_MOTOR, force limit above 0): that force is not rendered."
-        )
-    rate = 1e6 / identity.tick_us
-    if abs(rate - manifest.mechanics.loop_rate_Hz) > 0.01 * rate:
-        found.append(
-            f"The device runs at {rate:.0f} Hz and the package was built for "
-            f"{manifest.mechanics.loop_rate_Hz:.0f} Hz."
-        )
-    radius = manifest.mechanics.handle_radius_m
-    if abs(identity.handle_radius - radius) > 0.01 * radius:
-        found.append(
-            f"The device states a handle radius of {identity.handle_radius * 1e3:.1f} mm and the "
-            f"package was built for {radius * 1e3:.1f} mm: forces at the handles differ by this "
-            "ratio."
-        )
-    return tuple(found)
 
 
 def _prepare(motion: Motion, strokes: VirtualStrokes | None, confirm: Confirm | None) -> int | None:
