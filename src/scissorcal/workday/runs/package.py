@@ -83,7 +83,7 @@ def build_workspace_package(
         review=review,
         plate=fits["plate"],
         drawn=plate_pieces(engine.recipe, engine.workspace.root),
-        rig=_recorded_rig(engine, fits),
+        rig=recorded_rig(engine.workspace.captures_dir, fits),
         inputs_hash=engine.identity("package build"),
         allow_failed=allow_failed,
     )
@@ -109,7 +109,7 @@ def _fits(engine: Engine) -> dict[str, Any]:
     return found
 
 
-def _recorded_rig(engine: Engine, fits: Mapping[str, Any]) -> "RigRecord | None":
+def recorded_rig(captures: Path, fits: Mapping[str, Any]) -> "RigRecord | None":
     """The rig of the recordings: of friction, which is the rig's own, else of the cut.
 
     None where no recording is there that states one.
@@ -120,7 +120,7 @@ def _recorded_rig(engine: Engine, fits: Mapping[str, Any]) -> "RigRecord | None"
 
     sources = [name for what in ("friction", "cut") if fits[what] for name in fits[what].sources]
     for source in sources:
-        path = engine.workspace.captures_dir / source.rpartition(" sha256:")[0]
+        path = captures / source.rpartition(" sha256:")[0]
         device = read_header(path).device if path.is_file() else {}
         if "schema_hash" in device:
             stated = identity_of(device, path.name)
