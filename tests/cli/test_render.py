@@ -65,7 +65,7 @@ def test_a_package_states_the_rig_of_its_recordings(
     assert cli("capture", "friction", "--device", "sim").code == 0
     (recording,) = Workspace(workspace).recordings("friction")
     stated = read_recording(recording).device
-    friction = replace(friction_fit(), sources=(f"{recording.name} sha256:{64 * '0'}",))
+    friction = replace(friction_fit(), sources=(f"captures/{recording.name} sha256:{64 * '0'}",))
     rig = recorded_rig(recording.parent, {"friction": friction, "cut": None, "plate": None})
     assert rig is not None
     assert (rig.name, rig.serial) == (stated["name"], stated["serial"])

@@ -108,6 +108,7 @@ def build_package(
     """
     # the report imports this module to read packages; only a build needs what follows
     from scissorcal.package.check import check_package
+    from scissorcal.package.reach import data_reach
     from scissorcal.package.simplest.model import simplest_model
     from scissorcal.package.stated_bound import stated_bound
 
@@ -142,6 +143,7 @@ def build_package(
             pieces=piece_records(recipe, drawn, _energy(compiled.mechanics.fracture)),
             simplification=simplified.record,
             rig=rig,
+            reach=data_reach(recipe, cut),
             review=review,
             content_hash=UNHASHED,
         )

@@ -120,7 +120,7 @@ def recorded_rig(captures: Path, fits: Mapping[str, Any]) -> "RigRecord | None":
 
     sources = [name for what in ("friction", "cut") if fits[what] for name in fits[what].sources]
     for source in sources:
-        path = captures / source.rpartition(" sha256:")[0]
+        path = captures / Path(source.rpartition(" sha256:")[0]).name
         device = read_header(path).device if path.is_file() else {}
         if "schema_hash" in device:
             stated = identity_of(device, path.name)
