@@ -13,10 +13,10 @@ from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel, Strip, Ta
 from scissorcal.model import Cutting, Edge, Response
 from scissorcal.model.cutting import torque_at
 from scissorcal.package.plate_slopes import PlateSlopes
+from scissorcal.package.tangent import Tangent
 from scissorcal.render.admission import admit
 from scissorcal.render.admission_rule import allowed_stiffness
 from scissorcal.render.derating import LEAST_FACTOR, needs_of, needs_on
-from scissorcal.render.tangent import Tangent
 from tests.kernel.zoo import (
     BLADE_LENGTH,
     EDGE_OFFSET,

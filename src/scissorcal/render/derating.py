@@ -16,9 +16,9 @@ from scissorcal.kernel import (
     Table,
 )
 from scissorcal.package.plate_slopes import PlateSlopes
+from scissorcal.package.tangent import Tangent
 from scissorcal.render.drops import largest_drop
 from scissorcal.render.felt_cost import plate_strokes
-from scissorcal.render.tangent import Tangent
 
 Array = NDArray[np.float64]
 

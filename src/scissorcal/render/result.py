@@ -139,7 +139,7 @@ def _admitted(admission: Admission) -> Verdict:
 def felt_verdict(admission: Admission, *, accepted: bool = False) -> Verdict:
     """Whether what is felt of an admitted rendering is the package's torque, to the tolerance.
 
-    Beyond it the check fails, or, where a person ``accepted`` that, decides nothing and says so.
+    Beyond it the check fails, or, where a person ``accepted`` that, decides nothing and states it.
     """
     share, tolerance = admission.felt_share, admission.tolerance
     if not admission.evaluated:
