@@ -46,7 +46,7 @@ def test_what_is_rendered_beyond_the_data_is_stated_for_every_law(
 ) -> None:
     """In numbers of data and scene, in the package's warnings, and in the report's sentence."""
     chosen = recipe("press-only", render_friction=False)
-    shape = (1.0, 1.0, 1.0) if response == "spline" else ()
+    shape = (0.9, 0.2, -0.1) if response == "spline" else ()
     exponent = 1.2
     fit = cut_fit(chosen, energy=None, force=3.0, exponent=exponent, response=response, shape=shape)
     short = pressed_to(fit, chosen, 0.4e-3)

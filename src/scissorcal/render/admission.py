@@ -108,14 +108,11 @@ class Admission:
         if not self.evaluated:
             return f"stiffness {self.rendered:.3g} N m/rad, not checked against this rig"
         what = "drawn plate" if self.is_drawn else "uniform sheet"
-        changed = (
-            f", which changes the {what}'s felt torque by {self.felt_share:.1%} (rms, tolerance "
-            f"{self.tolerance * 100:.3g} %)"
-        )
-        cost = changed if self.derated else ""
         return (
-            f"stiffness {self.rendered:.3g} of the package's {self.needed:.3g} N m/rad{cost} "
-            f"(stable alone {self.allowed_alone:.2g}, in a hand {self.allowed_in_hand:.2g})"
+            f"stiffness {self.rendered:.3g} of the package's {self.needed:.3g} N m/rad (stable "
+            f"alone {self.allowed_alone:.2g}, in a hand {self.allowed_in_hand:.2g}); felt torque "
+            f"of the {what} changed by {self.felt_share:.1%} (rms, tolerance "
+            f"{self.tolerance * 100:.3g} %)"
         )
 
 

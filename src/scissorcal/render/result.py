@@ -154,8 +154,10 @@ def felt_verdict(admission: Admission, *, accepted: bool = False) -> Verdict:
         return not_evaluated(
             SCOPE, "felt torque", f"Accepted by a person ({ACCEPT}): {why}", tolerance, share
         )
-    cures = f"What would cure it, each by itself: {' '.join(admission.felt_cures)} Or accept it"
-    remedy = f"{why} {cures} ({ACCEPT})."
+    cures = "No encoder, delay or damping cures it alone: narrow the scene."
+    if admission.felt_cures:
+        cures = f"What would cure it, each by itself: {' '.join(admission.felt_cures)}"
+    remedy = f"{why} {cures} Or accept it ({ACCEPT})."
     return judge(SCOPE, "felt torque", share, tolerance, why, remedy)
 
 
