@@ -90,9 +90,11 @@ def test_a_stale_package_is_refused_until_it_is_asked_for(packed: Workspace, cli
     assert "The package is stale" in said.err
     assert "--allow-mismatch" in said.err
     assert not packed.probe_path.exists(), "nothing moves"
-    said = cli(*BRIEF, "--no-record", "--allow-mismatch")
+    said = cli(*BRIEF, "--allow-mismatch")
     assert said.code in (0, 3)
     assert "The package is stale" in said.err
+    (recording,) = packed.recordings("render")
+    assert any("The package is stale" in note for note in read_recording(recording).notes)
 
 
 @pytest.mark.parametrize(

@@ -84,8 +84,10 @@ def render_workspace(
 
     recipe = workspace.recipe()
     package = open_package(package_path or workspace.package_path(recipe), warn=False)
+    stale = "" if package_path else _stale(Engine.of(workspace))
     if not allow_mismatch:
-        _refuse_stale(workspace, package_path)
+        if stale:
+            raise MissingError(f"{stale} To render it all the same: --allow-mismatch.")
         _refuse_other_blades(recipe, package)
     eye = _camera(workspace, package, camera, device, taps_s, seed=seed, realtime=realtime)
     line = line_of(recipe, baud)
@@ -109,6 +111,8 @@ def render_workspace(
             else nullcontext()
         )
         with recording as writer, ExitStack() as seeing:
+            if stale and writer:
+                writer.note(stale)
             if eye:
                 plate = seeing.enter_context(eye.follow(link, writer, taps_s=taps_s, say=say))
             done = render(
@@ -131,16 +135,12 @@ def render_workspace(
     return Rendered(done, path, rig, eye.tracked() if eye else None)
 
 
-def _refuse_stale(workspace: Workspace, package_path: Path | None) -> None:
-    """Raise MissingError where the workspace's own package is not of its fits."""
-    if package_path is not None:
-        return
-    state = Engine.of(workspace).state("package build")
-    if state.state == "stale":
-        raise MissingError(
-            f"The package is stale: {state.found}. Run '{state.command}', or render it all the "
-            "same with --allow-mismatch."
-        )
+def _stale(engine: Engine) -> str:
+    """A sentence where the workspace's own package is not of its fits and recipe, else empty."""
+    state = engine.state("package build")
+    if state.state != "stale":
+        return ""
+    return f"The package is stale: {state.found}. Run '{state.command}'."
 
 
 def _refuse_other_blades(recipe: "Recipe", package: "ModelPackage") -> None:
@@ -263,10 +263,8 @@ def package_warnings(workspace: Workspace, package_path: Path | None = None) -> 
         return ()
     if package_path is not None:
         return package.warnings
-    state = engine.state("package build")
-    said = []
-    if state.state == "stale":
-        said.append(f"The package is stale: {state.found}. Run '{state.command}'.")
+    stale = _stale(engine)
+    said = [stale] if stale else []
     said += [
         f"The {name.replace('fit', 'fit of')} is unverified: no trust check says whether its "
         f"intervals hold ('{engine.state(name).command}')."
