@@ -176,6 +176,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "at most",
         "stability of what is felt: rendered stiffness over what the rig renders in a hand",
     ),
+    "render felt torque": (
+        "at most",
+        TORQUE + "its change by what the rig cannot render stably, rms over the scene's strokes",
+    ),
     "render deadline": ("at most", f"{_LOOP}: 99 % of the latencies, us"),
     "render misses": ("at most", f"{_LOOP}: share of lost frames"),
     "render faults": ("at most", f"{_LOOP}: faults that the device latched"),

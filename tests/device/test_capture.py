@@ -129,7 +129,7 @@ def test_presses_load_the_pad_at_several_contacts_and_cut_nothing(tmp_path: Path
     contacts = set()
     for stroke in presses:
         of = recording.samples[recording.samples["stroke"] == stroke.index]
-        contacts.add(round(float(of["advance"].mean()), 2))
+        contacts.add(round(float(of["advance"].mean()), 3))
         assert of["motor_torque"].min() < -0.03
     assert len(contacts) == 2
 
