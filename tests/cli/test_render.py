@@ -7,40 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.cli.root import run
 from scissorcal.package import build_package
 from scissorcal.package.manifest import RigRecord
 from scissorcal.recording import read_recording
 from scissorcal.workday.runs.package import recorded_rig
 from scissorcal.workday.workspace import Workspace
 from tests.cli.conftest import Cli
-from tests.made_once import copied
 from tests.package.fits import cut_fit, friction_fit, recipe
-from tests.workday.made import fitted_copy
 
 BRIEF = ("render", "--device", "sim", "--yes", "--strokes", "1", "--seconds", "0.3")
 SIM = RigRecord(
     name="scissorcal-sim", serial="office-paper", torque_limit_Nm=2.0, force_limit_N=40.0
 )
-
-
-@pytest.fixture(scope="module")
-def packed_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A workspace with fits and their package."""
-    folder = tmp_path_factory.mktemp("packed") / "paper"
-    workspace = fitted_copy(tmp_path_factory, folder, "friction", "cut")
-    with pytest.raises(SystemExit) as ended:
-        run(["package", "build", "--workspace", str(workspace.root)])
-    assert ended.value.code == 0
-    return workspace.root
-
-
-@pytest.fixture
-def packed(packed_once: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
-    """A copy of it; stand in it."""
-    folder = copied(packed_once, tmp_path / "paper")
-    monkeypatch.chdir(folder)
-    return Workspace(folder)
 
 
 def package(folder: Path, *, tolerance: float = 7.0, rig: RigRecord | None = None) -> Path:
