@@ -94,11 +94,19 @@ def build_for_browsers() -> None:
 
 
 def fetch_compilers() -> None:
-    """Install the compilers that this Python lacks for what is to be built."""
+    """Install the compilers that this Python lacks for what is to be built.
+
+    SystemExit with a sentence where that fails.
+    """
     lacking = [file.requirement for file in to_build() if not file.is_buildable]
     if lacking:
         pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-compile"]
-        subprocess.run([*pip, *lacking], check=True)
+        if subprocess.run([*pip, *lacking], check=False).returncode:
+            raise SystemExit(
+                f"{' and '.join(lacking)} could not be installed, for the reason above: run this "
+                "again where a package index can be reached. SCISSORCAL_WITHOUT_PAGE=1 leaves "
+                "the browser prototype out of make setup and make test."
+            )
 
 
 def _compilers() -> list[str]:

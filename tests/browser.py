@@ -30,15 +30,32 @@ import("./lean_three.mjs").then(async ({ leanThree }) => {
 """
 FRAMES_A_TURN = 8
 BRISK = """(frames) => {
-  const ask = requestAnimationFrame.bind(window), later = setTimeout.bind(window);
-  const again = setInterval.bind(window);
-  const clock = performance.now.bind(performance);
+  const ask = requestAnimationFrame.bind(window), clock = performance.now.bind(performance);
+  const timers = new Map(), none = [0, { at: Infinity }];
   let now = clock(), last = 0, due = new Map();
+  const put = (every) => (f, ms, ...given) => {
+    const wait = Math.max(1, ms || 0);
+    timers.set(++last, { f, given, at: now + wait, every: every && wait });
+    return last;
+  };
+  const call = (f, ...given) => { try { f(...given); } catch (error) { reportError(error); } };
   performance.now = () => now;
   window.requestAnimationFrame = (f) => { due.set(++last, f); return last; };
   window.cancelAnimationFrame = (id) => due.delete(id);
-  window.setTimeout = (f, ms, ...given) => later(f, (ms || 0) / frames, ...given);
-  window.setInterval = (f, ms, ...given) => again(f, (ms || 0) / frames, ...given);
+  window.setTimeout = put(false);
+  window.setInterval = put(true);
+  window.clearTimeout = window.clearInterval = (id) => timers.delete(id);
+  const goOn = (until) => {
+    for (;;) {
+      const [id, next] = [...timers].reduce((a, b) => (b[1].at < a[1].at ? b : a), none);
+      if (next.at > until) break;
+      now = next.at;
+      if (next.every) next.at += next.every;
+      else timers.delete(id);
+      call(next.f, ...next.given);
+    }
+    now = until;
+  };
   let count = frames, isShown = true;
   const gl = WebGL2RenderingContext.prototype;
   for (const name of ["clear", "drawArrays", "drawElements"]) {
@@ -48,11 +65,11 @@ BRISK = """(frames) => {
   const turn = () => {
     const begin = clock();
     for (let k = 1; k <= count; k += 1) {
-      now += 1000 / 60;
+      goOn(now + 1000 / 60);
       const these = due;
       due = new Map();
       isShown = k === count;
-      for (const f of these.values()) f(now);
+      for (const f of these.values()) call(f, now);
     }
     isShown = true;
     count = Math.max(1, Math.min(frames, Math.floor(16 * count / (clock() - begin + 1e-3))));
@@ -63,8 +80,9 @@ BRISK = """(frames) => {
 """A page's time: up to ``frames`` frames of 1/60 s each time that the browser draws one.
 
 So a stroke of seconds takes as long as its frames take to work out, and a frame is 1/60 s to the
-page on a busy computer, too. Of the frames that the browser draws as one, graphics in three
-dimensions are those of the last: without a graphics card each takes 18 ms at 360 x 640.
+page on a busy computer, too. Timers go by the same time: each is called before the first frame that
+is not earlier. Of the frames that the browser draws as one, graphics in three dimensions are those
+of the last: without a graphics card each takes 18 ms at 360 x 640.
 """
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (

@@ -50,6 +50,33 @@ def test_a_request_to_elsewhere_and_an_error_are_seen(tmp_path: Path) -> None:
         assert any("thrown" in error for error in seen.errors)
 
 
+TIMED = """() => new Promise((done) => {
+  const begin = performance.now(), seen = [];
+  const note = (name) => () => seen.push([name, Math.round(performance.now() - begin)]);
+  const each = setInterval(note("each"), 40);
+  setTimeout(note("late"), 100);
+  setTimeout(note("soon"), 50);
+  const never = setTimeout(note("never"), 60);
+  clearTimeout(never);
+  setTimeout((name) => { note(name)(); clearInterval(each); }, 121, "given");
+  setTimeout(() => setTimeout(() => done(seen), 1), 200);
+})"""
+
+
+@pytest.mark.parametrize("slowed", [1, 20])
+def test_timers_go_by_the_time_of_the_page_on_a_slow_computer_too(
+    tmp_path: Path, slowed: int
+) -> None:
+    file = tmp_path / "page.html"
+    file.write_text("<!doctype html><p>Nothing.</p>", encoding="utf-8")
+    with open_browser() as chromium:
+        page, _ = open_file(chromium, file)
+        of_page = page.context.new_cdp_session(page)
+        of_page.send("Emulation.setCPUThrottlingRate", {"rate": slowed})
+        each = [["each", 40], ["soon", 50], ["each", 80], ["late", 100], ["each", 120]]
+        assert page.evaluate(TIMED) == [*each, ["given", 121]]
+
+
 def test_webgl_is_there_without_a_graphics_card(tmp_path: Path) -> None:
     file = tmp_path / "page.html"
     file.write_text("<!doctype html><canvas id=c></canvas>", encoding="utf-8")

@@ -84,6 +84,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     "fit physical": ("at most", "signs of levels: sds by which one is below zero"),
     "fit start": ("at least", f"{_SEARCH}: least way from its start, in prior sds"),
     "fit bandwidth": ("at most", f"{_INTERVALS}: sds by which a parameter moves with the cutoff"),
+    "fit steady sweeps": (
+        "at most",
+        "friction at the slowest rates: share of time at rest in the sweeps that rested most",
+    ),
     "fit sensors": ("at most", "what was measured: share of samples that a sensor spoilt"),
     "fit sensor zeros": (
         "at most",
@@ -172,6 +176,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "at most",
         "stability of what is felt: rendered stiffness over what the rig renders in a hand",
     ),
+    "render felt torque": (
+        "at most",
+        TORQUE + "its change by what the rig cannot render stably, rms over the scene's strokes",
+    ),
     "render deadline": ("at most", f"{_LOOP}: 99 % of the latencies, us"),
     "render misses": ("at most", f"{_LOOP}: share of lost frames"),
     "render faults": ("at most", f"{_LOOP}: faults that the device latched"),
@@ -210,6 +218,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "at least",
         "whether the rig follows a capture without swinging: phase margin of its controller, "
         "degrees",
+    ),
+    "device steady sweeps": (
+        "at most",
+        "friction at the slowest rates: rate in rad/s below which blades stick and slip",
     ),
     "device drift": (
         "at most",

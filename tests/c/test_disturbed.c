@@ -429,7 +429,7 @@ int main(int argc, char **argv)
     CHECK(f.unlatched == 0, TITLE);
     CHECK(f.late_news == 0, TITLE);
     CHECK(f.stops > 0 && f.ends > 0, TITLE);
-    CHECK(f.end_s <= 0.105 && f.plate_out > 1000, TITLE);
+    CHECK(f.end_s <= 0.355 && f.plate_out > 1000, TITLE);
     CHECK(f.silence_over_s <= 0.006, TITLE);
     CHECK(f.energy_error <= 1e-9 && f.energy_moved > 0.0, TITLE);
     json_free(&vectors);

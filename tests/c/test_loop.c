@@ -1,5 +1,5 @@
 /* The loop against a device played by another thread, over a socket pair. How large a torque becomes
- * depends on when the threads run, since it falls in silence: that is of test_servo. */
+ * depends on when the threads run, since it falls in silence: that is of test_servo, and of test_loop_clock. */
 #define _POSIX_C_SOURCE 200809L
 
 #include "check.h"

@@ -1,5 +1,5 @@
 /* The loop by a made-up clock: when it ends for silence, of the device or of its supervisor, and
- * that a pause of this computer is neither. */
+ * that a pause of this computer is neither; and how large the torque of damping becomes. */
 #define _POSIX_C_SOURCE 200809L
 
 #include "check.h"
@@ -14,6 +14,9 @@
 #include <time.h>
 #include <unistd.h>
 
+#define RATE_PER_TICK 1e-4f /* rad; 0.1 rad/s, closing */
+#define TORQUE_LIMIT 0.25f
+
 enum { TICK_NS = 1000000, BEFORE = 100, AFTER = 100, LIMIT_MS = 1000, SUPERVISOR_MS = 100 };
 
 /* A device that sends a state each tick of the made-up clock, and what happens to it. */
@@ -27,6 +30,8 @@ static struct {
     int falls_silent;    /* after the first states */
     int beats;           /* whether the supervisor goes on after them */
     int commands;
+    sc_decoder decoder;  /* of the commands */
+    float largest;       /* torque of a command */
 } world;
 
 static int made_up_clock(clockid_t clock, struct timespec *now)
@@ -79,15 +84,22 @@ static ssize_t made_up_read(int fd, void *bytes, size_t room)
         sc_block_stop(world.block);
     }
     const sc_state state = {SC_STATE_MOTOR_ENABLED, world.sequence, 1000u * world.sequence,
-                            0.5f, 0.0f, 0.0f, 0.0f};
+                            0.5f - RATE_PER_TICK * (float)world.sequence, 0.0f, 0.0f, 0.0f};
     CHECK(room >= SC_FRAME_MAX, "room");
     return (ssize_t)sc_encode_frame(payload, sc_pack_state(&state, payload), bytes, room);
 }
 
 static ssize_t made_up_write(int fd, const void *bytes, size_t size)
 {
+    size_t taken = 0;
+    int got;
+    sc_command command;
     (void)fd;
-    (void)bytes;
+    while ((got = sc_decoder_feed(&world.decoder, bytes, size, &taken)) > 0) {
+        CHECK(sc_unpack_command(world.decoder.buffer, (size_t)got, &command), "command");
+        CHECK(command.torque >= 0.0f, "damping opposes closing");
+        world.largest = fmaxf(world.largest, fabsf(command.torque));
+    }
     world.commands++;
     return (ssize_t)size;
 }
@@ -102,16 +114,17 @@ static ssize_t made_up_write(int fd, const void *bytes, size_t size)
 #undef read
 #undef write
 
-static uint32_t run(int64_t pause_ns, int falls_silent, int beats)
+static uint32_t run_in(uint32_t mode, float damping, int64_t pause_ns, int falls_silent, int beats)
 {
     sc_block *block = malloc((size_t)sc_block_size(1));
     if (block == NULL) {
         exit(2);
     }
     sc_block_init(block, 1);
-    block->config.torque_limit = 0.25f;
+    block->config.torque_limit = TORQUE_LIMIT;
     block->config.torque_slew = 100.0f;
-    block->config.damping_Nm_s_per_rad = 1.0f;
+    block->config.damping_Nm_s_per_rad = damping;
+    block->config.rate_cutoff_Hz = 100.0f;
     block->config.opening_error_limit = 1.0f;
     block->config.advance_error_limit = 1.0f;
     block->config.supervisor_ms = SUPERVISOR_MS;
@@ -128,13 +141,19 @@ static uint32_t run(int64_t pause_ns, int falls_silent, int beats)
     world.pause_ns = pause_ns;
     world.falls_silent = falls_silent;
     world.beats = beats;
-    sc_block_order(block, SC_MODE_IDLE);
+    sc_decoder_init(&world.decoder);
+    sc_block_order(block, mode);
     const int line = open("/dev/null", O_RDWR);
     const uint32_t reason = run_by_the_made_up_clock(line, block);
     close(line);
     CHECK(block->servo.frames == world.sequence, "every state is taken");
     free(block);
     return reason;
+}
+
+static uint32_t run(int64_t pause_ns, int falls_silent, int beats)
+{
+    return run_in(SC_MODE_IDLE, 1.0f, pause_ns, falls_silent, beats);
 }
 
 int main(void)
@@ -153,5 +172,11 @@ int main(void)
 
     CHECK(run(1300 * ms, 0, 0) == SC_STOP_SUPERVISOR_LOST, "a pause does not hide it");
     NEAR(world.sequence - BEFORE, 5 * SUPERVISOR_MS, 12, "after", "a pause counts for 10 ms");
+
+    /* Damping times the rate of 0.1 rad/s, which the filter of 1.6 ms has reached, and the limit. */
+    CHECK(run_in(SC_MODE_DAMP, 1.0f, 0, 0, 1) == SC_STOP_ASKED, "damped");
+    NEAR(world.largest, 0.1, 1e-3, "torque", "damped");
+    CHECK(run_in(SC_MODE_DAMP, 5.0f, 0, 0, 1) == SC_STOP_ASKED, "damped more");
+    NEAR(world.largest, TORQUE_LIMIT, 0.0, "torque", "damped at the limit");
     return checks_done("loop by a made-up clock");
 }

@@ -113,6 +113,19 @@ def test_a_distinguishable_candidate_is_not_equivalent():
     assert rows[1]["loo_se"] > 0
 
 
+def test_bic_counts_as_many_bins_as_are_independent():
+    """-2 log L + k log n (Schwarz 1978), with log L and n of that share of the bins.
+
+    Left out of log L is log(2 pi) / 2 of each bin, which all candidates have.
+    """
+    fitted = fitted_pair(0.2, 1)
+    share = fitted[1].share  # of the best
+    for one, row, k in zip(fitted, candidate_rows(fitted, choose(fitted)), (2, 3), strict=True):
+        z, log_sd = one.candidate.likelihood.normal(one.optimum.point)
+        expected = share * np.sum(z**2 + 2.0 * log_sd) + k * np.log(share * STROKES * BINS)
+        assert row["bic"] == pytest.approx(expected, rel=1e-12)
+
+
 def test_a_difference_too_small_to_feel_leaves_candidates_equivalent():
     fitted = fitted_pair(0.2, 1)
     assert choose(fitted, signal_rms=1e3).equivalent == ("line", "parabola")

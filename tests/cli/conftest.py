@@ -24,7 +24,9 @@ from scissorcal.vision.sim.sim_camera import (
     render_plate_photographs,
 )
 from scissorcal.workday.tracking import sim_world
+from scissorcal.workday.workspace import Workspace
 from tests.made_once import copied
+from tests.workday.made import fitted_copy
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,25 @@ def workspace(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
     assert cli("init", folder, "--recipe", "paper-80gsm").code == 0
     monkeypatch.chdir(folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def packed_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace with fits and their package."""
+    folder = tmp_path_factory.mktemp("packed") / "paper"
+    workspace = fitted_copy(tmp_path_factory, folder, "friction", "cut")
+    with pytest.raises(SystemExit) as ended:
+        run(["package", "build", "--workspace", str(workspace.root)])
+    assert ended.value.code == 0
+    return workspace.root
+
+
+@pytest.fixture
+def packed(packed_once: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+    """A copy of it; stand in it."""
+    folder = copied(packed_once, tmp_path / "paper")
+    monkeypatch.chdir(folder)
+    return Workspace(folder)
 
 
 @pytest.fixture(scope="session")

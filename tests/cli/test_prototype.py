@@ -18,36 +18,20 @@ from pathlib import Path
 from typing import Any
 
 import aiohttp
-import numpy as np
 import pytest
 
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.sim.process import SimProcess
-from scissorcal.package import build_package
 from scissorcal.recording import RecordingWriter, Stroke, read_recording
 from scissorcal.render.engine import REQUEST
 from scissorcal.workday.runs.prototype import workspace_hands
-from scissorcal.workday.workspace import Workspace, create_workspace
+from scissorcal.workday.workspace import Workspace
 from tests.guard import GUARD_S
-from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.prototype.made import ask, heard, samples_of
 from tests.strange_device import StrangeDevice
 from tests.strange_device.terminal import serve_on_pty
 
 from .conftest import Cli
-
-
-@pytest.fixture
-def packed(tmp_path: Path) -> Workspace:
-    """A workspace with a package."""
-    workspace = create_workspace(tmp_path / "paper", "paper-80gsm")
-    (workspace.root / "package").mkdir()
-    chosen = recipe()
-    friction = friction_fit(coulomb=0.014, stribeck=0.004, viscous=0.002)
-    cut = cut_fit(chosen, kappa=0.75, energy=0.52)
-    path = workspace.package_path(workspace.recipe())
-    build_package(chosen, friction, cut, path, np.random.default_rng(1))
-    return workspace
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,17 +58,17 @@ def test_no_finer_grid_finds_better_gains() -> None:
     assert decay == pytest.approx(contact_decay(LOOP, gains))
 
 
-@settings(max_examples=2)
-@given(
-    stiffness=st.floats(1e2, 1e5),
-    mass=st.floats(0.02, 2.0),
-    delay_ms=st.floats(0.0, 5.0),
-    tick_us=st.sampled_from([250, 500, 1000, 2000]),
-    cutoff=st.sampled_from([0.0, 100.0, 400.0]),
-)
-def test_gains_hold_at_every_corner_or_are_refused_with_a_figure_that_holds(
-    stiffness: float, mass: float, delay_ms: float, tick_us: int, cutoff: float
-) -> None:
+LOOPS = {
+    "stiffness": st.floats(1e2, 1e5),
+    "mass": st.floats(0.02, 2.0),
+    "delay_ms": st.floats(0.0, 5.0),
+    "tick_us": st.sampled_from([250, 500, 1000, 2000]),
+    "cutoff": st.sampled_from([0.0, 100.0, 400.0]),
+}
+
+
+def try_gains(stiffness: float, mass: float, delay_ms: float, tick_us: int, cutoff: float) -> None:
+    """Gains hold at every corner, or are refused with a figure that holds."""
     late = (1e-3 * delay_ms, 1.5e-3, 1e-6 * tick_us)
     loop = ContactLoop(stiffness, mass, 0.2, *late, cutoff)
     try:
@@ -95,6 +96,19 @@ def test_gains_hold_at_every_corner_or_are_refused_with_a_figure_that_holds(
         effort_limit=(1.0, 1.0),
         **gains.settings(),
     )
+
+
+@settings(max_examples=2)
+@given(**LOOPS)
+def test_gains_hold_at_every_corner_or_are_refused_with_a_figure_that_holds(**of: Any) -> None:
+    try_gains(**of)
+
+
+@pytest.mark.slow
+@settings(max_examples=15)
+@given(**LOOPS)
+def test_gains_of_more_loops_hold_or_are_refused_with_a_figure_that_holds(**of: Any) -> None:
+    try_gains(**of)
 
 
 def test_what_cannot_be_held_is_refused_with_the_figures_that_could() -> None:

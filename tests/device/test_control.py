@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +17,18 @@ from scissorcal.device.capture_gains import (
     Probed,
     capture_gains,
 )
-from scissorcal.device.control import Axis, Gains, loop_margins, loop_poles, open_loop, sag
+from scissorcal.device.control import (
+    Axis,
+    Gains,
+    greatest_fall,
+    loop_margins,
+    loop_poles,
+    open_loop,
+    sag,
+)
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
+from scissorcal.device.slow_sliding import StribeckFall
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Identity
 from scissorcal.recipe.library import builtin_recipe
@@ -83,16 +93,16 @@ def test_poles_and_sag_are_those_of_a_simulated_loop(delay_s: float) -> None:
     assert np.abs(steps_of(axis, swinging, 400)).max() > 10.0 * sag(axis, gains)
 
 
-@settings(max_examples=10)
-@given(
-    delay_ms=st.floats(0.0, 6.0),
-    tick_us=st.sampled_from([250, 500, 1000, 2000]),
-    inertia=st.floats(5e-5, 1e-3),
-    size=st.floats(0.05, 0.6),
-)
-def test_margins_are_where_poles_reach_the_unit_circle(
-    delay_ms: float, tick_us: int, inertia: float, size: float
-) -> None:
+AXES = {
+    "delay_ms": st.floats(0.0, 6.0),
+    "tick_us": st.sampled_from([250, 500, 1000, 2000]),
+    "inertia": st.floats(5e-5, 1e-3),
+    "size": st.floats(0.05, 0.6),
+}
+
+
+def compare_margins(delay_ms: float, tick_us: int, inertia: float, size: float) -> None:
+    """Margins are where poles reach the unit circle."""
     axis = replace(AXIS, delay_s=1e-3 * delay_ms, tick_s=1e-6 * tick_us, inertia=inertia)
     omega = size / (axis.delay_s + 1.5 * axis.tick_s + 1.3e-3)
     shape = Gains(omega / 3.0, 1.0, omega**2 / 40.0)
@@ -118,6 +128,19 @@ def test_margins_are_where_poles_reach_the_unit_circle(
     assert not (settles(1.1 * margins.gain) and settles(0.9 / margins.gain))
 
 
+@settings(max_examples=10)
+@given(**AXES)
+def test_margins_are_where_poles_reach_the_unit_circle(**of: Any) -> None:
+    compare_margins(**of)
+
+
+@pytest.mark.slow
+@settings(max_examples=25)
+@given(**AXES)
+def test_margins_of_more_axes_are_where_poles_reach_the_unit_circle(**of: Any) -> None:
+    compare_margins(**of)
+
+
 @pytest.mark.parametrize(
     ("tick_us", "delay_ms"), [(250, 0.2), (250, 3.0), (500, 1.0), (1000, 0.2), (2000, 3.0)]
 )
@@ -133,7 +156,7 @@ def test_designs_keep_their_margins(tick_us: int, delay_ms: float) -> None:
         delay_s=probed.delay_s,
         tick_s=1e-6 * tick_us,
         rate_cutoff_Hz=found.rate_cutoff_Hz,
-        inertia_factor=1.15,
+        inertia_factor=probed.inertia_factor,
     )
     margins = loop_margins(axis, found.opening)
     assert margins.enough
@@ -152,6 +175,115 @@ def test_what_is_late_is_refused_with_the_delay_that_would_do() -> None:
     enough = 1e-3 * float(str(no.value).split("at most ")[1].split()[0])
     assert 2e-3 < enough < 10e-3
     capture_gains(recipe, IDENTITY, "cut", replace(PROBED, delay_s=0.95 * enough))
+
+
+@settings(max_examples=15)
+@given(
+    inertia=st.floats(5e-5, 1e-3),
+    spread=st.floats(0.0, 0.4),
+    delay_ms=st.floats(0.2, 3.0),
+    late_ms=st.floats(0.0, 0.5),
+    viscous=st.floats(0.0, 5e-3),
+)
+def test_margins_hold_over_the_probes_interval(
+    inertia: float, spread: float, delay_ms: float, late_ms: float, viscous: float
+) -> None:
+    """At both ends of ln inertia, mean +- 1.645 sd, and the upper end of the delay."""
+    sds = spread * inertia, 1e-3 * late_ms
+    probed = Probed(inertia, sds[0], viscous, 0.015, 1e-3 * delay_ms, (), sds[1])
+    try:
+        found = capture_gains(builtin_recipe("paper-80gsm"), IDENTITY, "friction", probed)
+    except DeviceError:
+        return
+    for end in (-1.645, 1.645):
+        axis = replace(
+            AXIS,
+            inertia=inertia * math.exp(end * spread),
+            viscous=viscous,
+            delay_s=1e-3 * (delay_ms + 1.645 * late_ms),
+            rate_cutoff_Hz=found.rate_cutoff_Hz,
+        )
+        margins = loop_margins(axis, found.opening)
+        assert margins.phase_deg > 44.9
+        assert margins.gain > 1.99
+
+
+def test_sweeps_of_friction_get_damping_and_strokes_of_a_cut_stiffness() -> None:
+    recipe = builtin_recipe("paper-80gsm")
+    sweeps = capture_gains(recipe, IDENTITY, "friction", PROBED)
+    strokes = capture_gains(recipe, IDENTITY, "cut", PROBED)
+    assert sweeps.opening.kd > 1.2 * strokes.opening.kd
+    assert sweeps.opening.kp < strokes.opening.kp
+    axis = replace(AXIS, rate_cutoff_Hz=sweeps.rate_cutoff_Hz)
+    assert greatest_fall(axis, sweeps.opening) > 1.3 * greatest_fall(axis, strokes.opening)
+
+
+@settings(max_examples=10)
+@given(level=st.floats(1e-4, 1e-2), rate=st.floats(0.02, 0.3))
+def test_a_known_fall_of_friction_is_stood_or_the_slowest_steady_rate_is_said(
+    level: float, rate: float
+) -> None:
+    recipe = builtin_recipe("paper-80gsm")
+    probed = replace(PROBED, stribeck=StribeckFall(level, rate))
+    found = capture_gains(recipe, IDENTITY, "friction", probed)
+    axis = replace(
+        AXIS,
+        inertia_factor=probed.inertia_factor,
+        rate_cutoff_Hz=found.rate_cutoff_Hz,
+    )
+    stood = greatest_fall(axis, found.opening)
+    speeds = np.geomspace(0.01 * rate, 10.0 * rate, 400)
+    fall = 2.0 * level * speeds / rate**2 * np.exp(-((speeds / rate) ** 2))
+    assert found.steady_from == found.sticks_below
+    assert found.steady_from is not None
+    assert np.all(fall[speeds >= found.steady_from] <= 1.001 * stood)
+    if found.steady_from > 0.0:
+        just = speeds[(speeds < found.steady_from) & (speeds > 0.95 * found.steady_from)]
+        assert np.all(2.0 * level * just / rate**2 * np.exp(-((just / rate) ** 2)) >= 0.99 * stood)
+        assert fall.max() > stood
+    verdict = found.verdicts[1]
+    assert (verdict.status == "pass") == (found.steady_from <= 0.05)
+    assert f"{stood:.2g}" in verdict.why
+
+
+def test_where_the_fall_is_not_known_the_bound_holds_for_every_stribeck_rate() -> None:
+    bound = StribeckFall.within(0.014)
+    steady = bound.steady_from(0.05)
+    assert steady == pytest.approx(2.0 / math.e * 0.6 * 0.014 / 0.05)
+    for rate in np.geomspace(1e-3, 10.0, 60):
+        known = StribeckFall(bound.level, float(rate))
+        assert known.steady_from(0.05) <= steady * (1.0 + 1e-9)
+    found = capture_gains(builtin_recipe("paper-80gsm"), IDENTITY, "friction", PROBED)
+    assert found.sticks_below == 0.0
+    assert found.verdicts[1].status == "not_evaluated"
+    assert "slower ones are tried" in found.verdicts[1].why
+
+
+def test_facts_of_a_probe_tell_how_friction_falls() -> None:
+    facts = {"stribeck_Nm": 4e-3, "stribeck_rate_rad_per_s": 0.07}
+    result = ProbeResult("rig", "0", "2026-11-22T20:00:00+00:00", facts=facts)
+    probed = Probed.of(result)
+    assert probed is not None
+    assert probed.stribeck == StribeckFall(4e-3, 0.07)
+    part = Probed.of(replace(result, facts={"stribeck_Nm": 4e-3}))
+    assert part is not None
+    assert part.stribeck is None
+
+
+@settings(max_examples=15)
+@given(delay_ms=st.floats(0.0, 3.0), inertia=st.floats(5e-5, 1e-3), kd=st.floats(0.01, 0.03))
+def test_the_greatest_fall_is_where_a_loop_begins_to_swing(
+    delay_ms: float, inertia: float, kd: float
+) -> None:
+    axis = replace(AXIS, delay_s=1e-3 * delay_ms, inertia=inertia)
+    gains = Gains(20.0 * kd, kd, 100.0 * kd)
+    fall = greatest_fall(axis, gains)
+    assert fall <= kd + axis.viscous
+    if fall == 0.0:
+        return
+    for share, settles in ((0.99, True), (1.01, False)):
+        fallen = replace(axis, viscous=axis.viscous - share * fall)
+        assert (np.abs(loop_poles(fallen, gains)).max() < 1.0) == settles
 
 
 def test_a_coarse_encoder_lowers_the_gains() -> None:
@@ -190,7 +322,7 @@ def test_a_known_delay_counts_where_the_probe_told_no_inertia() -> None:
     found = capture_gains(recipe, IDENTITY, "friction", probed)
     assert found.opening.kp < 0.5
     assert "found delay, and could not tell inertia and dry friction" in found.verdicts[0].why
-    with pytest.raises(DeviceError, match=r"acts 5 ms after.*largest_torque_Nm"):
+    with pytest.raises(DeviceError, match=r"acts 5.2 ms after.*largest_torque_Nm"):
         capture_gains(recipe, IDENTITY, "cut", probed)
     keys = {"opening_kp_Nm_per_rad": 1.0, "opening_kd_Nm_s_per_rad": 0.02}
     stated = changed("paper-80gsm", rig__control={**keys, "opening_ki_Nm_per_rad_s": 5.0})

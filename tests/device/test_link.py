@@ -231,13 +231,24 @@ def test_unplugging_is_a_device_error(far_end: Make) -> None:
         {"torque_limit": 0.0},
         {"opening_min": 1.0},
         {"advance_max": -1.0},
-        {"tick_us": 0},
         {"handle_radius": float("inf")},
     ],
 )
 def test_invalid_limits_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(DeviceError, match=next(iter(wrong))):
         check_identity("port", IDENTITY._replace(**wrong))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("tick_us", [0, 249, 10_001, 2**32 - 1])
+def test_ticks_beyond_the_protocol_s_are_refused(tick_us: int) -> None:
+    with pytest.raises(DeviceError, match="from 250 us to 10000 us"):
+        check_identity("port", IDENTITY._replace(tick_us=tick_us))
+
+
+@pytest.mark.parametrize("tick_us", [250, 10_000])
+def test_the_protocol_s_shortest_and_longest_tick_are_taken(tick_us: int) -> None:
+    identity = IDENTITY._replace(tick_us=tick_us)
+    assert check_identity("port", identity) == identity
 
 
 def test_the_round_trip_is_the_time_from_question_to_answer(

@@ -83,19 +83,56 @@ def test_friction_sweeps_every_speed_both_ways_across_the_whole_scene() -> None:
     recipe = builtin_recipe("paper-80gsm")
     plan = friction_plan(recipe, IDENTITY, advance=-0.06)
     low, high = recipe.scene.opening_rad
+    cells = np.zeros((10, 2, len(recipe.capture.friction.speeds_rad_per_s)), dtype=bool)
     for index, opening, rate, advance in each_stroke(plan)[:-1]:
         stroke = plan.strokes[index]
         assert np.all(advance == -0.06)
         assert np.all(rate <= 0 if stroke.kind == "closing" else rate >= 0)
         cruising = np.abs(rate) > 0.99 * stroke.speed
-        assert opening[cruising].min() < low + 0.03
-        assert opening[cruising].max() > high - 0.03
+        inside = np.histogram(opening[cruising], 10, (low + 0.03, high - 0.03))[0] > 0
+        speed = recipe.capture.friction.speeds_rad_per_s.index(stroke.speed)
+        cells[:, int(stroke.kind == "opening"), speed] |= inside
+    assert np.all(cells)
     planned = {(stroke.kind, stroke.speed) for stroke in plan.strokes[:-1]}
     speeds = recipe.capture.friction.speeds_rad_per_s
     assert planned == {(kind, speed) for kind in ("closing", "opening") for speed in speeds}
-    assert len(plan.strokes) == 4 * len(speeds) + 1
+    assert len(plan.strokes) == (2 + 3) * len(speeds) + 1
     assert plan.strokes[-1].kind == "excitation"
     assert [index for index, *_ in each_stroke(plan)] == list(range(len(plan.strokes)))
+
+
+@settings(max_examples=20)
+@given(
+    speeds=st.lists(st.floats(0.03, 1.5), min_size=2, max_size=4, unique=True),
+    repeats=st.integers(1, 3),
+)
+def test_half_of_the_sweeps_turn_in_the_middle(speeds: list[float], repeats: int) -> None:
+    """Each sweep covers the range both ways; every second begins after a turn in its middle."""
+    recipe = changed(
+        "paper-80gsm",
+        capture__friction={
+            "speeds_rad_per_s": tuple(speeds),
+            "repeats": repeats,
+            "excitation_s": 1.0,
+        },
+    )
+    low, high = recipe.scene.opening_rad
+    plan = friction_plan(recipe, IDENTITY)
+    reference = plan.segments[0].reference
+    moving = np.sign(reference.opening_rate)
+    turned = from_ends = 0
+    for index, opening, _, _ in each_stroke(plan)[:-1]:
+        begin = int(np.flatnonzero(reference.stroke == index)[0])
+        before = moving[:begin][moving[:begin] != 0]
+        there = 1.0 if plan.strokes[index].kind == "opening" else -1.0
+        assert abs(opening[-1] - opening[0]) > 0.3 * (high - low)
+        middle = abs(opening[0] - 0.5 * (low + high)) < 0.25 * (high - low)
+        assert not middle or before[-1] == -there, "it begins with a turn"
+        turned, from_ends = turned + middle, from_ends + (not middle)
+    sweeps = len(speeds) * repeats
+    middles = sum((place + repeat) % 2 for repeat in range(repeats) for place in range(len(speeds)))
+    assert turned == middles
+    assert from_ends == 2 * (sweeps - middles) + 2 * middles
 
 
 @pytest.mark.parametrize("name", [*CUTTING, "press-only"])

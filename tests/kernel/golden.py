@@ -316,7 +316,8 @@ def servo_cases() -> dict[str, tuple[ServoConfig, str, list[tuple[int, int, floa
     wrapped = [
         ((2**32 - 30 + k) % 2**32, (2**32 - 41_500 + us) % 2**32, o, a) for k, us, o, a in steady
     ]
-    pause = [s if s[0] < 40 else (s[0], s[1] + 250_000, *s[2:]) for s in steady]
+    pause = [s if s[0] < 40 else (s[0] + 250, s[1] + 250_000, *s[2:]) for s in steady]
+    leapt = [s if s[0] < 40 else (s[0], s[1] + 250_000, *s[2:]) for s in steady]
     reborn = [s if s[0] < 40 else (s[0], s[1] - 39_000, *s[2:]) for s in steady]
     return {
         "tracking": (config, "track", steady),
@@ -327,6 +328,7 @@ def servo_cases() -> dict[str, tuple[ServoConfig, str, list[tuple[int, int, floa
         "damping with lost frames": (config, "damp", gaps),
         "damping after a pause": (config, "damp", pause),
         "damping after the device restarted its clock": (config, "damp", reborn),
+        "damping after the device's clock leapt": (config, "damp", leapt),
         "idle": (config, "idle", steady),
     }
 

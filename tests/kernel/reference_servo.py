@@ -18,7 +18,7 @@ class ReferenceServo:
     rates: list[float] = field(default_factory=lambda: [0.0, 0.0])
     integrals: list[float] = field(default_factory=lambda: [0.0, 0.0])
     sent: list[float] = field(default_factory=lambda: [0.0, 0.0])
-    last: tuple[int, float, float] | None = None
+    last: tuple[int, int, float, float] | None = None
     engaged_at: int | None = None
 
     def engage(self, mode: str) -> None:
@@ -28,7 +28,7 @@ class ReferenceServo:
 
     def step(self, sequence: int, us: int, opening: float, advance: float) -> tuple[float, ...]:
         """Torque, force and the estimated rates."""
-        dt = self._measure(us, opening, advance)
+        dt = self._measure(sequence, us, opening, advance)
         if self.engaged_at is None:
             self.engaged_at = sequence
         if self.mode == "idle":
@@ -48,23 +48,17 @@ class ReferenceServo:
             self.sent[axis] = min(max(aim, low), high)
         return (*self.sent, *self.rates)
 
-    def _measure(self, us: int, opening: float, advance: float) -> float:
-        if self.last is None:
-            self.last = (us, opening, advance)
+    def _measure(self, sequence: int, us: int, opening: float, advance: float) -> float:
+        last, self.last = self.last, (sequence, us, opening, advance)
+        if last is None:
             return 0.0
-        passed = (us - self.last[0]) % 2**32
-        if passed == 0 and (opening, advance) == self.last[1:]:
-            return 0.0
-        passed = passed or self.config.tick_us
-        if passed > 100_000:
-            self.rates = [0.0, 0.0]
-            passed = self.config.tick_us if passed >= 2**31 else passed
-        else:
-            weight = 2 * math.pi * self.config.rate_cutoff_Hz * passed * 1e-6
-            share = weight / (1 + weight) if self.config.rate_cutoff_Hz > 0 else 1.0
-            for axis, moved in enumerate((opening - self.last[1], advance - self.last[2])):
-                self.rates[axis] += share * (moved / (passed * 1e-6) - self.rates[axis])
-        self.last = (us, opening, advance)
+        by_ticks = (sequence - last[0]) % 2**32 * self.config.tick_us
+        stated = (us - last[1] + 2**31) % 2**32 - 2**31
+        passed = stated if by_ticks <= 2 * stated <= 4 * by_ticks else by_ticks
+        weight = 2 * math.pi * self.config.rate_cutoff_Hz * passed * 1e-6
+        share = weight / (1 + weight) if self.config.rate_cutoff_Hz > 0 else 1.0
+        for axis, moved in enumerate((opening - last[2], advance - last[3])):
+            self.rates[axis] += share * (moved / (passed * 1e-6) - self.rates[axis])
         return min(passed * 1e-6, 0.01)
 
     def _track(self, index: int, opening: float, advance: float, dt: float) -> list[float]:

@@ -133,18 +133,19 @@ def test_a_damped_blade_presses_harder_while_it_sinks_in():
     assert np.all(moving.torque[~closing] <= still.torque[~closing])
 
 
-@given(
-    kappa=st.floats(0.0, 1.0),
-    energy=st.sampled_from([1e-9, 1e-3, 0.5, 1e4]),
-    force=st.sampled_from([1e-6, 1.0, 1e6]),
-    exponent=st.floats(0.3, 5.0),
-    opening=st.lists(st.floats(-0.5, 2.0), min_size=2, max_size=30),
-    advance=st.floats(-0.2, 0.2),
-    blades=st.sampled_from([1, 2]),
-    damping=st.sampled_from([0.0, 1e3]),
-)
-@settings(max_examples=30)
-def test_extremes_stay_finite(kappa, energy, force, exponent, opening, advance, blades, damping):
+EXTREMES = {
+    "kappa": st.floats(0.0, 1.0),
+    "energy": st.sampled_from([1e-9, 1e-3, 0.5, 1e4]),
+    "force": st.sampled_from([1e-6, 1.0, 1e6]),
+    "exponent": st.floats(0.3, 5.0),
+    "opening": st.lists(st.floats(-0.5, 2.0), min_size=2, max_size=30),
+    "advance": st.floats(-0.2, 0.2),
+    "blades": st.sampled_from([1, 2]),
+    "damping": st.sampled_from([0.0, 1e3]),
+}
+
+
+def stays_finite(kappa, energy, force, exponent, opening, advance, blades, damping):
     """Crossed blades, leaps of the opening, sheets behind the pivot, stiffness of steel or foam."""
     one = cutting(
         BENT,
@@ -159,6 +160,19 @@ def test_extremes_stay_finite(kappa, energy, force, exponent, opening, advance, 
     for values in (path.torque, path.push, path.place, [path.stored, path.lost]):
         assert np.all(np.isfinite(values))
     assert np.all(np.diff(path.place) >= 0.0)
+
+
+@settings(max_examples=30)
+@given(**EXTREMES)
+def test_extremes_stay_finite(**extreme):
+    stays_finite(**extreme)
+
+
+@pytest.mark.slow
+@settings(max_examples=200)
+@given(**EXTREMES)
+def test_more_extremes_stay_finite(**extreme):
+    stays_finite(**extreme)
 
 
 def test_an_invalid_path_is_refused():

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from scissorcal.kernel import Mode, SampleFlag, Servo, State, StateFlag, StopReason
 from tests.kernel.test_servo import CONFIG, closing, rendering, state
+from tests.kernel.test_servo_stamps import STAMPS_UNTIL_STOP
 from tests.kernel.zoo import make_tables
 
 TICK_SLEW = CONFIG.torque_slew * CONFIG.tick_us * 1e-6
@@ -86,7 +87,7 @@ def test_a_clock_that_stands_does_not_freeze_the_torque_and_stops() -> None:
         cracks.append(servo.crack)
         assert tick < 200
     assert servo.stop_reason is StopReason.DEVICE_CLOCK
-    assert len(cracks) == 21
+    assert len(cracks) == 1 + STAMPS_UNTIL_STOP
     assert cracks[-2] > cracks[0], "the blades moved and cut"
 
 

@@ -110,8 +110,12 @@ def tracking(config: ServoConfig = CONFIG, seconds: float = 4.0) -> Servo:
     return servo
 
 
+LET_GO_TICKS = 260
+"""In which a gentle end is through."""
+
+
 def ends_gently(commands: Sequence[float]) -> bool:
-    steps = np.abs(np.diff(commands[-40:]))
+    steps = np.abs(np.diff(commands[-LET_GO_TICKS:]))
     return bool(abs(commands[-1]) < NO_TORQUE and steps.max() <= 0.1 * (1 + 1e-4))
 
 
@@ -133,8 +137,8 @@ def test_a_measured_torque_may_be_late_or_be_the_commanded_one(late: int) -> Non
 def test_a_late_loop_that_swings_is_stopped_before_it_is_wild(late: int) -> None:
     joint, servo = Joint(late=late), tracking()
     assert joint.run(servo, 4000) is StopReason.OSCILLATION
-    assert len(joint.commands) < 450
-    assert joint.fastest < 20.0
+    assert len(joint.commands) < 350 + LET_GO_TICKS
+    assert joint.fastest < 30.0
     assert ends_gently(joint.commands)
     assert "doctor" in servo.stop_reason.sentence
 
@@ -211,7 +215,7 @@ def test_an_encoder_that_stands_is_told_before_the_torque_is_large(since: int) -
     joint, servo = Joint(seen=seen), tracking()
     assert joint.run(servo, 4000) is StopReason.OPENING_STANDS
     assert max(map(abs, joint.commands)) < 0.3
-    assert ends_gently(joint.commands)
+    assert joint.commands[-1] == 0.0, "at once: an encoder that is wrong damps nothing"
 
 
 def test_blades_that_rest_under_unequal_torques_are_told() -> None:
@@ -327,7 +331,7 @@ def test_ticks_that_are_not_tick_us_long_are_told_by_this_computer() -> None:
 def test_a_torque_that_is_no_number_stops(bad: float) -> None:
     joint = Joint(measured=lambda torque: bad)
     assert joint.run(tracking(), 1000) is StopReason.UNREADABLE
-    assert len(joint.commands) < 40
+    assert len(joint.commands) < 20 + LET_GO_TICKS
 
 
 def test_a_torque_at_its_limit_for_too_long_stops() -> None:
@@ -357,23 +361,21 @@ def test_a_watch_needs_sound_thresholds() -> None:
 
 
 def test_what_is_seen_while_it_ends_does_not_take_the_first_reasons_place() -> None:
-    config = replace(CONFIG, opening_error_limit=0.032, torque_slew=0.5)
-    servo = tracking(config)
-    joint = Joint(seen=lambda tick, opening: 0.6)
-    assert joint.run(servo, 4000) is StopReason.OPENING_STANDS
-    assert servo.watched["opening_stands"] >= 1.0
+    """A torque that is no number ends it gently, an encoder that fails meanwhile at once."""
+    servo, joint = tracking(), Joint(measured=lambda torque: math.nan)
+    joint.run(servo, 60)
+    assert servo.stop_reason is StopReason.NONE
+    command = servo.step(State(65, 61, 61_000, 0.6, -0.02, math.nan, 0.0))
+    assert servo.stop_reason is StopReason.UNREADABLE
+    assert (command.flags, command.torque) == (0, 0.0)
 
 
 def test_an_ending_ends_also_where_the_device_repeats_itself() -> None:
-    servo = tracking(replace(CONFIG, torque_slew=0.5))
-    state = State(1, 0, 0, 0.6, -0.02, 0.0, 0.0)
-    for tick in range(1, 4000):
-        state = State(1, tick, 1000 * tick, 0.6, -0.02, 0.0, 0.0)
-        servo.step(state)
-        if servo.watched["opening_stands"] >= 1.0:
-            break
+    servo, joint = tracking(replace(CONFIG, torque_slew=0.5)), Joint(measured=lambda _: math.nan)
+    joint.run(servo, 60)
     assert servo.stop_reason is StopReason.NONE
-    for _ in range(120):
+    state = State(1, 60, 60_000, joint.opening, -0.02, math.nan, 0.0)
+    for _ in range(370):
         command = servo.step(state)
-    assert servo.stop_reason is StopReason.OPENING_STANDS
+    assert servo.stop_reason is StopReason.UNREADABLE
     assert command.torque == 0.0

@@ -67,7 +67,7 @@ def test_at_the_station_the_edge_has_the_height_and_rises(
     at, beta = found[known], BETA[known]
     reached = at * np.sin(beta) + edge.offset_at(at) * np.cos(beta)
     assert reached == pytest.approx(height, abs=1e-13)
-    assert np.all(np.sin(beta) + edge.slope_at(at) * np.cos(beta) >= -1e-13)
+    assert np.all(np.sin(beta) + edge.slope_at(at) * np.cos(beta) >= 0.0)
     stations = np.linspace(0.0, edge.length_m, 4001)
     away = np.multiply.outer(np.sin(BETA), stations) - height
     away += np.multiply.outer(np.cos(BETA), edge.offset_at(stations))

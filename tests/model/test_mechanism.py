@@ -124,7 +124,7 @@ def test_work_of_a_free_motion_is_kinetic_energy_and_losses():
         lambda t, q, v: free_acceleration(RIG, q, v, drive(t)),
         np.array([0.5, 0.0]),
         np.array([1.0, -0.05]),
-        np.linspace(0.0, 0.2, 5),
+        np.linspace(0.0, 0.6, 13),
         extra=(power,),
     )
     kinetic = 0.5 * (v**2 @ np.array([2.1e-4, 0.8]))

@@ -20,8 +20,9 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> PackageSummary:
 
 @pytest.fixture(scope="session")
 def pad(tmp_path_factory: pytest.TempPathFactory) -> PackageSummary:
-    """Pressed only, without friction."""
-    chosen = recipe("press-only", render_friction=False)
+    """Pressed only, without friction, over a scene that reaches the torque limit."""
+    wide = {"opening_deg": (12.0, 50.0), "contact_mm": (15.0, 60.0)}
+    chosen = recipe("press-only", render_friction=False, **wide)
     path = tmp_path_factory.mktemp("package") / "pad.zip"
     fit = cut_fit(chosen, energy=None, force=5.0)
     return build_package(chosen, None, fit, path, np.random.default_rng(3))

@@ -95,7 +95,7 @@ def test_every_flipped_byte_is_refused_or_harmless(
     assert refused > 0.8 * len(places)
 
 
-@settings(max_examples=60, suppress_health_check=HEALTH)
+@settings(max_examples=150, suppress_health_check=HEALTH)
 @given(data=st.data())
 def test_any_changed_range_of_a_member_is_refused(
     data: st.DataObject, paper: PackageSummary, copy_of_paper: Path
@@ -116,7 +116,7 @@ def test_any_changed_range_of_a_member_is_refused(
             open_package(copy_of_paper)
 
 
-@settings(max_examples=60, suppress_health_check=HEALTH)
+@settings(max_examples=150, suppress_health_check=HEALTH)
 @given(data=st.data())
 def test_any_changed_range_of_the_file_is_refused_or_harmless(
     data: st.DataObject, paper: PackageSummary, copy_of_paper: Path

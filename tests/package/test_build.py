@@ -196,7 +196,7 @@ def test_a_best_point_outside_its_posterior_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_scene_that_is_mostly_beyond_the_torque_limit_is_built(tmp_path: Path) -> None:
-    chosen = recipe("press-only", opening_deg=(12.0, 25.0))
+    chosen = recipe("press-only", opening_deg=(12.0, 25.0), contact_mm=(15.0, 60.0))
     fit = cut_fit(chosen, energy=None, force=500.0)
     summary = build_package(chosen, friction_fit(), fit, tmp_path / "p.zip", rng())
     assert summary.manifest.bound.scene_torque_Nm == chosen.limits.torque_Nm

@@ -214,7 +214,7 @@ def test_savings_are_measured_and_counted() -> None:
     assert choice.step_ns_fitted > 0
     assert choice.step_ns_used > 0
     assert choice.step_ratio > 0
-    assert saving.capture_s == pytest.approx(4 * np.radians(38.0) * (1 / 0.05 + 1 / 1.5))
+    assert saving.capture_s == pytest.approx(4 * np.radians(34.0) * (1 / 0.05 + 1 / 1.5))
     assert choice.simplification.bytes_before > choice.simplification.bytes_after
 
 

@@ -20,7 +20,8 @@ from scissorcal.render.admission_rule import (
 )
 from scissorcal.render.cures import stated_cures
 from scissorcal.render.derating import needs_of, softened
-from scissorcal.render.felt_cost import felt_change
+from scissorcal.render.felt_cost import FeltTorque, felt_change, felt_rates
+from scissorcal.render.felt_cures import Asked
 from scissorcal.render.result import _admitted
 from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts, with_probe
 from tests.kernel.zoo import make_tables
@@ -36,6 +37,7 @@ RIG = LoopFacts(
 )
 HAND = 0.02
 LIMIT, RATE = 1.0, 1.0
+ASKED = Asked(LIMIT, 0.05, RATE, tolerance=0.07, hand_damping=HAND)
 
 
 def test_the_rule_is_half_of_what_damping_takes_over_the_delay() -> None:
@@ -112,7 +114,7 @@ def test_a_softer_response_keeps_fracture_and_gentle_slopes(paper: ModelPackage)
 
 def test_a_rig_that_answers_at_once_renders_all(paper: ModelPackage) -> None:
     quick = replace(RIG, tick_s=2.5e-4, late_s=0.0)
-    found = admit(paper.tables, quick, HAND, LIMIT, RATE)
+    found = admit(paper.tables, quick, ASKED)
     assert found.evaluated
     assert not found.derated
     assert found.factor == 1.0
@@ -121,12 +123,13 @@ def test_a_rig_that_answers_at_once_renders_all(paper: ModelPackage) -> None:
 
 
 def test_what_is_derated_is_within_the_rule_and_says_what_it_costs(paper: ModelPackage) -> None:
-    found = admit(paper.tables, RIG, HAND, LIMIT, RATE)
+    found = admit(paper.tables, RIG, ASKED)
     assert found.derated
     assert 0.9 * found.allowed_in_hand < found.rendered <= found.allowed_in_hand < found.needed
     soft = rendered_tables(paper.tables, found)
     assert needs_of(soft, LIMIT).stiffness == pytest.approx(found.rendered)
-    assert found.felt_share == pytest.approx(felt_change(paper.tables, soft, LIMIT))
+    felt = FeltTorque(paper.tables, LIMIT, felt_rates(paper.tables, 0.05, RATE))
+    assert found.felt_share == pytest.approx(felt.change(soft, found.friction_width_rad))
     assert f"{found.factor:.0%}" in found.reasons[1]
     assert f"{found.felt_share:.1%}" in found.reasons[1]
 
@@ -135,14 +138,14 @@ def test_each_stated_cure_cures(paper: ModelPackage) -> None:
     """The figures of the cures: a delay, more damping."""
     needed = needs_of(paper.tables, LIMIT).stiffness
     fine = replace(RIG, encoder_step_rad=1e-6)
-    delay, damping = admit(paper.tables, fine, HAND, LIMIT, 1.5).cures
+    delay, damping = admit(paper.tables, fine, ASKED).cures
     quick = float(delay.split("A delay of ")[1].split(" ms")[0]) * 1e-3
     late = replace(fine, late_s=quick - 0.5 * fine.tick_s)
     assert delayed_stiffness(late, HAND) == pytest.approx(needed, rel=0.1)
     more = float(damping.split(" mN m s/rad")[0]) * 1e-3
     assert delayed_stiffness(fine, HAND + more) == pytest.approx(needed, rel=0.1)
     coarse = replace(RIG, encoder_step_rad=2.0 * math.pi / 2000, late_s=0.0, tick_s=1e-4)
-    dry, step = admit(paper.tables, coarse, 0.3, LIMIT, RATE).cures
+    dry, step = admit(paper.tables, coarse, replace(ASKED, hand_damping=0.3)).cures
     rough = float(dry.split("friction of ")[1].split(" mN m")[0]) * 1e-3
     assert allowed_stiffness(replace(coarse, coulomb_Nm=rough), 0.3) > 0.9 * needed
     finer = float(step.split("step of ")[1].split(" rad")[0])
@@ -194,22 +197,22 @@ def test_friction_alone_without_a_known_dry_friction_is_refused(paper: ModelPack
     tables = replace(paper.tables, fracture_energy=0.0, response=flat)
     assert needs_of(tables, LIMIT).friction_Nm > 0.0
     with pytest.raises(InputError, match="Capture friction again"):
-        admit(tables, replace(RIG, coulomb_Nm=0.0), HAND, LIMIT, RATE)
+        admit(tables, replace(RIG, coulomb_Nm=0.0), ASKED)
 
 
 def test_what_was_rendered_where_nothing_is_allowed_fails(paper: ModelPackage) -> None:
-    found = admit(paper.tables, RIG, HAND, LIMIT, RATE)
+    found = admit(paper.tables, RIG, ASKED)
     assert _admitted(found).status == "pass"
     assert _admitted(replace(found, allowed_in_hand=0.0)).status == "fail"
 
 
 def test_friction_near_rest_follows_the_encoder_and_the_delay(paper: ModelPackage) -> None:
     """Its own stiffness stays within the rule; a coarse encoder widens it further."""
-    known = admit(paper.tables, RIG, HAND, LIMIT, RATE)
+    known = admit(paper.tables, RIG, ASKED)
     level = needs_of(paper.tables, LIMIT).friction_Nm
     assert level / known.friction_width_rad <= known.allowed_in_hand * 1.000001
     coarse = replace(RIG, encoder_step_rad=2.0 * math.pi / 5000)
-    wide = admit(paper.tables, coarse, HAND, LIMIT, RATE)
+    wide = admit(paper.tables, coarse, ASKED)
     assert wide.friction_width_rad == pytest.approx(4.0 * coarse.encoder_step_rad)
     config = passivity_config(known, rig().identity)
     assert config.friction_width == known.friction_width_rad
@@ -220,14 +223,14 @@ def test_friction_near_rest_follows_the_encoder_and_the_delay(paper: ModelPackag
 def test_without_dry_friction_or_far_too_late_it_is_refused(paper: ModelPackage) -> None:
     for unfit in (replace(RIG, coulomb_Nm=0.0), replace(RIG, late_s=0.05)):
         with pytest.raises(InputError, match="cannot render the package stably"):
-            admit(paper.tables, unfit, HAND, LIMIT, RATE)
+            admit(paper.tables, unfit, ASKED)
 
 
 def test_a_material_damper_that_the_rate_is_too_late_for_is_rendered_weaker(
     paper: ModelPackage,
 ) -> None:
     oily = replace(paper.tables, rate_damping=100.0)
-    found = admit(oily, RIG, HAND, LIMIT, RATE)
+    found = admit(oily, RIG, ASKED)
     assert found.derated
     assert 0.0 < found.damping_share < 1.0
     assert "damping" in found.reasons[-1]
@@ -260,7 +263,7 @@ def test_what_a_probe_adds(paper: ModelPackage) -> None:
 
 
 def test_an_unknown_rig_is_not_evaluated(silent_paper: ModelPackage) -> None:
-    found = admit(silent_paper.tables, None, HAND, LIMIT, RATE)
+    found = admit(silent_paper.tables, None, ASKED)
     assert not found.evaluated
     assert not found.derated
     assert "not known" in found.reasons[0]

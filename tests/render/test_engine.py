@@ -62,6 +62,7 @@ def test_strokes_are_rendered_recorded_and_judged(paper: ModelPackage, tmp_path:
     assert result.latency is None
     assert {verdict.check: verdict.status for verdict in result.verdicts} == {
         "admission": "pass",
+        "felt torque": "pass",
         "deadline": "not_evaluated",
         "misses": "pass",
         "faults": "pass",
@@ -324,7 +325,11 @@ def test_a_device_that_cannot_reach_the_scene_is_refused(paper: ModelPackage) ->
 
 
 def test_a_device_of_another_rate_or_handle_is_named(paper: ModelPackage) -> None:
-    result = render(Disguised(handle_radius=0.05), paper, strokes=TWO, seconds=0.5)
+    other_handle = Disguised(handle_radius=0.05)
+    with pytest.raises(InputError, match=r"is of another rig.*handle radius of 50\.0 mm"):
+        render(other_handle, paper, strokes=TWO, seconds=0.5)
+    assert other_handle.virtual_time < 0.1
+    result = render(other_handle, paper, strokes=TWO, seconds=0.5, allow_mismatch=True)
     assert any("handle radius of 50.0 mm" in sentence for sentence in result.warnings)
     manifest = paper.manifest
     slow = manifest.mechanics.model_copy(update={"loop_rate_Hz": 500.0})

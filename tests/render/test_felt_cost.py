@@ -4,13 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from scissorcal.errors import InputError
 from scissorcal.kernel import ModelTables, Piece, PiecesModel, Strip
 from scissorcal.render.admission import admit, rendered_tables
 from scissorcal.render.derating import softened
-from scissorcal.render.felt_cost import felt_change, plate_strokes
+from scissorcal.render.felt_cost import FeltTorque, felt_change, felt_rates, plate_strokes
+from scissorcal.render.result import felt_verdict
 from tests.kernel.zoo import make_tables
-from tests.render.test_admission import HAND, LIMIT, RATE, RIG
+from tests.render.test_admission import ASKED, LIMIT, RIG
 
 FACE, ENERGY = 5e-5, 0.6
 TABLES = make_tables()
@@ -54,8 +58,8 @@ def test_a_plate_that_is_not_cut_is_pressed_at_each_of_its_edges() -> None:
     strokes = plate_strokes(TABLES, pads)
     middle = 0.5 * (TABLES.contact_min + TABLES.contact_max)
     assert [advance[-1] for _, advance, _ in strokes] == pytest.approx([-middle, 0.1 - middle])
-    pad = replace(TABLES, fracture_energy=0.0)
-    soft = replace(SOFT, fracture_energy=0.0)
+    there = {"fracture_energy": 0.0, "contact_min": middle, "contact_max": middle}
+    pad, soft = (replace(each, **there) for each in (TABLES, SOFT))
     assert felt_change(TABLES, SOFT, LIMIT, pads) == pytest.approx(
         felt_change(pad, soft, LIMIT), rel=1e-3
     )
@@ -105,7 +109,7 @@ def test_the_cost_is_what_the_core_renders_less_of_it() -> None:
 
 def test_admission_states_the_plates_own_cost() -> None:
     plate = (long_piece(3.0),)
-    found = admit(TABLES, RIG, HAND, LIMIT, RATE, plate)
+    found = admit(TABLES, RIG, ASKED, plate)
     soft = rendered_tables(TABLES, found)
     assert found.derated
     assert found.felt_share == pytest.approx(felt_change(TABLES, soft, LIMIT, plate))
@@ -116,6 +120,90 @@ def test_admission_states_the_plates_own_cost() -> None:
     assert f"{found.felt_sheet_share:.1%}" in said
     assert "drawn plate" in said
     assert "drawn plate" in found.summary
-    sheet = admit(TABLES, RIG, HAND, LIMIT, RATE)
+    sheet = admit(TABLES, RIG, ASKED)
     assert sheet.felt_share == sheet.felt_sheet_share
     assert "drawn plate" not in sheet.summary + sheet.reasons[1]
+
+
+def test_friction_near_rest_is_part_of_what_is_felt() -> None:
+    """Over twice the width friction turns from one sense to the other: by hand, level by level."""
+    air = replace(TABLES, render_friction=True, contact_min=0.07, contact_max=0.0701)
+    air = replace(air, fracture_energy=0.0, upper_face=1e-6, opening_min=0.5)
+    width, rate = 0.02, 0.5
+    felt = FeltTorque(air, LIMIT, (rate,))
+    assert felt.change(air) == 0.0
+    opening = np.linspace(air.opening_max, air.opening_min, 4000)
+    factor = 0.9 + 0.2 * opening
+    up, down = 0.010 + 0.004 * rate, 0.012 + 0.006 * rate
+    stretch = np.clip(1.0 - (air.opening_max - opening) / width, -1.0, 1.0)
+    whole = (down * factor).reshape(25, -1).mean(axis=1)
+    built = (-np.where(stretch > 0.0, up, down) * factor * stretch).reshape(25, -1).mean(axis=1)
+    expected = np.sqrt(np.mean((built - whole) ** 2) / np.mean(whole**2))
+    assert felt.change(air, width) == pytest.approx(expected, rel=1e-4)
+    assert expected > 0.2
+
+
+def test_a_weaker_damper_is_felt_at_the_scenes_rates() -> None:
+    oily = replace(TABLES, rate_damping=30.0)
+    weaker = replace(oily, rate_damping=10.0)
+    slow, fast = (FeltTorque(oily, LIMIT, (rate,)).change(weaker) for rate in (0.05, 1.0))
+    assert 0.0 < slow < 0.1 * fast
+    assert felt_rates(oily, 0.05, 1.0) == pytest.approx((0.05, 0.05**0.5, 1.0))
+    assert felt_rates(oily, 0.0, 0.001) == pytest.approx((0.01, 0.01, 0.01))
+
+
+@given(stiffer=st.floats(0.5, 3.0), late_ms=st.floats(0.3, 4.0), tolerance=st.floats(0.005, 0.2))
+@settings(max_examples=15)
+def test_each_felt_cure_brings_the_felt_torque_within_the_tolerance(
+    stiffer: float, late_ms: float, tolerance: float
+) -> None:
+    """Each sentence's own figure, put in alone, is enough; without one nothing is said."""
+    response = replace(
+        TABLES.response, x=TABLES.response.x / stiffer, slope=stiffer * TABLES.response.slope
+    )
+    tables = replace(TABLES, response=response, render_friction=True)
+    rig = replace(RIG, late_s=late_ms * 1e-3)
+    asked = replace(ASKED, tolerance=tolerance)
+    try:
+        found = admit(tables, rig, asked)
+    except InputError:
+        return
+    assert bool(found.felt_cures) <= found.is_felt
+    for cure in found.felt_cures:
+        facts, wanted, scene = rig, asked, tables
+        if "deg on" in cure:
+            from_deg = float(cure.split("openings from ")[1].split(" deg")[0])
+            scene = replace(tables, opening_min=np.radians(from_deg))
+        elif "contacts up to" in cure:
+            to_mm = float(cure.split("contacts up to ")[1].split(" mm")[0])
+            scene = replace(tables, contact_max=1e-3 * to_mm)
+        elif "delay of" in cure:
+            delay = float(cure.split("delay of ")[1].split(" ms")[0]) * 1e-3
+            tick = min(rig.tick_s, 2.0 * delay)
+            facts = replace(rig, tick_s=tick, late_s=delay - 0.5 * tick)
+        elif "more damping" in cure:
+            more = float(cure.split(" mN m s/rad more")[0]) * 1e-3
+            wanted = replace(asked, hand_damping=asked.hand_damping + more)
+        else:
+            continue  # friction or an encoder's step, which go together with others
+        assert admit(scene, facts, wanted).felt_share <= 1.03 * tolerance, cure
+
+
+def test_the_verdict_fails_beyond_the_tolerance_and_says_what_cures_it() -> None:
+    wide = admit(TABLES, RIG, replace(ASKED, tolerance=0.5))
+    assert felt_verdict(wide).status == "pass"
+    assert wide.felt_cures == ()
+    strict = admit(TABLES, RIG, replace(ASKED, tolerance=0.5 * wide.felt_share))
+    verdict = felt_verdict(strict)
+    assert (verdict.status, verdict.value) == ("fail", strict.felt_share)
+    assert verdict.threshold == strict.tolerance
+    assert verdict.bounds_torque
+    assert f"{strict.felt_share:.1%}" in verdict.why
+    assert "A delay of" in verdict.why
+    assert "--accept-derated" in verdict.why
+    accepted = felt_verdict(strict, accepted=True)
+    assert accepted.status == "not_evaluated"
+    assert accepted.why.startswith("Accepted by a person (--accept-derated)")
+    assert (accepted.value, accepted.threshold) == (verdict.value, verdict.threshold)
+    assert felt_verdict(wide, accepted=True).status == "pass"
+    assert felt_verdict(admit(TABLES, None, ASKED)).status == "not_evaluated"

@@ -202,7 +202,7 @@ class StrangeDevice:
         if old is not None and at >= f.advance_stuck_at_s:
             advance = old[1]
         self._last_measured = (opening, advance, torque, force)
-        if at >= f.nan_opening_at_s:
+        if at >= f.nan_opening_at_s and self._sequence % f.nan_opening_every == 0:
             opening = math.nan
         if at >= f.beyond_stops_at_s:
             opening = OPENING_HIGH + 0.4
@@ -215,12 +215,18 @@ class StrangeDevice:
     def _send_state(self) -> None:
         f, at = self.faults, self._streamed_s
         if at < f.clock_stands_at_s:
-            self._clock_us += 1e6 * self.tick_s * f.clock_gain
+            step_us = 1e6 * self.tick_s * f.clock_gain
+            self._clock_us += -step_us if at >= f.clock_down_at_s else step_us
         flags = wire.MOTOR_ENABLED * (self._enabled and not self._fault)
         flags |= wire.FAULT_LATCHED * self._fault | wire.COMMANDS_LOST * self._lost
         flags |= wire.AT_STOP * self.blades.at_stop | wire.TORQUE_SATURATED * self._clipped
         flags |= wire.ENCODER_FAULT * (at >= f.encoder_fault_at_s)
         clock = int(self._clock_us) & 0xFFFFFFFF
+        third = at >= f.stamps_wrong_at_s and self._sequence % 3 == 0
+        if at >= f.clock_random_at_s or third:
+            clock = int(self.rng.integers(1 << 32))
+        if at >= f.sequence_leaps_at_s and self._sequence % 2 == 0:
+            self._sequence += 40
         state = struct.pack(
             "<BBHIIffff",
             wire.STATE,

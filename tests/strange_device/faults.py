@@ -27,6 +27,12 @@ class Faults:
     tick_us: int = 1000
     clock_gain: float = 1.0
     clock_stands_at_s: float = math.inf
+    clock_down_at_s: float = math.inf
+    clock_random_at_s: float = math.inf
+    stamps_wrong_at_s: float = math.inf
+    """From then on every third stamp is of another time."""
+    sequence_leaps_at_s: float = math.inf
+    """From then on every second STATE has 40 ticks more than passed."""
     stated_radius_m: float | None = None
     stated_resolution_rad: float | None = None
     delay_to_host_s: float = 0.0
@@ -45,6 +51,7 @@ class Faults:
     encoder_stuck_at_s: float = math.inf
     advance_stuck_at_s: float = math.inf
     nan_opening_at_s: float = math.inf
+    nan_opening_every: int = 1
     nan_torque_at_s: float = math.inf
     beyond_stops_at_s: float = math.inf
     leap_at_s: float = math.inf
@@ -92,6 +99,10 @@ FAULTS = {
     "clock in milliseconds": Faults(clock_gain=1e-3),
     "clock 5 % fast": Faults(clock_gain=1.05),
     "clock stands": Faults(clock_stands_at_s=2.0),
+    "clock counts down": Faults(clock_down_at_s=2.0),
+    "clock random": Faults(clock_random_at_s=2.0),
+    "every third stamp wrong": Faults(stamps_wrong_at_s=2.0),
+    "sequence leaps": Faults(sequence_leaps_at_s=2.0),
     "handle radius misstated": Faults(stated_radius_m=60.0),
     "0.2 ms late": Faults(delay_to_host_s=0.0001, delay_to_device_s=0.0001),
     "1 ms late": Faults(delay_to_host_s=0.0005, delay_to_device_s=0.0005),
@@ -113,6 +124,7 @@ FAULTS = {
     "measurements frozen": Faults(frozen_at_s=2.0),
     "encoder stuck": Faults(encoder_stuck_at_s=2.0),
     "opening NaN": Faults(nan_opening_at_s=2.0),
+    "every second opening NaN": Faults(nan_opening_at_s=2.0, nan_opening_every=2),
     "motor torque NaN": Faults(nan_torque_at_s=2.0),
     "opening beyond the stops": Faults(beyond_stops_at_s=2.0),
     "one leap of 0.25 rad": Faults(leap_at_s=2.0),

@@ -41,7 +41,11 @@ def test_a_moving_plate_that_is_touched_shows_the_delay(seed: int, late_s: float
 
 @pytest.mark.slow
 def test_its_standard_deviation_is_honest() -> None:
-    """Mean square of 12 z-scores below the 99.9 % quantile of a chi-square."""
+    """Mean square of 12 z-scores below the 99.9 % quantile of a chi-square.
+
+    Of 40 such runs all measured the delay, so at least 93 % do (95 %, binomial): of 12 then 7 or
+    fewer with a chance of 1e-3.
+    """
     scenario = Scenario("moving", moving=True, seconds=8.0)
     scores = []
     for seed in range(100, 112):
@@ -49,7 +53,7 @@ def test_its_standard_deviation_is_honest() -> None:
         found = measured(scenario, seed, late)
         if found.known:
             scores.append((found.later_s - late) / found.sd_s)
-    assert len(scores) > 9
+    assert len(scores) > 7
     assert np.mean(np.square(scores)) < chi2.ppf(0.999, len(scores)) / len(scores)
 
 

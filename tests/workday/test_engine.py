@@ -381,7 +381,11 @@ def test_a_speed_that_the_fit_hardly_uses_is_named_in_plan_and_report(tmp_path: 
     [
         (
             0.5,
-            ("strokes at 0.3, 0.6, 0.8 rad/s: 1 of 2 recorded each", "excitation: 0.0 s of 5 s"),
+            (
+                "closing strokes at 0.3 rad/s: 1 of 3 recorded",
+                "opening strokes at 0.3, 0.6 rad/s: 1 of 2 recorded each",
+                "excitation: 0.0 s of 5 s",
+            ),
         ),
         (0.9, ("excitation:",)),
     ],

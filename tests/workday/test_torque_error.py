@@ -35,7 +35,10 @@ class _Exact:
 
 
 def test_a_press_is_judged_where_it_can_be_rendered() -> None:
+    """Over a scene that presses beyond the torque limit at its nearest contacts."""
     recipe, specimen = builtin_recipe("press-only"), load_specimen("soft-pad")
+    wide = {"opening_deg": (12.0, 50.0), "contact_mm": (15.0, 60.0)}
+    recipe = recipe.model_copy(update={"scene": recipe.scene.model_copy(update=wide)})
     exact = torque_error(cast(Any, _Exact(specimen, 1.0, 1.5)), specimen, recipe)
     assert exact < 0.01
     off = torque_error(cast(Any, _Exact(specimen, 1.1, 1.5)), specimen, recipe)

@@ -50,6 +50,22 @@ def render(
             "several places, so that contact tells its height.",
         ),
     ] = 0.0,
+    accept_derated: Annotated[
+        bool,
+        typer.Option(
+            "--accept-derated",
+            help="Render although what is felt differs from the package by more than the scene's "
+            "tolerance; result and recording state that a person accepted it.",
+        ),
+    ] = False,
+    allow_mismatch: Annotated[
+        bool,
+        typer.Option(
+            "--allow-mismatch",
+            help="Render a package of another rig (radius, joint, limits, serial number) or a "
+            "stale one; what differs is said and recorded.",
+        ),
+    ] = False,
     trusted_key: TrustedKey = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
     realtime: Realtime = False,
@@ -62,7 +78,8 @@ def render(
 
     The loop runs in C, in a separate process, within the recipe's limits. With --device sim a
     virtual hand makes the strokes, in virtual time unless --realtime is given. With --camera a
-    plate whose pose the scene estimates may move while it is cut.
+    plate whose pose the scene estimates may move while it is cut. What the rig cannot render
+    stably is rendered softer; exit code 3 where that is felt beyond the scene's tolerance.
 
     \b
     Example:
@@ -101,6 +118,8 @@ def render(
             say=note,
             camera=camera,
             taps_s=taps,
+            accept_derated=accept_derated,
+            allow_mismatch=allow_mismatch,
         )
     result = asdict(rendered.result)
     verdicts = rendered.result.verdicts

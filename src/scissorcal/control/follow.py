@@ -100,7 +100,11 @@ def control(
     identity = link.identity
     if not job.tracked:
         refuse_nobody(identity, confirm)
-    gains = capture_gains(recipe, identity, "friction", Probed.of(probe))
+    # Stiff ones, without material: sweeps of friction give up stiffness for damping. By the mean of
+    # the delay, as the gains of contact are (decision 136).
+    probed = Probed.of(probe)
+    probed = None if probed is None else replace(probed, delay_sd_s=0.0)
+    gains = capture_gains(recipe, identity, "friction-advance", probed)
     tell = progress or _silent
     now_s = link.virtual_time if isinstance(link, Exchanging) else time.monotonic()
     pose = _pose_now(job.source, now_s, "nothing was moved")

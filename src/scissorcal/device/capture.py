@@ -27,7 +27,7 @@ from scissorcal.device.open_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
 from scissorcal.device.rig_record import rig_facts
 from scissorcal.device.trajectory import Plan, friction_plan
-from scissorcal.device.watching import watches_of
+from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
@@ -230,6 +230,7 @@ def servo_config(
         force_limit=min(limits.force_N, identity.force_limit),
         force_slew=limits.force_slew_N_per_s,
         ramp_s=limits.engagement_ramp_s,
+        let_go_damping_Nm_s_per_rad=let_go_damping(identity, rest),
         rate_cutoff_Hz=control.rate_cutoff_Hz,
         opening_kp=control.opening.kp,
         opening_kd=control.opening.kd,

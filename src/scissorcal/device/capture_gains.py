@@ -4,8 +4,16 @@ import math
 from dataclasses import dataclass
 
 from scissorcal.device.advance_trajectory import largest_acceleration, sliding_speeds
-from scissorcal.device.control import Axis, Gains, Margins, PHASE_MARGIN_deg, loop_margins
+from scissorcal.device.control import (
+    Axis,
+    Gains,
+    Margins,
+    PHASE_MARGIN_deg,
+    greatest_fall,
+    loop_margins,
+)
 from scissorcal.device.control_design import Demand, Design, design_gains
+from scissorcal.device.slow_sliding import StribeckFall
 from scissorcal.device.trajectory import SWING_ACCELERATION
 from scissorcal.device.watching import STILL_RAD
 from scissorcal.errors import DeviceError
@@ -18,7 +26,7 @@ from scissorcal.recipe.pace import (
 )
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Kind
-from scissorcal.recording.probe import ProbeResult
+from scissorcal.recording.probe import NORMAL_90, ProbeResult
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 OPENING_ERROR_RAD = 0.3
@@ -27,13 +35,9 @@ ADVANCE_ERROR_M = 0.02
 
 CUTOFFS_PER_TICK = (1.0, 0.4, 0.2, 0.1)
 """Rate filters that are tried, in shares of the sampling rate: the first passes nearly all."""
-LEAST_FACTOR = 1.15
 COUNT_SHARE = 0.01
 """Share of the motor's limit by which a count of the encoder may change the effort in any case:
 blades without dry friction may buzz so little."""
-SURE = 2.0
-"""Standard deviations by which the inertia may be other than what a probe found. The delay's own,
-0.1 ms, is a degree of the 45 that are kept."""
 HELD_BACK = 3.0
 """Dry friction over the opening, and static friction, may hold three times what a probe found."""
 ADVANCE_MASS_KG, ADVANCE_VISCOUS_N_s_per_m, ADVANCE_COULOMB_N = 0.8, 4.0, 0.8
@@ -41,8 +45,11 @@ ADVANCE_FACTOR = 2.0
 """A sledge with a pair of scissors, its guide and belt: no probe moves it, so it may weigh half or
 double."""
 
-TYPICAL_INERTIA_kg_m2, TYPICAL_INERTIA_SD_kg_m2, TYPICAL_COULOMB_Nm = 2e-4, 1e-4, 0.015
-"""Of scissors whose inertia no probe told: it may be double or half of that."""
+TYPICAL_INERTIA_kg_m2, TYPICAL_COULOMB_Nm = 2e-4, 0.015
+TYPICAL_INERTIA_SD_kg_m2 = TYPICAL_INERTIA_kg_m2 * math.log(2.0) / NORMAL_90
+"""Of scissors whose inertia no probe told: it may be double or half of that, at 90 %."""
+STRIBECK_FACTS = ("stribeck_Nm", "stribeck_rate_rad_per_s")
+"""Facts of a probe that saw how friction falls with speed."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,8 @@ class Probed:
 
     ``delay_s``: from a measurement to the torque that answers it, through line, host and motor;
     None where the probe did not find it. ``missing`` names what it did not find: inertia and dry
-    friction are a typical rig's then.
+    friction are a typical rig's then. ``stribeck`` is how friction falls with speed, None where
+    only the bound of `StribeckFall.within` is known.
     """
 
     inertia_kg_m2: float
@@ -60,6 +68,8 @@ class Probed:
     coulomb_Nm: float
     delay_s: float | None
     missing: tuple[str, ...] = ()
+    delay_sd_s: float = 0.0
+    stribeck: StribeckFall | None = None
 
     @classmethod
     def of(cls, probe: ProbeResult | None) -> "Probed | None":
@@ -78,7 +88,19 @@ class Probed:
             TYPICAL_COULOMB_Nm if dry is None else dry.mean,
             None if delay is None else delay.mean,
             missing,
+            0.0 if delay is None else delay.sd,
+            _fall_of(probe),
         )
+
+    @property
+    def inertia_factor(self) -> float:
+        """Factor by which the inertia may be other either way, at 90 %: ln inertia is normal."""
+        return math.exp(NORMAL_90 * self.inertia_sd_kg_m2 / self.inertia_kg_m2)
+
+    @property
+    def latest_s(self) -> float:
+        """Upper end of the delay's interval of 90 %."""
+        return max(0.0, (self.delay_s or 0.0) + NORMAL_90 * self.delay_sd_s)
 
     @property
     def lack(self) -> str:
@@ -100,6 +122,8 @@ class CaptureGains:
     """Gains of both axes and the rate filter; ``verdicts`` say how far they are from swinging.
 
     Blades that stand while the reference moves by ``still_rad`` are stuck, and not in dry friction.
+    Sweeps of friction are steady from ``steady_from`` (rad/s) on, and known to stick and slip below
+    ``sticks_below``; None and 0 where nothing is known of it.
     """
 
     opening: Gains
@@ -107,6 +131,8 @@ class CaptureGains:
     rate_cutoff_Hz: float
     still_rad: float
     verdicts: tuple[Verdict, ...]
+    steady_from: float | None = None
+    sticks_below: float = 0.0
 
 
 TYPICAL = CaptureGains(
@@ -132,10 +158,11 @@ def capture_gains(
 ) -> CaptureGains:
     """Gains of a capture: numbers of the recipe first, then by design, else the typical ones.
 
-    With ``probed``, gains keep 45 degrees and a factor of 2 at any inertia within two standard
-    deviations (``design_gains``); numbers of the recipe are judged by the same margins. Raises
-    DeviceError where gains of the recipe would make the loop swing, or where no gains can follow
-    the plan because of the delay.
+    With ``probed``, gains keep 45 degrees and a factor of 2 at any inertia within the probe's
+    interval of 90 % and the upper end of the delay's (``design_gains``); numbers of the recipe are
+    judged by the same margins. Those of sweeps of friction slide steadily where friction falls with
+    speed, as far as these margins allow. Raises DeviceError where gains of the recipe would make
+    the loop swing, or where no gains can follow the plan because of the delay.
     """
     stated = _stated(recipe)
     if probed is None or probed.delay_s is None:
@@ -150,11 +177,15 @@ def capture_gains(
     cutoffs = tuple(share * 1e6 / identity.tick_us for share in CUTOFFS_PER_TICK)
     found: list[Gains] = []
     margins: list[Margins] = []
+    stribeck = probed.stribeck or StribeckFall.within(probed.coulomb_Nm)
+    fall = stribeck.steepest if kind == "friction" else 0.0
     for name, axis, demand, own in zip(("opening", "advance"), axes, demands, stated, strict=True):
         if all(value is not None for value in own):
             gains, at = Gains(*(float(value or 0.0) for value in own)), cutoffs[:1]
         else:
-            design = _designed(axis, demand, cutoffs, name, probed.lack)
+            design = _designed(
+                axis, demand, cutoffs, name, probed.lack, fall if name == "opening" else 0.0
+            )
             gains, at = _merged(own, design.gains), (design.axis.rate_cutoff_Hz,)
         cutoffs = at if name == "opening" else cutoffs
         filtered = axis.filtered(at[0])
@@ -164,8 +195,15 @@ def capture_gains(
         )
         found.append(gains)
     still = max(STILL_RAD, HELD_BACK * probed.coulomb_Nm / found[0].kp)
-    verdicts = (_verdict(margins, axes[0].delay_s, probed.lack),)
-    return CaptureGains(found[0], found[1], cutoffs[0], still, verdicts)
+    margin = _verdict(margins, axes[0].delay_s, probed.lack)
+    if kind != "friction":
+        return CaptureGains(found[0], found[1], cutoffs[0], still, (margin,))
+    stood = greatest_fall(axes[0].filtered(cutoffs[0]), found[0])
+    steady = stribeck.steady_from(stood)
+    slowest = min(recipe.capture.friction.speeds_rad_per_s)
+    verdicts = (margin, _sliding(stribeck, stood, slowest))
+    sticks = 0.0 if stribeck.rate is None else steady
+    return CaptureGains(found[0], found[1], cutoffs[0], still, verdicts, steady, sticks)
 
 
 def _stated(recipe: Recipe) -> tuple[tuple[float | None, ...], tuple[float | None, ...]]:
@@ -193,12 +231,19 @@ def _merged(own: tuple[float | None, ...], other: Gains) -> Gains:
     return Gains(kp, kd, ki)
 
 
+def _fall_of(probe: ProbeResult) -> StribeckFall | None:
+    """How the probe saw friction fall with speed; None where it did not."""
+    level, rate = (probe.facts.get(name) for name in STRIBECK_FACTS)
+    if level is None or rate is None or rate <= 0.0:
+        return None
+    return StribeckFall(max(0.0, level), rate)
+
+
 def _axes(recipe: Recipe, identity: Identity, probed: Probed) -> tuple[Axis, Axis]:
     """Opening and advance as the controller meets them; the filter of the rate is still open."""
     torque = COUNT_SHARE * min(recipe.limits.torque_Nm, identity.torque_limit)
     force = COUNT_SHARE * min(recipe.limits.force_N, identity.force_limit)
-    tick, delay = identity.tick_us * 1e-6, max(0.0, probed.delay_s or 0.0)
-    factor = 1.0 + SURE * probed.inertia_sd_kg_m2 / probed.inertia_kg_m2
+    tick, delay = identity.tick_us * 1e-6, probed.latest_s
     opening = Axis(
         inertia=probed.inertia_kg_m2,
         viscous=max(0.0, probed.viscous_Nm_s_per_rad),
@@ -208,7 +253,7 @@ def _axes(recipe: Recipe, identity: Identity, probed: Probed) -> tuple[Axis, Axi
         step=identity.opening_resolution,
         rate_cutoff_Hz=0.0,
         most_per_count=max(probed.coulomb_Nm, torque),
-        inertia_factor=max(LEAST_FACTOR, factor),
+        inertia_factor=probed.inertia_factor,
     )
     advance = Axis(
         inertia=ADVANCE_MASS_KG,
@@ -267,10 +312,10 @@ def _checked(axis: Axis, gains: Gains, name: str) -> Margins:
 
 
 def _designed(
-    axis: Axis, demand: Demand, cutoffs: tuple[float, ...], name: str, lack: str
+    axis: Axis, demand: Demand, cutoffs: tuple[float, ...], name: str, lack: str, fall: float
 ) -> Design:
     try:
-        return design_gains(axis, demand, cutoffs, name)
+        return design_gains(axis, demand, cutoffs, name, fall=fall)
     except DeviceError as error:
         raise DeviceError(f"{error} {lack}".rstrip()) from None
 
@@ -278,6 +323,27 @@ def _designed(
 def _undelayed(probed: Probed) -> Verdict:
     why = f"The gains are those of a typical rig, which is answered within 1 ms. {probed.lack}"
     return not_evaluated("device", "control margin", why)
+
+
+def _sliding(stribeck: StribeckFall, stood: float, slowest: float) -> Verdict:
+    """Whether the slowest planned sweep slides steadily, as far as it is known before."""
+    steady = stribeck.steady_from(stood)
+    told = f"The loop stands friction that falls by up to {stood:.2g} N m s/rad"
+    if stribeck.rate is None and steady > slowest:
+        return not_evaluated(
+            "device",
+            "steady sweeps",
+            f"{told}: sweeps are steady from {steady:.2g} rad/s on, whatever the friction. The "
+            "probe did not see how friction falls with speed, so slower ones are tried, and the "
+            "fit tells whether the blades stuck.",
+        )
+    good = f"{told}, and sweeps at {slowest:.2g} rad/s are steady."
+    bad = (
+        f"{told}, and this rig's falls by {stribeck.steepest:.2g}: blades stick and slip below "
+        f"{steady:.2g} rad/s. Slower sweeps need a shorter delay: shorten the adapter's latency "
+        "timer, raise the baud rate, or take a faster tick."
+    )
+    return judge("device", "steady sweeps", steady, slowest, good, bad)
 
 
 def _verdict(margins: list[Margins], delay_s: float, lack: str) -> Verdict:

@@ -28,6 +28,11 @@ GRID = 400
 LOWEST = 1e-4
 """Frequencies of the response begin at this share of the highest, half a turn a tick."""
 SETTLING_TICKS = 4000
+NO_FRICTION = 1e-8
+"""Share of a rate that viscous friction takes in a time, below which it is left out: the exact
+forms divide differences of nearly equal numbers by it."""
+FALL_STEPS = 10
+"""Halvings that give the greatest fall of friction to 0.1 % of the rate's gain."""
 INTEGRAL = 4
 """Place of the integral among the loop's states."""
 
@@ -140,6 +145,24 @@ def sag(axis: Axis, gains: Gains) -> float:
             break
         most = max(most, abs(float(state[0])))
     return most
+
+
+def greatest_fall(axis: Axis, gains: Gains) -> float:
+    """Steepest fall of friction with rate at which sliding stays steady, in effort per rate.
+
+    While friction falls by f per rate it feeds any deviation as a viscous friction of -f would. The
+    loop settles up to the result at every inertia within the factor; with a quick loop it is
+    kd + viscous. 0 where it does not settle at all.
+    """
+    low, high = 0.0, gains.kd + axis.viscous
+    for _ in range(FALL_STEPS):
+        middle = 0.5 * (low + high)
+        fallen = replace(axis, viscous=axis.viscous - middle)
+        if all(_settles(one, gains) for one in _inertias(fallen)):
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 def spread_of_error(axis: Axis, gains: Gains) -> float:
@@ -268,7 +291,7 @@ def _sampled(axis: Axis) -> tuple[float, float, Array, Array, int]:
 
 def _free(axis: Axis, time_s: float) -> tuple[float, float]:
     """Way that a unit of rate makes in a time, and what is left of it."""
-    if axis.viscous <= 0.0:
+    if _is_free(axis, time_s):
         return time_s, 1.0
     slows = -math.expm1(-axis.viscous * time_s / axis.inertia)
     return slows * axis.inertia / axis.viscous, 1.0 - slows
@@ -277,6 +300,11 @@ def _free(axis: Axis, time_s: float) -> tuple[float, float]:
 def _pushed(axis: Axis, time_s: float) -> Array:
     """Place and rate after a unit of effort for a time, from rest."""
     way, _ = _free(axis, time_s)
-    if axis.viscous <= 0.0:
+    if _is_free(axis, time_s):
         return np.array([0.5 * time_s * time_s, time_s]) / axis.inertia
     return np.array([(time_s - way) / axis.viscous, way / axis.inertia])
+
+
+def _is_free(axis: Axis, time_s: float) -> bool:
+    """Whether viscous friction changes a rate too little in a time for the exact forms."""
+    return abs(axis.viscous) * time_s < NO_FRICTION * axis.inertia

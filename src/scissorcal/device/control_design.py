@@ -11,6 +11,7 @@ from scissorcal.device.control import (
     Margins,
     PHASE_MARGIN_deg,
     count_effort,
+    greatest_fall,
     keeps_margins,
     loop_margins,
     open_loop,
@@ -27,6 +28,12 @@ STEPS = 40
 LEADS = (2.0, 2.5, 3.0, 4.0)
 """Crossover over the corner at which the rate takes over from the error: 63 to 76 degrees of lead,
 of which delay, filter and integral take their part."""
+SLOW_LEADS = (6.0, 8.0, 12.0)
+"""Further leads where sliding must be steady: damping for stiffness. The last leaves 4 degrees of
+phase to the error, so that larger ones add little."""
+KEPT_FALL = 0.9
+"""Share of the greatest fall of friction that a design keeps where no more is known of friction.
+The last tenth costs half of the stiffness, and weak gains let blades rest longer at each turn."""
 MOST_LAG = math.radians(90.0 - PHASE_MARGIN_deg)
 """Lag by delay and hold at the crossover that leaves the margin, if the lead were complete."""
 INTEGRALS = (1.25, 2.0, 4.0)
@@ -58,14 +65,20 @@ class Design:
 
 
 def design_gains(
-    axis: Axis, demand: Demand, cutoffs_Hz: tuple[float, ...], name: str = "opening"
+    axis: Axis,
+    demand: Demand,
+    cutoffs_Hz: tuple[float, ...],
+    name: str = "opening",
+    *,
+    fall: float = 0.0,
 ) -> Design:
     """The gains, and one of ``cutoffs_Hz`` for the rate, that follow best with the stated margins.
 
     Sought is the smallest squared error after a step of friction or load, with a crossover of at
     most FASTEST_CROSSOVER_rad_per_s. A count of the encoder changes the effort by no more than
     ``most_per_count``: beyond dry friction the blades would buzz at rest (Diolaiti et al. 2006,
-    doi:10.1109/TRO.2005.862487).
+    doi:10.1109/TRO.2005.862487). Sliding is steady while friction falls by up to ``fall`` per rate
+    (`greatest_fall`), or by KEPT_FALL of what the margins allow where that is less.
     Raises DeviceError, with the delay that would do, where the best gains are too weak.
 
     >>> axis = Axis(2.1e-4, 0.002, 0.015, delay_s=1e-3, tick_s=1e-3, step=4.8e-5,
@@ -76,7 +89,7 @@ def design_gains(
     """
     found = _best(axis, cutoffs_Hz)
     if found is not None and _strong_enough(found, demand):
-        return found
+        return _steady(axis, demand, cutoffs_Hz, fall) if fall > 0.0 else found
     raise DeviceError(_refusal(axis, demand, cutoffs_Hz, name, found))
 
 
@@ -100,16 +113,31 @@ def _strong_enough(found: Design, demand: Demand) -> bool:
 
 def _best(axis: Axis, cutoffs_Hz: tuple[float, ...]) -> Design | None:
     """The design of least error that keeps the margins; None where there is none."""
-    least, found = math.inf, None
-    for cutoff in cutoffs_Hz:
-        filtered = axis.filtered(cutoff)
-        for lead in LEADS:
-            for integral in INTEGRALS:
-                one = fastest_design(filtered, lead, integral)
-                error = math.inf if one is None else spread_of_error(filtered, one.gains)
-                if error < least:
-                    least, found = error, one
-    return found
+    return min(_designs(axis, cutoffs_Hz, LEADS), key=_error, default=None)
+
+
+def _steady(axis: Axis, demand: Demand, cutoffs_Hz: tuple[float, ...], fall: float) -> Design:
+    """The design of least error among those that are strong enough and stand the fall."""
+    every = _designs(axis, cutoffs_Hz, LEADS + SLOW_LEADS)
+    strong = [one for one in every if _strong_enough(one, demand)]
+    stood = [greatest_fall(one.axis, one.gains) for one in strong]
+    least = min(fall, KEPT_FALL * max(stood))
+    return min((one for one, most in zip(strong, stood, strict=True) if most >= least), key=_error)
+
+
+def _designs(axis: Axis, cutoffs_Hz: tuple[float, ...], leads: tuple[float, ...]) -> list[Design]:
+    """The fastest design of each shape and filter."""
+    found = (
+        fastest_design(axis.filtered(cutoff), lead, integral)
+        for cutoff in cutoffs_Hz
+        for lead in leads
+        for integral in INTEGRALS
+    )
+    return [one for one in found if one is not None]
+
+
+def _error(design: Design) -> float:
+    return spread_of_error(design.axis, design.gains)
 
 
 @lru_cache(maxsize=1024)  # captures, plans and refusals of a day ask for the same axis

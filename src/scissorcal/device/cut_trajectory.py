@@ -7,7 +7,14 @@ import numpy as np
 
 from scissorcal.device.crossing import TIP_SHARE, Blade
 from scissorcal.device.paths import PathBuilder
-from scissorcal.device.trajectory import Plan, Segment, StrokeList, opening_range, refuse_linear
+from scissorcal.device.trajectory import (
+    Plan,
+    Segment,
+    StrokeList,
+    opening_range,
+    refuse_linear,
+    usable_opening,
+)
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability, Identity
 from scissorcal.recipe.pace import (
@@ -179,9 +186,13 @@ def _presses(recipe: Recipe, identity: Identity) -> Plan:
 
 
 def _press_places(recipe: Recipe, identity: Identity, count: int) -> tuple[_Cut, ...]:
-    """Contacts spread over the scene's range, each with openings from just above to deep."""
+    """Contacts spread over the scene's range, each with openings from just above to deep.
+
+    How deep follows from the material, so the blades may close farther than in the scene: there
+    the depths of its nearest contact are not reached at its farthest.
+    """
     blade = Blade.of(recipe)
-    openings = opening_range(recipe, identity)
+    openings = usable_opening(identity)[0], opening_range(recipe, identity)[1]
     deepest = min(
         DEPTH_PER_REFERENCE * recipe.fit.cut.reference_indentation_mm * 1e-3,
         DEPTH_PER_FACE * recipe.upper_face_m,

@@ -37,6 +37,8 @@ CONFIGURE_WAIT_S = 0.2
 HELLO_WAIT_S = 0.2
 READ_BYTES = 65536
 IDENTITY_TYPE = 0x11
+SHORTEST_TICK_US, LONGEST_TICK_US = 250, 10_000
+"""Limits of the protocol (docs/protocol.md, Timing)."""
 
 
 class Link(Protocol):
@@ -269,7 +271,8 @@ class PortLink(AbstractContextManager["PortLink"]):
 def check_identity(name: str, identity: Identity) -> Identity:
     """Return the identity if this host can work with it.
 
-    Raises DeviceError where version or schema differ, or where a limit is no number or empty.
+    Raises DeviceError where version or schema differ, where a limit is no number or empty, or where
+    the tick is shorter or longer than the protocol's.
     """
     if identity.schema_hash != SCHEMA_HASH:
         raise DeviceError(
@@ -289,12 +292,16 @@ def check_identity(name: str, identity: Identity) -> Identity:
         wrong.append("opening_min/opening_max")
     if not identity.advance_min <= identity.advance_max:
         wrong.append("advance_min/advance_max")
-    if identity.tick_us == 0:
-        wrong.append("tick_us")
     if wrong:
         raise DeviceError(
             f"{name} states impossible limits ({', '.join(dict.fromkeys(wrong))}): "
             "correct the identity in its firmware. No motor was moved."
+        )
+    if not SHORTEST_TICK_US <= identity.tick_us <= LONGEST_TICK_US:
+        raise DeviceError(
+            f"{name} states a tick of {identity.tick_us} us; the protocol has ticks from "
+            f"{SHORTEST_TICK_US} us to {LONGEST_TICK_US} us. Correct tick_us in its firmware, or "
+            "the rate at which it sends. No motor was moved."
         )
     return identity
 

@@ -14,7 +14,7 @@ def loop_verdicts(
     """Judge how a loop ran; ``latency`` is in microseconds, None in virtual time."""
     return (
         _deadline(scope, latency, tick_us),
-        _complete(scope, report),
+        _complete(scope, report, tick_us),
         _faultless(scope, report, tick_us),
         _supervised(scope, report),
     )
@@ -29,13 +29,20 @@ def _deadline(scope: str, latency: Percentiles | None, tick_us: int) -> Verdict:
     return judge(scope, "deadline", latency.p99, tick_us, why, remedy)
 
 
-def _complete(scope: str, report: MotionReport) -> Verdict:
+def _complete(scope: str, report: MotionReport, tick_us: int) -> Verdict:
     counters = report.counters
     share = counters.misses / max(1, counters.frames + counters.misses)
     why = f"{counters.misses} of {counters.frames + counters.misses} frames were lost."
     remedy = (
         f"{why} Check the cable and the baud rate; 'scissorcal device doctor' measures the port."
     )
+    worst_us = report.interval.worst if report.interval else 0.0
+    if report.stalls and report.stalls * worst_us >= counters.misses * tick_us:
+        remedy = (
+            f"{why} The loop was without frames {report.stalls} times, for up to "
+            f"{1e-3 * worst_us:.0f} ms: this computer was held up by other work, and what was sent "
+            "meanwhile was lost, or the device paused. Close programs that load this computer."
+        )
     return judge(scope, "misses", share, MOST_MISSED, why, remedy)
 
 

@@ -44,7 +44,8 @@ def sweep_part(
 ) -> Part:
     """Empty sweeps, closing and opening at each speed (rad/s), then an excitation if it has time.
 
-    They move as a plan of friction moves; ``first`` is the number of the part's first stroke.
+    They move as a plan of friction moves, every second sweep from the middle of the range in three
+    strokes; ``first`` is the number of the part's first stroke.
     """
     wanted = recipe.capture.friction.model_copy(
         update={
@@ -54,7 +55,7 @@ def sweep_part(
         }
     )
     plan = friction_plan(with_capture(recipe, "friction", wanted), identity, advance)
-    count = 2 * len(speeds) + (excitation_s > 0.0)
+    count = len(plan.strokes) - (excitation_s <= 0.0)
     (whole,) = plan.segments
     return _numbered(plan, whole, range(count), first)
 

@@ -77,9 +77,10 @@ class StrokeList:
 def friction_plan(recipe: Recipe, identity: Identity, advance: float = 0.0) -> Plan:
     """Plan empty sweeps at every speed in both directions, then an excitation for the inertia.
 
-    Every repeat has all speeds, so that an interrupted capture has them too. Ramps
-    lie outside the scene's range of openings where the rig's stops leave room. ``advance`` (m) is
-    the fixed position of the sledge.
+    Every repeat has all speeds, so that an interrupted capture has them too. Every second sweep,
+    and of each speed that of every second repeat, begins in the middle of the range and ends there.
+    Ramps lie outside the scene's range of openings where the rig's stops leave room. ``advance``
+    (m) is the fixed position of the sledge.
     """
     refuse_linear(recipe)
     stops = usable_opening(identity)
@@ -90,16 +91,14 @@ def friction_plan(recipe: Recipe, identity: Identity, advance: float = 0.0) -> P
     advance = float(np.clip(advance, identity.advance_min, identity.advance_max))
     path = PathBuilder(high, advance, tick_s)
     path.rest(DWELL_S)
-    for _ in range(capture.repeats):
-        for speed in capture.speeds_rad_per_s:
+    for repeat in range(capture.repeats):
+        for place, speed in enumerate(capture.speeds_rad_per_s, repeat):
             over = ramp_way(speed, TURN_ACCELERATION)
-            bottom, top = max(stops[0], low - over), min(stops[1], high + over)
-            path.open_to(top, APPROACH_SPEED, TURN_ACCELERATION)
-            path.rest(DWELL_S)
-            path.open_to(bottom, speed, TURN_ACCELERATION, strokes.add("closing", speed))
-            path.rest(DWELL_S)
-            path.open_to(top, speed, TURN_ACCELERATION, strokes.add("opening", speed))
-            path.rest(DWELL_S)
+            ends = max(stops[0], low - over), min(stops[1], high + over)
+            if place % 2 == 0:
+                _sweep_from_top(path, strokes, speed, ends)
+            else:
+                _sweep_from_middle(path, strokes, speed, ends, closing=place % 4 == 1)
     path.open_to(0.5 * (low + high), APPROACH_SPEED, TURN_ACCELERATION)
     path.rest(SETTLE_S)
     limits = SwingLimits(0.45 * (high - low), max(capture.speeds_rad_per_s), SWING_ACCELERATION)
@@ -108,6 +107,49 @@ def friction_plan(recipe: Recipe, identity: Identity, advance: float = 0.0) -> P
     path.rest(DWELL_S)
     segment = Segment(path.reference(), "nothing", -1, EMPTY_REQUEST)
     return Plan((segment,), tuple(strokes.all), tick_s)
+
+
+def _sweep_from_top(
+    path: PathBuilder, strokes: StrokeList, speed: float, ends: tuple[float, float]
+) -> None:
+    """Closing and opening over the whole range, from where the blades stand widest."""
+    bottom, top = ends
+    path.open_to(top, APPROACH_SPEED, TURN_ACCELERATION)
+    path.rest(DWELL_S)
+    path.open_to(bottom, speed, TURN_ACCELERATION, strokes.add("closing", speed))
+    path.rest(DWELL_S)
+    path.open_to(top, speed, TURN_ACCELERATION, strokes.add("opening", speed))
+    path.rest(DWELL_S)
+
+
+def _sweep_from_middle(
+    path: PathBuilder,
+    strokes: StrokeList,
+    speed: float,
+    ends: tuple[float, float],
+    *,
+    closing: bool,
+) -> None:
+    """The range both ways from its middle, ``closing`` or opening first; the first way in two.
+
+    Friction builds up after each reversal (docs/model.md). Were there reversals at the ends alone,
+    a dependence of friction on the opening would explain it as well. So the blades come to the
+    middle from the other side, and turn there.
+    """
+    middle = 0.5 * (ends[0] + ends[1])
+    over = ramp_way(speed, TURN_ACCELERATION)
+    first, last = ends if closing else (ends[1], ends[0])
+    sense = 1.0 if closing else -1.0
+    begin = float(np.clip(middle + sense * over, *ends))
+    end = float(np.clip(middle - sense * over, *ends))
+    kinds: tuple[StrokeKind, StrokeKind] = ("closing", "opening")
+    there, back = kinds if closing else kinds[::-1]
+    path.open_to(0.5 * (middle + first), APPROACH_SPEED, TURN_ACCELERATION)
+    path.open_to(begin, APPROACH_SPEED, TURN_ACCELERATION)
+    path.rest(DWELL_S)
+    for kind, goal in ((there, first), (back, last), (there, end)):
+        path.open_to(goal, speed, TURN_ACCELERATION, strokes.add(kind, speed))
+        path.rest(DWELL_S)
 
 
 def approach(opening: float, advance: float, start: Reference, tick_s: float) -> Reference:

@@ -11,6 +11,16 @@ SWING_TORQUE_SHARE = 0.1
 SWING_HZ = 8.0
 """No hand makes strokes that fast: voluntary to and fro of a joint ends at 5 to 6 Hz."""
 
+DELAY_MORE_S = 0.00025
+"""The work of a torque is taken at so much more than the probe's delay. Both sides then bear an
+error of 0.5 ms either way: loops are found, and teeth are not taken for one (decision 176)."""
+
+HELD_UP_S = 0.002
+"""Captures keep 45 degrees at a crossover of 45 Hz at most, which 2.8 ms use up."""
+
+LET_GO_SHARE = 0.3
+"""Of the damping at which a loop of this inertia, delay and tick swings by itself."""
+
 RUNAWAY_RAD_PER_S = 1.0
 """Chosen: far below the strokes of a capture that a reversed motor would end in (25 rad/s), far
 above what friction's reversal or the sheet's springing back adds within 8 ms."""
@@ -64,6 +74,9 @@ def watches_of(
         swing_rate=SWING_RAD_PER_S,
         swing_torque=SWING_TORQUE_SHARE * torque_limit,
         swing_Hz=SWING_HZ,
+        swing_inertia=_known_inertia(rest),
+        swing_delay_ticks=_swing_delay_ticks(identity, rest),
+        held_up_ticks=max(2.0, HELD_UP_S * 1e6 / identity.tick_us),
         runaway_rate=RUNAWAY_RAD_PER_S,
         runaway_speed=RUNAWAY_M_PER_S,
         still_rad=STILL_RAD,
@@ -83,6 +96,26 @@ def watches_of(
         handle_radius=identity.handle_radius if sensor else 0.0,
         handle_zero=rest.handle_zero_N if sensor else 0.0,
     )
+
+
+def let_go_damping(identity: Identity, rest: RestFacts) -> float:
+    """The damping (N m s/rad) while a servo lets go of what it holds; 0 where no probe tells it.
+
+    A share of inertia / (delay + tick): with a delay d and a tick T damping alone is stable below
+    about inertia / (d + T / 2).
+    """
+    inertia = _known_inertia(rest)
+    return LET_GO_SHARE * inertia / ((rest.delay_s or 0.0) + identity.tick_us * 1e-6)
+
+
+def _swing_delay_ticks(identity: Identity, rest: RestFacts) -> float:
+    return ((rest.delay_s or 0.0) + DELAY_MORE_S) * 1e6 / identity.tick_us
+
+
+def _known_inertia(rest: RestFacts) -> float:
+    """The inertia, where the delay is known as well: neither is of use alone."""
+    known = rest.inertia_kg_m2 is not None and rest.delay_s is not None
+    return (rest.inertia_kg_m2 or 0.0) if known else 0.0
 
 
 def _rest_torque(identity: Identity, rest: RestFacts) -> float:

@@ -36,9 +36,7 @@ def _build(path: Path) -> None:
             "--no-deps FOLDER', where FOLDER holds the source of scissorcal, or its wheel."
         )
     if not all(find_spec(name) for name in COMPILERS):
-        raise MissingError(
-            f"{_NOT_BUILT}: run 'make page' in {CHECKOUT}, which fetches Zig and Node."
-        )
+        raise MissingError(f"{_NOT_BUILT}: run {_remedy()}, which fetches Zig and Node.")
     print(_BUILDING, file=sys.stderr, flush=True)
     done = subprocess.run(
         [sys.executable, BUILDER],
@@ -50,6 +48,14 @@ def _build(path: Path) -> None:
     )
     if done.returncode or not path.is_file():
         raise MissingError(
-            f"{_NOT_BUILT}, and building it failed: remove the cause, then run 'make page' in "
-            f"{CHECKOUT}. It said: {(done.stdout + done.stderr).strip()[-1000:]}"
+            f"{_NOT_BUILT}, and building it failed: remove the cause, then run this command again. "
+            f"It said: {(done.stdout + done.stderr).strip()[-1000:]}"
         )
+
+
+def _remedy() -> str:
+    """What brings the compilers to this Python: make has its own environment in the checkout."""
+    own = CHECKOUT / ".venv"
+    if Path(sys.prefix).resolve() == own.resolve():
+        return f"'make page' in {CHECKOUT}"
+    return "pip install 'scissorcal[page]'"

@@ -25,6 +25,8 @@ HEADERS = (
     "sc_plate.h",
     "sc_pieces.h",
     "sc_lag.h",
+    "sc_stamp.h",
+    "sc_swing.h",
     "sc_watch.h",
     "sc_servo.h",
     "sc_block.h",

@@ -21,7 +21,7 @@ def estimated_rates(opening: ArrayLike, tick_us: int, cutoff_Hz: float) -> NDArr
     rates = np.empty(places.size)
     motion = ffi.new("sc_motion *")
     for index, place in enumerate(places.tolist()):
-        clock = index * tick_us & 0xFFFFFFFF
-        lib.sc_motion_update(motion, cutoff_Hz, tick_us, clock, place, 0.0)
+        passed_us = tick_us if index else 0
+        lib.sc_motion_update(motion, cutoff_Hz, passed_us, place, 0.0)
         rates[index] = motion.opening_rate
     return rates

@@ -27,8 +27,8 @@ SAMPLE_DTYPE = dtype_of("sc_sample")
 
 U32 = 0xFFFFFFFF
 
-STUCK_FRAMES = int(lib.SC_STUCK_UNTIL_STOP)
-"""States in a row at which the device's clock stands still, until it is taken for stuck."""
+STUCK_FRAMES = int(lib.SC_RECENT_STATES)
+"""The newest states over which the servo counts what is wrong with clock and places."""
 LEAP_RATES = int(lib.SC_LEAP_RATES)
 """Times the limit of the rate: no motion between two states is taken for one if it is faster."""
 
@@ -72,8 +72,9 @@ class ServoConfig:
 
     Commands stay within ``torque_limit`` (N m) and ``force_limit`` (N; 0 switches the advance
     motor off) and the slews (N m/s, N/s). ``ramp_s``: from engaging RENDER to its
-    full force. ``damping_Nm_s_per_rad`` acts in DAMP. ``rate_cutoff_Hz``: low-pass of the rate
-    estimator, 0 for none. TRACK stops when an error exceeds its limit (rad, m).
+    full force. ``damping_Nm_s_per_rad`` acts in DAMP, ``let_go_damping_Nm_s_per_rad`` while torque
+    and force fall to zero at a gentle end. ``rate_cutoff_Hz``: low-pass of the rate estimator, 0
+    for none. TRACK stops when an error exceeds its limit (rad, m).
     A motion beyond ``opening_rate_limit`` (rad/s) or ``advance_rate_limit`` (m/s) stops while a
     mode drives the blades. Openings (rad) outside ``opening_low`` to ``opening_high`` are not
     usable, nor are places that would need twice as fast a motion.
@@ -91,6 +92,7 @@ class ServoConfig:
     force_slew: float
     ramp_s: float = 0.5
     damping_Nm_s_per_rad: float = 0.02
+    let_go_damping_Nm_s_per_rad: float = 0.0
     rate_cutoff_Hz: float = 100.0
     opening_kp: float = 0.0
     opening_kd: float = 0.0

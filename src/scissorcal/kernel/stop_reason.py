@@ -38,6 +38,7 @@ class StopReason(IntEnum):
     UNREADABLE = 40
     RUNAWAY_ADVANCE = 41
     STOP_ELSEWHERE = 42
+    HELD_UP = 43
 
     @property
     def sentence(self) -> str:
@@ -74,11 +75,15 @@ _STOP_SENTENCES = {
         "recipe's limits and rig.control."
     ),
     StopReason.IMPLAUSIBLE: (
-        "4 frames in a row had an opening beyond the device's stops, or an opening or advance that "
-        "was not finite or leapt farther than any motion; check the encoders and their cables."
+        "4 of the last 20 frames had an opening beyond the device's stops, or an opening or "
+        "advance that was not finite or leapt farther than any motion; check the encoders and "
+        "their cables."
     ),
     StopReason.DEVICE_CLOCK: (
-        "The device's clock (device_us) stood still for 20 frames; restart the device."
+        "The device's clock (device_us) contradicted its sequence numbers in 8 of the last 20 "
+        "frames: it stood still, counted down or leapt, or the sequence leapt. device_us must grow "
+        "by tick_us with each number; restart the device, and correct its firmware if that does "
+        "not help."
     ),
     StopReason.OVERSPEED: (
         "Above 30 rad/s (or 5 m/s): the blades moved faster than any capture or hand moves "
@@ -127,6 +132,11 @@ _STOP_SENTENCES = {
         "'scissorcal device doctor' to find what is late, or lower the gains in the recipe's "
         "rig.control."
     ),
+    StopReason.HELD_UP: (
+        "The blades swung to and fro because commands came late: this computer was held up by "
+        "other work, or the device held its states back. Close programs that load this computer, "
+        "then start again; 'scissorcal device doctor' measures how late answers are."
+    ),
     StopReason.RUNAWAY: (
         "The blades sped up against the torque of their motor: motor or encoder has the wrong "
         "sense. Positive torque must open the blades and a wider opening count up: set "
@@ -165,7 +175,7 @@ _STOP_SENTENCES = {
         "tick_us."
     ),
     StopReason.UNREADABLE: (
-        "20 frames in a row had a motor torque or handle force that was not finite. Check the "
+        "8 of the last 20 frames had a motor torque or handle force that was not finite. Check the "
         "sensors and their cables."
     ),
 }

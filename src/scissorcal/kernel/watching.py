@@ -18,7 +18,10 @@ class WatchConfig:
 
     ``held_s``: torque at its limit for so long, less the time below it since. ``swing_rate``,
     ``swing_torque``, ``swing_Hz``: three swings in a row of at least this amplitude (rad/s), change
-    of torque (N m) and frequency; of a tracked reference, its own rate is subtracted.
+    of torque (N m) and frequency, that the motor's torque feeds; of a tracked reference, its own
+    rate is subtracted. ``swing_inertia`` (kg m^2) and ``swing_delay_ticks``, until a command acts,
+    are the rig's: with inertia 0 all such swings count. Where a command was later than usual by
+    ``held_up_ticks`` meanwhile, the stop is HELD_UP.
     ``runaway_rate``, ``runaway_speed``: blades (rad/s) or sledge (m/s) speed up by so much against
     their motor's effort. ``stop_margin``: the device says it is at a stop, so far (rad) from
     ``stop_low`` and ``stop_high``. ``still_rad``, ``still_m``: the reference moves so far while the
@@ -38,6 +41,9 @@ class WatchConfig:
     swing_rate: float = 0.0
     swing_torque: float = 0.0
     swing_Hz: float = 0.0
+    swing_inertia: float = 0.0
+    swing_delay_ticks: float = 0.0
+    held_up_ticks: float = 0.0
     runaway_rate: float = 0.0
     runaway_speed: float = 0.0
     still_rad: float = 0.0

@@ -218,6 +218,18 @@ def torque_at(
     return np.asarray(force * x / np.sqrt(1.0 + taper**2))
 
 
+def within_thickness(cutting: Cutting, indentation: Array) -> NDArray[np.bool_]:
+    """Whether the blades together sink in by no more than the material's thickness.
+
+    Into what is only pressed nothing sinks deeper. Where something is cut, what bounds the
+    indentation is the fracture energy: a thin sheet bends between blades that have passed each
+    other by more than its thickness.
+    """
+    whole = cutting.moving_blades * cutting.upper_face_m
+    pressed_only = cutting.fracture_energy is None
+    return np.asarray(indentation <= whole) if pressed_only else np.ones_like(indentation, bool)
+
+
 def damped(cutting: Cutting, view: EdgeView, force: Array, rate: Array) -> Array:
     """The response's force (N) while the edge sinks in or withdraws at the opening's rate.
 

@@ -31,6 +31,7 @@ from scissorcal.package.manifest import (
     Parameter,
     PlateRecord,
     Provenance,
+    RigRecord,
     canonical,
     content_hash,
     units_of,
@@ -79,6 +80,7 @@ def build_package(
     review: Review | None = None,
     plate: PlateFit | None = None,
     drawn: Sequence["LayerPiece"] = (),
+    rig: RigRecord | None = None,
     inputs_hash: str = NO_IDENTITY,
     allow_failed: bool = False,
 ) -> PackageSummary:
@@ -93,7 +95,8 @@ def build_package(
     tolerance. ``tolerance``, each table's as a share of its value, overrides both. ``review`` is
     the signature under the fits' report; it changes nothing else in the package. ``plate`` is
     where the plate stands, stored as a pose with its covariance. ``drawn`` are the pieces of the
-    recipe's drawn plate on the line of the cut, none for a uniform sheet. ``inputs_hash`` is the
+    recipe's drawn plate on the line of the cut, none for a uniform sheet. ``rig`` is that of the
+    recordings: a rendering on another one is refused. ``inputs_hash`` is the
     identity that a workspace gives to recipe, fits and algorithm (`workday.engine`); where it has
     another one now, the package is stale.
 
@@ -105,6 +108,7 @@ def build_package(
     """
     # the report imports this module to read packages; only a build needs what follows
     from scissorcal.package.check import check_package
+    from scissorcal.package.reach import data_reach
     from scissorcal.package.simplest.model import simplest_model
     from scissorcal.package.stated_bound import stated_bound
 
@@ -138,6 +142,8 @@ def build_package(
             plate=_plate_record(plate) if plate else None,
             pieces=piece_records(recipe, drawn, _energy(compiled.mechanics.fracture)),
             simplification=simplified.record,
+            rig=rig,
+            reach=data_reach(recipe, cut),
             review=review,
             content_hash=UNHASHED,
         )

@@ -165,8 +165,17 @@ class ResponseOver:
         force = np.where(depth > self.knots[-1], beyond, np.maximum(inside, 0.0))
         return np.where(depth > 0.0, force, 0.0)
 
+    def steepness(self, depth: Array) -> Array:
+        """Its derivative at indentations; 0 outside of the material, the end's beyond the table."""
+        last = len(self.width) - 1
+        i = np.clip(np.searchsorted(self.knots, depth, side="right") - 1, 0, last)
+        t = (depth - self.knots[i]) / self.width[i]
+        first, second, third = self.first[i], self.second[i], self.third[i]
+        inside = (first + t * (2.0 * second + 3.0 * t * third)) / self.width[i]
+        return np.where(depth > 0.0, np.where(depth > self.knots[-1], self.slopes[-1], inside), 0.0)
+
     def slope(self, depth: Span) -> Span:
-        """Its derivative."""
+        """Its derivative over intervals, as bounds by parts of the table."""
         return self.profile.over(Span(np.maximum(depth.low, 0.0), np.maximum(depth.high, 0.0)))
 
     def deepest(self, force: Array) -> Array:
@@ -191,6 +200,21 @@ class ResponseOver:
         ]
         lows = np.maximum(np.minimum.reduce(found), 0.0)
         return Profile(self.ends, lows, np.maximum.reduce(found))
+
+
+def slope_of_opening(tables: ModelTables, stand: Stand, stiff: Span, force: Span) -> Span:
+    """By how much torque falls per opening (N m/rad) while the crack stands, of a sheet of scale 1.
+
+    ``stiff`` and ``force`` are the response's slope and value where the edge stands.
+    """
+    if tables.closure == "work":
+        loss = stand.lever * stand.slope + stand.y * stand.turn
+        slope = stiff * square(stand.lever) - force * loss
+    else:
+        level = cosine_of(stand.taper)
+        tilt = stand.x * stand.taper * stand.twist * level * square(level)
+        slope = stiff * stand.lever * stand.x * level + force * tilt * stand.y
+    return slope * (1.0 / tables.moving_blades)
 
 
 def part(span: Span, chosen: NDArray[np.bool_]) -> Span:

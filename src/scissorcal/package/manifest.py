@@ -225,6 +225,32 @@ class Provenance(Section):
     friction: FrictionRecord | None
 
 
+class DataReach(Section):
+    """How deep (m) and hard (N at the edge) the data of the cut and the scene press.
+
+    ``crossed_share`` and ``through_share`` are shares of the scene's pressed places at which the
+    blades' edges have crossed, and at which they would sink in deeper than the thickness; both 0
+    where something is cut. ``tolerance`` is the scene's, as a share.
+    """
+
+    data_depth_m: Positive
+    data_force_N: NonNegative
+    scene_depth_m: NonNegative
+    scene_force_N: NonNegative
+    crossed_share: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+    through_share: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+    tolerance: Positive
+
+
+class RigRecord(Section):
+    """The rig of the recordings that a package is made from, as it stated itself."""
+
+    name: Annotated[str, Field(max_length=40)]
+    serial: Annotated[str, Field(max_length=40)]
+    torque_limit_Nm: NonNegative
+    force_limit_N: NonNegative
+
+
 class PlateRecord(Section):
     """Where the plate stands, where the scene asks for it: T_rig_plate, or T_camera_plate.
 
@@ -262,7 +288,9 @@ class Manifest(Section):
     own: structure, parameters and draws are of the law that is rendered. It is null in packages
     that were built before there was such a choice. ``plate_pose`` is the scene's: "estimated" makes
     a rendering follow the plate, from ``plate`` where no tracker does. ``pieces`` are a drawn plate
-    along the line of the cut, null for the uniform sheet that was calibrated.
+    along the line of the cut, null for the uniform sheet that was calibrated. ``rig`` is the rig of
+    the recordings, null where they do not state one, as imported ones, and in older packages.
+    ``reach`` says how far data and scene reach, null where no data press and in older packages.
     """
 
     format: Literal["scissorcal-package/1"]
@@ -278,6 +306,8 @@ class Manifest(Section):
     plate: PlateRecord | None = None
     pieces: Pieces | None = None
     simplification: Simplification | None = None
+    rig: RigRecord | None = None
+    reach: DataReach | None = None
     review: Review | None
     content_hash: Digest
 

@@ -24,6 +24,7 @@ from scissorcal.package.exact import (
     torque_quantiles,
 )
 from scissorcal.package.manifest import CutRecord, FrictionRecord, Manifest
+from scissorcal.package.reach import reach_sentences
 from scissorcal.package.review import against
 
 Array = NDArray[np.float64]
@@ -199,7 +200,8 @@ class ModelPackage:
         """What to know before rendering this package, as sentences."""
         record = self.manifest.provenance
         left_out = record.cut.left_out + (record.friction.left_out if record.friction else ())
-        return self.review_warnings + self.fit_warnings + left_out + self._step_warnings
+        beyond = reach_sentences(self.manifest.reach, record.cut.structure.response)
+        return self.review_warnings + self.fit_warnings + left_out + beyond + self._step_warnings
 
     @property
     def _step_warnings(self) -> tuple[str, ...]:

@@ -36,6 +36,7 @@ from scissorcal.package.law_boxes import (
     cosine_of,
     first_boxes,
     part,
+    slope_of_opening,
     square,
 )
 
@@ -216,20 +217,15 @@ class PlateSlopes:
         if quantity == "advance":
             slope = stiff * square(stand.slope) - force * stand.bend
             return np.asarray(self.blades * slope.largest)
+        if quantity == "opening":
+            return slope_of_opening(self.tables, stand, stiff, force).largest
         shared = stiff * stand.lever * stand.slope - force * stand.turn
         if self.tables.closure == "work":
-            if quantity == "cross":
-                return shared.largest
-            loss = stand.lever * stand.slope + stand.y * stand.turn
-            slope = stiff * square(stand.lever) - force * loss
-        else:
-            level = cosine_of(stand.taper)
-            tilt = stand.x * stand.taper * stand.twist * level * square(level)
-            if quantity == "cross":
-                own = stiff * stand.slope * stand.x * level - force * (level - tilt)
-                return np.maximum(shared.largest, own.largest)
-            slope = stiff * stand.lever * stand.x * level + force * tilt * stand.y
-        return np.asarray(slope.largest / self.blades)
+            return shared.largest
+        level = cosine_of(stand.taper)
+        tilt = stand.x * stand.taper * stand.twist * level * square(level)
+        own = stiff * stand.slope * stand.x * level - force * (level - tilt)
+        return np.maximum(shared.largest, own.largest)
 
 
 def _some(stand: Stand, chosen: NDArray[np.bool_]) -> Stand:

@@ -12,6 +12,7 @@ from scissorcal.calibration.cut.fitted import has_numbers
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.model import edge_height
+from scissorcal.model.cutting import within_thickness
 from scissorcal.package.build import pick_draws
 from scissorcal.package.exact import (
     ExactModel,
@@ -21,6 +22,7 @@ from scissorcal.package.exact import (
     torque_quantiles,
 )
 from scissorcal.package.grid import FELT_SHARE
+from scissorcal.package.reach import data_reach, reach_sentences
 from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
@@ -42,8 +44,9 @@ class Places:
     """Torque at places of the scene, all (n,): rad, rad/s, m, N m.
 
     ``low`` and ``high`` bound the torque with the scene's confidence. ``reached`` says that the
-    contact lies on the blade, ``touching`` that the edge presses on the material (elsewhere only
-    friction is felt), ``supported`` that data lie nearby. Torque is NaN where not reached.
+    contact lies on the blade, and that what is only pressed is as thick as that; ``touching`` that
+    the edge presses on the material (elsewhere only friction is felt), ``supported`` that data lie
+    nearby. Torque is NaN where not reached.
     """
 
     opening: Array
@@ -72,6 +75,7 @@ class SceneTorque:
     ``confidence`` and ``tolerance`` are the scene's, as shares. ``share`` (n,) is half of the band
     over the torque at each place of ``grid`` that can be felt, NaN elsewhere. ``not_in_band`` has
     what was not measured and may move the mean torque by more than the tolerance: check and share.
+    ``beyond_data`` says in sentences what of the scene no data reach (`reach`).
     """
 
     confidence: float
@@ -81,6 +85,7 @@ class SceneTorque:
     share: Array
     slices: tuple[Slice, ...]
     not_in_band: tuple[tuple[str, float | None], ...]
+    beyond_data: tuple[str, ...]
 
     @property
     def largest(self) -> float:
@@ -125,6 +130,7 @@ def scene_torque(recipe: Recipe, cut: FitResult | None, friction: FitResult | No
         share,
         tuple(_slices(recipe, probe)),
         _not_in_band(probe.cut),
+        reach_sentences(data_reach(recipe, probe.cut), str(probe.cut.structure["response"])),
     )
 
 
@@ -145,6 +151,7 @@ def felt_places(model: ExactModel, grid: tuple[Array, Array, Array], torque: Arr
     place = np.ravel(model.settled(opening, contact))
     view = edge_height(model.cutting.edge, place, model.blade_angle(opening))
     reached = np.asarray(view.station < model.cutting.edge.length_m)
+    reached &= within_thickness(model.cutting, model.cutting.upper_face_m - view.height)
     return _felt(reached, np.where(reached, np.abs(torque), np.nan))
 
 
@@ -207,6 +214,7 @@ class _Probe:
         place = np.ravel(central.settled(opening, contact))
         view = edge_height(central.cutting.edge, place, central.blade_angle(opening))
         reached = np.asarray(view.station < central.cutting.edge.length_m)
+        reached &= within_thickness(central.cutting, central.cutting.upper_face_m - view.height)
         touching = np.asarray(view.height < central.cutting.upper_face_m)
         torque = np.ravel(central.torque(opening, rate, contact))
         low, high = torque_quantiles(self._drawn, opening, rate, contact, self._probabilities)

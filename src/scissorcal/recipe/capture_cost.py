@@ -116,13 +116,29 @@ def refuse_long(cost: CaptureCost, free_bytes: float, *, meant: bool = False) ->
 
 def _sweeps_s(recipe: Recipe) -> float:
     low, high = recipe.scene.opening_rad
-    one = 0.0
-    for speed in recipe.capture.friction.speeds_rad_per_s:
-        length = high - low + 2.0 * ramp_way(speed, TURN_ACCELERATION)
-        over = glide_time(length, APPROACH_SPEED, TURN_ACCELERATION)
-        one += over + 2.0 * glide_time(length, speed, TURN_ACCELERATION) + 3.0 * DWELL_S
+    speeds, repeats = recipe.capture.friction.speeds_rad_per_s, recipe.capture.friction.repeats
+    first, second = (
+        sum(
+            _sweep_s(speed, high - low, place % 2 == 1) for place, speed in enumerate(speeds, begun)
+        )
+        for begun in (0, 1)
+    )
     back = glide_time(high - low, APPROACH_SPEED, TURN_ACCELERATION)
-    return recipe.capture.friction.repeats * one + back + 2.0 * DWELL_S + SETTLE_S
+    every = first * ((repeats + 1) // 2) + second * (repeats // 2)
+    return every + back + 2.0 * DWELL_S + SETTLE_S
+
+
+def _sweep_s(speed: float, travel: float, from_middle: bool) -> float:
+    """Both ways over a range of openings; from its middle one of them in two strokes."""
+    over = ramp_way(speed, TURN_ACCELERATION)
+    length = travel + 2.0 * over
+    whole = glide_time(length, speed, TURN_ACCELERATION)
+    approach = glide_time(length, APPROACH_SPEED, TURN_ACCELERATION) + 3.0 * DWELL_S
+    if not from_middle:
+        return approach + 2.0 * whole
+    half = 0.5 * length + over
+    turned = glide_time(half, APPROACH_SPEED, TURN_ACCELERATION)
+    return approach + turned + whole + 2.0 * glide_time(half, speed, TURN_ACCELERATION) + DWELL_S
 
 
 def _slides_s(recipe: Recipe) -> float:

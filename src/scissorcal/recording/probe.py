@@ -38,12 +38,14 @@ class Estimate:
 
 @dataclass(frozen=True)
 class RestFacts:
-    """What tells blades at rest from a stuck encoder.
+    """What the watches need to know of a rig: above all, blades at rest from a stuck encoder.
 
     ``handle_zero_N`` is what the force sensor shows without a hand, 0 where nobody measured it;
     ``breakaway_Nm`` the least torque that moves the blades, None where nobody found it;
     ``torque_noise_Nm`` and ``force_noise_N`` are standard deviations. ``jitters``: the encoder's
-    readings are noisy enough never to stay the same.
+    readings are noisy enough never to stay the same. ``inertia_kg_m2`` and ``delay_s``, until a
+    command acts, tell a swing that the loop drives from one that a cut's teeth do; None where
+    nobody measured them.
     """
 
     handle_zero_N: float = 0.0
@@ -51,6 +53,8 @@ class RestFacts:
     torque_noise_Nm: float = 0.0
     force_noise_N: float = 0.0
     jitters: bool = False
+    inertia_kg_m2: float | None = None
+    delay_s: float | None = None
 
 
 UNKNOWN_REST = RestFacts()
@@ -99,12 +103,18 @@ class ProbeResult:
             torque_noise_Nm=facts.get("torque_noise_Nm", 0.0),
             force_noise_N=facts.get("force_noise_N", 0.0),
             jitters=facts.get("encoder_jitters", 0.0) > 0.0,
+            inertia_kg_m2=_above_zero(self.inertia_kg_m2),
+            delay_s=_above_zero(self.delay_s),
         )
 
     def as_dict(self) -> dict[str, Any]:
         """Give the probe as plain values, for JSON; facts that are not finite are left out."""
         facts = {name: value for name, value in self.facts.items() if math.isfinite(value)}
         return {**asdict(self), "facts": facts}
+
+
+def _above_zero(found: Estimate | None) -> float | None:
+    return found.mean if found is not None and found.mean > 0.0 else None
 
 
 def probe_of(device: Mapping[str, Any]) -> ProbeResult | None:

@@ -18,6 +18,8 @@ from dataclasses import dataclass
 MARGIN = 0.5
 RATE_CUTOFF_HZ = 100.0
 """Low-pass of the rate by which damping is rendered."""
+COUNTS_NEAR_REST = 4
+"""Rendered friction builds up over at least so many counts: one count moves it by a quarter."""
 OSCILLATION_RATE = 1.5
 """rad/s: amplitude of the rate up to which friction must stop an oscillation; a scene with faster
 motion raises it."""
@@ -77,3 +79,16 @@ def allowed_damper(facts: LoopFacts) -> float:
     """
     late = facts.delay_s + 1.0 / (2.0 * math.pi * RATE_CUTOFF_HZ)
     return MARGIN * facts.inertia_kg_m2 / late
+
+
+def damping_share(damper: float, facts: LoopFacts) -> float:
+    """How much of a material's damping (N m s/rad) is rendered."""
+    return min(1.0, allowed_damper(facts) / damper) if damper > 0.0 else 1.0
+
+
+def friction_width(level: float, facts: LoopFacts, allowed: float) -> float:
+    """Opening (rad) over which rendered friction of a level (N m) builds up after a reversal.
+
+    Some counts of the encoder, and no stiffer than ``allowed`` (N m/rad).
+    """
+    return max(COUNTS_NEAR_REST * facts.encoder_step_rad, level / allowed) if level > 0.0 else 0.0

@@ -6,19 +6,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel, Table
+from scissorcal.kernel import (
+    STEP_DTYPE,
+    Kernel,
+    ModelTables,
+    Piece,
+    PiecesModel,
+    StepOutput,
+    Table,
+)
 from scissorcal.package.plate_slopes import PlateSlopes
+from scissorcal.package.tangent import Tangent
 from scissorcal.render.drops import largest_drop
 from scissorcal.render.felt_cost import plate_strokes
 
 Array = NDArray[np.float64]
 
 OPENINGS, CONTACTS = 48, 24
-STEP_RAD = 1e-3
-"""Opening over which a slope is taken: some hundred steps of float32 in torque, and an indentation
-change of some 20 um."""
+HALVINGS = 20
+"""Of an interval of openings, to where the torque reaches its limit: to 1e-6 of the interval."""
 TRIED_EVERY = 4
 """Ticks of a stroke between places at which a slope is taken."""
+LEAST_FACTOR = 0.05
+"""A response twenty times as soft as the material's is another material: refused."""
 WIDENINGS = 8
 """Rounds in which intervals are widened; each takes most of what is too steep."""
 
@@ -47,35 +57,92 @@ def needs_of(tables: ModelTables, torque_limit: float) -> Needs:
     """Search the scene for the steepest slopes; places whose torque exceeds the limit do not count.
 
     At each opening and contact the crack first runs to where it holds (with the peak force of a
-    ripple), then the blades open by a milliradian: what torque falls by is elastic.
+    ripple); the slope there is the tangent of what is rendered (`tangent.Tangent`). Where the limit
+    is reached between two openings, the place at which it is counts, too.
     """
     quiet = replace(tables, render_friction=False)
-    smooth, teeth = Kernel(replace(quiet, kappa=1.0)), Kernel(quiet)
-    found = Needs(0.0, tables.opening_max, tables.contact_min, 0.0, 0.0, _friction(tables), 0.0)
-    for opening in np.linspace(tables.opening_min, tables.opening_max, OPENINGS):
-        for contact in np.linspace(tables.contact_min, tables.contact_max, CONTACTS):
-            smooth.reset(float(contact))
-            at = smooth.step(float(opening), 0.0, 0.0)
-            if not 0.0 < at.torque <= torque_limit:
-                continue
-            settled = smooth.crack
-            opened = smooth.step(float(opening) + STEP_RAD, 0.0, 0.0)
-            slope = (at.torque - opened.torque) / STEP_RAD
-            smooth.reset(settled)
-            faster = smooth.step(float(opening), -1.0, 0.0)
-            teeth.reset(float(contact))
-            ran = teeth.step(float(opening), 0.0, 0.0)
-            drop = at.torque - ran.torque if ran.fracture_J > 0.0 else 0.0
-            found = replace(
-                found,
-                drop_Nm=max(found.drop_Nm, drop),
-                damper=max(found.damper, faster.torque - at.torque),
-            )
-            if slope > found.stiffness:
-                found = replace(
-                    found, stiffness=slope, opening=float(opening), contact=float(settled)
-                )
-    return replace(found, found=found.stiffness)
+    sheet, drop, damper = _Sheet(quiet, torque_limit), 0.0, 0.0
+    places = [
+        place
+        for contact in np.linspace(tables.contact_min, tables.contact_max, CONTACTS)
+        for place in sheet.places(float(contact))
+    ]
+    if not places:
+        opening, contact = tables.opening_max, tables.contact_min
+        return Needs(0.0, opening, contact, 0.0, 0.0, _friction(tables), 0.0)
+    for place in places:
+        drop = max(drop, sheet.drop(place))
+        damper = max(damper, sheet.damper(place))
+    openings = np.array([np.float32(place.opening) for place in places], dtype=np.float64)
+    steps = np.array([tuple(place.step) for place in places], dtype=STEP_DTYPE)
+    slopes = Tangent(quiet).at(openings, steps)
+    worst = int(np.argmax(slopes))
+    steepest = max(float(slopes[worst]), 0.0)
+    return Needs(
+        stiffness=steepest,
+        opening=places[worst].opening,
+        contact=places[worst].step.contact,
+        drop_Nm=drop,
+        damper=damper,
+        friction_Nm=_friction(tables),
+        found=steepest,
+    )
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A fresh sheet pressed at ``contact``, and what the step gave there."""
+
+    opening: float
+    contact: float
+    step: StepOutput
+
+
+class _Sheet:
+    """A uniform sheet that is put anew at each place, with smooth fracture and with teeth."""
+
+    def __init__(self, quiet: ModelTables, torque_limit: float) -> None:
+        self._smooth, self._teeth = Kernel(replace(quiet, kappa=1.0)), Kernel(quiet)
+        self._openings = np.linspace(quiet.opening_min, quiet.opening_max, OPENINGS).tolist()
+        self._limit = torque_limit
+
+    def places(self, contact: float) -> list[_Place]:
+        """Where the sheet at a contact is felt within the limit, and where it reaches the limit."""
+        found: list[_Place] = []
+        before: _Place | None = None
+        for opening in self._openings:
+            place = self._pressed(opening, contact)
+            if before and self._is_beyond(before) != self._is_beyond(place):
+                found.append(self._at_limit(before, place))
+            found.append(place)
+            before = place
+        return [place for place in found if 0.0 < place.step.torque <= self._limit]
+
+    def drop(self, place: _Place) -> float:
+        """By how much torque falls at once as a crack with teeth runs there."""
+        self._teeth.reset(place.contact)
+        ran = self._teeth.step(place.opening, 0.0, 0.0)
+        return place.step.torque - ran.torque if ran.fracture_J > 0.0 else 0.0
+
+    def damper(self, place: _Place) -> float:
+        """By how much torque grows there with a rate of 1 rad/s, the crack held."""
+        self._smooth.reset(place.step.contact)
+        return self._smooth.step(place.opening, -1.0, 0.0).torque - place.step.torque
+
+    def _pressed(self, opening: float, contact: float) -> _Place:
+        self._smooth.reset(contact)
+        return _Place(opening, contact, self._smooth.step(opening, 0.0, 0.0))
+
+    def _is_beyond(self, place: _Place) -> bool:
+        return place.step.torque > self._limit
+
+    def _at_limit(self, one: _Place, other: _Place) -> _Place:
+        """The last place within the limit between one on each side of it."""
+        within, beyond = (other, one) if self._is_beyond(one) else (one, other)
+        for _ in range(HALVINGS):
+            middle = self._pressed(0.5 * (within.opening + beyond.opening), one.contact)
+            within, beyond = (within, middle) if self._is_beyond(middle) else (middle, beyond)
+        return within
 
 
 def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) -> Needs:
@@ -116,18 +183,53 @@ def stiffness_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piec
 
 
 def _found_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) -> float:
-    """The largest slope of the torque (N m/rad) where blades open a little, along the strokes."""
+    """The largest tangent of the torque (N m/rad) where cracks rest, along the strokes."""
     quiet = replace(tables, render_friction=False)
-    model, found = PiecesModel(quiet, pieces), 0.0
+    tangent, found = Tangent(quiet), 0.0
+    each = [PiecesModel(quiet, [piece]) for piece in pieces]
     for opening, advance, counts in plate_strokes(quiet, pieces):
-        model.step_many(opening[~counts], 0.0, advance[~counts])
-        places = np.repeat(opening[counts][::TRIED_EVERY], 3)
-        places[1::3] += STEP_RAD
-        torque = model.step_many(places, 0.0, advance[-1])["torque"].astype(np.float64)
-        at, opened = torque[0::3], torque[1::3]
-        slope = (at - opened)[at <= torque_limit] / STEP_RAD
-        found = max(found, float(np.max(slope, initial=0.0)))
+        places = opening[counts][::TRIED_EVERY]
+        torque, slope = np.zeros(len(places)), np.zeros(len(places))
+        for piece, model in zip(pieces, each, strict=True):
+            steps = model.step_many(opening, 0.0, advance)[counts][::TRIED_EVERY]
+            torque += steps["torque"]
+            slope += piece.scale * tangent.at(places.astype(np.float32).astype(np.float64), steps)
+        found = max(found, float(np.max(slope[torque <= torque_limit], initial=0.0)))
     return found
+
+
+@dataclass(frozen=True)
+class Derated:
+    """To which slope (N/m) the response is limited, None where it is not, and what is left of the
+    package's stiffness (N m/rad)."""
+
+    steepest_N_per_m: float | None
+    stiffness: float
+
+    def is_refused(self, needed: float, allowed: float) -> bool:
+        """Whether it is still too stiff, or less than LEAST_FACTOR of what is needed."""
+        return self.stiffness > allowed or self.stiffness < LEAST_FACTOR * needed
+
+
+def derate(
+    tables: ModelTables, needed: float, allowed: float, limit: float, pieces: Sequence[Piece] = ()
+) -> Derated:
+    """The steepest response that is allowed, found in steps, as levers change with the depth."""
+    if needed <= allowed:
+        return Derated(None, needed)
+    steepest, left = float(tables.response.slope.max()), needed
+    while left > allowed and left > LEAST_FACTOR * needed:
+        steepest *= max(0.999 * allowed / left, 0.5)
+        left = stiffness_on(softened(tables, steepest), limit, pieces)
+    return Derated(steepest, left)
+
+
+def limited(tables: ModelTables, steepest: float | None, damping_share: float = 1.0) -> ModelTables:
+    """What is rendered of a model: its response limited to a slope, a share of its damping."""
+    soft = tables if steepest is None else softened(tables, steepest)
+    if damping_share == 1.0:
+        return soft
+    return replace(soft, rate_damping=damping_share * soft.rate_damping)
 
 
 def softened(tables: ModelTables, steepest: float) -> ModelTables:

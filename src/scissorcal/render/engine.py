@@ -4,16 +4,14 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, Motion
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.rig_record import rig_facts
-from scissorcal.device.watching import watches_of
+from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.errors import InputError
-from scissorcal.kernel import Capability, ConfigKey, Identity, PlateConfig, ServoConfig
+from scissorcal.kernel import ConfigKey, Identity, PlateConfig, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter
@@ -25,9 +23,15 @@ from scissorcal.render.admission import (
     rendered_tables,
 )
 from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
+from scissorcal.render.mismatch import find_mismatch, refuse_other_rig
 from scissorcal.render.plate_pose import EVERY_S, PlatePlacer, plate_config
 from scissorcal.render.plate_source import plate_placer
-from scissorcal.render.result import AppliedLimits, RenderResult, render_verdicts
+from scissorcal.render.result import (
+    AppliedLimits,
+    RenderResult,
+    felt_verdict,
+    render_verdicts,
+)
 from scissorcal.render.rig_facts import RigFacts
 from scissorcal.render.watch import LOOK_EVERY_S, Progress, Watch
 from scissorcal.tracking.plate_pose import PoseSource
@@ -73,6 +77,8 @@ def render(
     confirm: Confirm | None = None,
     rig: RigFacts | None = None,
     plate: PoseSource | None = None,
+    accept_derated: bool = False,
+    allow_mismatch: bool = False,
 ) -> RenderResult:
     """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
 
@@ -86,6 +92,7 @@ def render(
     blades before any force.
     ``writer`` records every sample; see `open_writer`. What is wrong with the package or does not
     match the device becomes a note of the recording at the start, and ``warnings`` of the result.
+    A package of another rig (`mismatch`) is refused unless ``allow_mismatch``.
 
     Where the package's scene has ``plate_pose = "estimated"``, the torque is that of the plate
     where ``plate`` has it, or without one where the package's fitted pose has it. The force falls
@@ -96,7 +103,9 @@ def render(
     Before any force, `admission.admit_package` compares the package's stiffness with what the rig
     renders stably, and softens it where that is less; ``rig`` is what is known of friction,
     inertia, delay and the force sensor's zero, by default the package's friction fit. The result's
-    ``admission`` states it.
+    ``admission`` states it. Where the felt torque then differs from the package's by more than the
+    scene's tolerance, the verdict *felt torque* fails, unless a person wants it so
+    (``accept_derated``), which result and recording then state.
 
     Raises InputError, before anything moves, where package and device do not match, where the rig
     cannot render the package stably, or nobody can be asked; MissingError where an estimated plate
@@ -105,17 +114,23 @@ def render(
     identity = link.identity
     _refuse_impossible(identity, seconds, confirm)
     applied = _applied(package, limits, identity)
-    mismatches = _mismatches(package, identity)
+    mismatch = find_mismatch(package, identity)
+    if not allow_mismatch:
+        refuse_other_rig(package, identity)
     admission = admit_package(package, identity, rig, applied.torque_Nm)
-    warnings = package.warnings + mismatches + _admitted(admission)
+    differs = mismatch.other_rig + mismatch.notes
+    warnings = package.warnings + differs + _admitted(admission)
     tables = rendered_tables(package.tables, admission)
     follower = plate_placer(package, plate, tables, applied.torque_Nm, writer)
     placed = plate_config(tables) if follower else PlateConfig()
     config = _servo_config(applied, admission, identity, seconds, rig, placed)
     config = replace(config, motor_sign=motor_sign)
+    accepted = accept_derated and admission.is_felt
     if writer:
         for sentence in warnings:
             writer.note(sentence)
+        if admission.is_felt:
+            writer.note(felt_verdict(admission, accepted=accepted).why)
     watch = Watch(_travel(package), writer, progress or _silent, seconds)
     every_s, pieces = EVERY_S if follower else BLOCK_S, package.pieces or None
     with open_motion(link, config, tables, every_s=every_s, pieces=pieces) as motion:
@@ -133,7 +148,9 @@ def render(
             watch.record(samples)
         if is_simulator(identity):
             motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
-    result = _result(motion, watch, package, applied, admission, warnings, follower)
+    result = _result(
+        motion, watch, package, applied, admission, warnings, follower, accepted=accepted
+    )
     if writer:
         _note(writer, result, result.warnings[len(warnings) :])
     return result
@@ -147,6 +164,8 @@ def _result(
     admission: Admission,
     warnings: tuple[str, ...],
     follower: PlatePlacer | None,
+    *,
+    accepted: bool,
 ) -> RenderResult:
     """Figures of a rendering that has ended; ``warnings`` are those known at its start."""
     report = motion.report()
@@ -175,9 +194,12 @@ def _result(
         ledger=report.ledger,
         limits=applied,
         admission=admission,
+        accepted_derated=accepted,
         plate=plate,
         package_hash=package.manifest.content_hash,
-        verdicts=render_verdicts(report, latency, motion.identity.tick_us, admission, plate),
+        verdicts=render_verdicts(
+            report, latency, motion.identity.tick_us, admission, plate, accepted=accepted
+        ),
         warnings=warnings
         + _limited_warning(limited, applied)
         + _still_warning(watch.still_s)
@@ -255,6 +277,7 @@ def _servo_config(
         force_slew=applied.force_slew_N_per_s,
         ramp_s=applied.engagement_ramp_s,
         damping_Nm_s_per_rad=FALLBACK_DAMPING,
+        let_go_damping_Nm_s_per_rad=let_go_damping(identity, rest),
         rate_cutoff_Hz=RATE_CUTOFF_HZ,
         opening_low=identity.opening_min - STOP_MARGIN_RAD,
         opening_high=identity.opening_max + STOP_MARGIN_RAD,
@@ -273,50 +296,6 @@ def _admitted(admission: Admission) -> tuple[str, ...]:
         return ()
     cures = f" What would cure it: {' '.join(admission.cures)}" if admission.cures else ""
     return (f"{' '.join(admission.reasons)}{cures}",)
-
-
-def _mismatches(package: ModelPackage, identity: Identity) -> tuple[str, ...]:
-    """Sentences on how the device differs from what the package was built for.
-
-    Raises InputError where the scene and the device have no opening in common.
-    """
-    manifest = package.manifest
-    render = manifest.mechanics.render
-    has_motor = bool(identity.capabilities & Capability.ADVANCE_MOTOR) and identity.force_limit > 0
-    if render == ("translation_force",) and not has_motor:
-        raise InputError(
-            f"The package {manifest.name} renders the translation force alone, and this device has "
-            'no advance motor: nothing would be felt. Add "torque" to scene.render, or use a rig '
-            "with an advance motor."
-        )
-    low, high = manifest.ranges.opening_rad
-    if identity.opening_max <= low or identity.opening_min >= high:
-        raise InputError(
-            f"The package {manifest.name} is for openings of {np.degrees(low):.0f} to "
-            f"{np.degrees(high):.0f} degrees, and this device moves between "
-            f"{np.degrees(identity.opening_min):.0f} and {np.degrees(identity.opening_max):.0f}: "
-            "build a package for this rig."
-        )
-    found = []
-    if "translation_force" in render and not has_motor:
-        found.append(
-            "The package renders a translation force, and this device has no advance motor "
-            "(capability ADVANCE_MOTOR, force limit above 0): that force is not rendered."
-        )
-    rate = 1e6 / identity.tick_us
-    if abs(rate - manifest.mechanics.loop_rate_Hz) > 0.01 * rate:
-        found.append(
-            f"The device runs at {rate:.0f} Hz and the package was built for "
-            f"{manifest.mechanics.loop_rate_Hz:.0f} Hz."
-        )
-    radius = manifest.mechanics.handle_radius_m
-    if abs(identity.handle_radius - radius) > 0.01 * radius:
-        found.append(
-            f"The device states a handle radius of {identity.handle_radius * 1e3:.1f} mm and the "
-            f"package was built for {radius * 1e3:.1f} mm: forces at the handles differ by this "
-            "ratio."
-        )
-    return tuple(found)
 
 
 def _prepare(motion: Motion, strokes: VirtualStrokes | None, confirm: Confirm | None) -> int | None:

@@ -15,6 +15,7 @@ from scissorcal.render.plate_estimate import PlateReport
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 SCOPE = "render"
+ACCEPT = "--accept-derated"
 MOST_CREATED = 0.1
 MOST_OUT = 0.1
 """Chosen: a person waits for a second in ten without asking what is wrong."""
@@ -52,9 +53,10 @@ class RenderResult:
     of more than five ticks, ``unsent`` commands that the line did not accept, ``overrun`` samples
     that this process read too late. ``limited_share`` is the share of rendering frames in which
     torque or force met its limit. ``strokes`` counts closings of the blades, ``package_hash`` is
-    the content hash of what was rendered, ``admission`` how much of its stiffness, and
-    ``plate`` how an estimated plate was followed (None where its pose is known). ``warnings`` are
-    sentences for the person at the rig.
+    the content hash of what was rendered, ``admission`` how much of its stiffness,
+    ``accepted_derated`` whether a felt torque beyond the scene's tolerance was accepted by a
+    person, and ``plate`` how an estimated plate was followed (None where its pose is known).
+    ``warnings`` are sentences for the person at the rig.
     """
 
     seconds: float
@@ -76,6 +78,7 @@ class RenderResult:
     ledger: EnergyLedger
     limits: AppliedLimits
     admission: Admission
+    accepted_derated: bool
     plate: PlateReport | None
     package_hash: str
     verdicts: tuple[Verdict, ...]
@@ -105,13 +108,17 @@ def render_verdicts(
     tick_us: int,
     admission: Admission,
     plate: PlateReport | None = None,
+    *,
+    accepted: bool = False,
 ) -> tuple[Verdict, ...]:
-    """Judge a rendering: admitted, on time, complete, without faults, supervised, passive.
+    """Judge a rendering: admitted, felt, on time, complete, without faults, supervised, passive.
 
-    An estimated ``plate`` is judged, too, by how long it was known well enough.
+    An estimated ``plate`` is judged, too, by how long it was known well enough. ``accepted``: a
+    person wants the rendering although its torque is felt beyond the scene's tolerance.
     """
     return (
         _admitted(admission),
+        felt_verdict(admission, accepted=accepted),
         *loop_verdicts(SCOPE, report, latency, tick_us),
         _passive(report.ledger),
         _motor_sense(report.ledger),
@@ -127,6 +134,31 @@ def _admitted(admission: Admission) -> Verdict:
     allowed = admission.allowed_in_hand
     share = admission.rendered / allowed if allowed > 0.0 else math.inf
     return judge(SCOPE, "admission", share, 1.0, why)
+
+
+def felt_verdict(admission: Admission, *, accepted: bool = False) -> Verdict:
+    """Whether what is felt of an admitted rendering is the package's torque, to the tolerance.
+
+    Beyond it the check fails, or, where a person ``accepted`` that, decides nothing and states it.
+    """
+    share, tolerance = admission.felt_share, admission.tolerance
+    if not admission.evaluated:
+        why = "What this rig changes of the felt torque is not known, as its friction is not."
+        return not_evaluated(SCOPE, "felt torque", f"{why} {' '.join(admission.cures)}")
+    why = (
+        f"Softer response, weaker damping and friction near rest change the felt torque by "
+        f"{share:.1%} (rms over the scene's closing strokes), the scene's tolerance is "
+        f"{tolerance * 100:.3g} %."
+    )
+    if admission.is_felt and accepted:
+        return not_evaluated(
+            SCOPE, "felt torque", f"Accepted by a person ({ACCEPT}): {why}", tolerance, share
+        )
+    cures = "No encoder, delay or damping cures it alone: narrow the scene."
+    if admission.felt_cures:
+        cures = f"What would cure it, each by itself: {' '.join(admission.felt_cures)}"
+    remedy = f"{why} {cures} Or accept it ({ACCEPT})."
+    return judge(SCOPE, "felt torque", share, tolerance, why, remedy)
 
 
 def _plate_pose(plate: PlateReport) -> Verdict:

@@ -162,8 +162,11 @@ def _sweeps(
         parts = [told.get(stroke, none) for stroke in strokes]
         return Offer(sum(parts, none), sum(seconds.get(stroke, 0.0) for stroke in strokes))
 
-    sweeps = {speed: offer(2 * index, 2 * index + 1) for index, speed in enumerate(speeds)}
-    return sweeps, offer(2 * len(speeds))
+    sweeps = {
+        speed: offer(*(stroke.index for stroke in plan.strokes if stroke.speed == speed))
+        for speed in speeds
+    }
+    return sweeps, offer(plan.strokes[-1].index)
 
 
 def _strokes(

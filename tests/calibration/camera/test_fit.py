@@ -201,8 +201,13 @@ def test_a_picture_that_is_covered_in_part_is_judged_where_a_thing_stands() -> N
 
 @pytest.mark.slow
 def test_what_a_camera_states_of_uncovered_places_holds_the_truth() -> None:
-    """Errors against the renderer's lens, the best rotation taken out; 8 cameras of a dozen."""
-    ratios = []
+    """Errors against the renderer's lens, the best rotation taken out, within two standard errors.
+
+    Those of one camera go together, so that each camera counts once, by most of its places: of 30
+    all lay within but one. Where 5 % do not, as two standard errors say, 3 or more of 8 have a
+    chance of 6e-3 (binomial).
+    """
+    held = []
     for seed in range(8):
         fit = fit_camera(
             middle_only(np.random.default_rng(100 + seed)), rng=np.random.default_rng(0)
@@ -225,10 +230,8 @@ def test_what_a_camera_states_of_uncovered_places_holds_the_truth() -> None:
         turned = rotation.apply(np.column_stack([rays, np.ones(len(rays))]))
         error = (LENS.bend(turned[:, :2] / turned[:, 2:]) - pixels) / np.sqrt(2.0)
         ratio = np.linalg.norm(error, axis=1) / places.error_px.ravel()
-        ratios.append(ratio[~inside & np.isfinite(ratio)])
-    # a standard error holds 68 % of a normal's draws, and 95 % lie within two of them
-    within = np.concatenate(ratios)
-    assert np.mean(within < 2.0) > 0.9
+        held.append(np.median(ratio[~inside & np.isfinite(ratio)]) < 2.0)
+    assert held.count(False) <= 2
 
 
 def unbent(pixels: Array) -> Array:

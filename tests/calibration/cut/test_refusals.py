@@ -72,6 +72,20 @@ def test_a_recording_without_unloading_is_refused(friction):
     assert "open the blades wide in every stroke" in str(refused.value)
 
 
+def test_a_sensor_that_clips_is_named_before_what_follows_from_it(friction):
+    """A torque that is clipped wherever the blades press shows no unloading either."""
+    rng = np.random.default_rng(15)
+    made = cut(way(HIGH, LOW)).made.recording
+    samples = made.samples.copy()
+    samples["motor_torque"] += rng.normal(0.0, 2e-4, len(samples))
+    high = float(np.quantile(samples["motor_torque"], 0.8))
+    samples["motor_torque"] = np.minimum(samples["motor_torque"], high)
+    with pytest.raises(InputError, match="unloading the material") as refused:
+        fit_cut((replace(made, samples=samples),), paper(), friction, effort="draft", rng=rng)
+    said = str(refused.value)
+    assert said.index("is at the end of its range") < said.index("no stroke shows")
+
+
 def test_other_errors_are_not_reported_as_missing_unloading(friction, monkeypatch):
     def broken(*_):
         raise ValueError("something else")

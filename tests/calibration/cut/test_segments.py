@@ -1,13 +1,17 @@
 """A recording of cuts in pieces: turns, rests, cracks that wait and cracks that run."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scissorcal.calibration.cut.path import material_of, path_motion
 from scissorcal.calibration.cut.path.runs import find_runs, split
 from scissorcal.calibration.cut.segments import cut_into_segments
 from tests.calibration.cut.made_cuts import (
+    FRICTION,
     GEOMETRY,
     GUESS,
     HIGH,
@@ -17,6 +21,7 @@ from tests.calibration.cut.made_cuts import (
     cut,
     way,
 )
+from tests.calibration.cut.path.made import INERTIA
 
 
 def segments_of(made: Cut, cuts: bool = True):
@@ -115,10 +120,32 @@ def test_invalid_samples_split_a_stretch_and_remove_one_segment(two_strokes):
     assert 1 <= lost <= 2
 
 
-def test_a_invalid_piece_is_left_out(two_strokes):
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_piece_is_not_lost_for_a_sample_or_two(two_strokes, count):
+    """Torque between usable samples 3 ms apart is that of the line between them."""
     whole = segments_of(two_strokes)
     usable = np.ones(len(two_strokes.tip), dtype=bool)
-    usable[whole.pieces[1].ends[2]] = False
+    first = int(whole.pieces[1].ends[2])
+    usable[first : first + count] = False
+    torn = np.where(usable, two_strokes.made.recording.samples["motor_torque"], 1e3)
+    recording = two_strokes.made.recording
+    samples = recording.samples.copy()
+    samples["motor_torque"] = torn
+    made = replace(two_strokes.made, recording=replace(recording, samples=samples))
+    motions = path_motion((made.recording,), INERTIA, (usable,))
+    materials = tuple(material_of(motion, FRICTION, 0.0) for motion in motions)
+    found = segments_of(replace(two_strokes, made=made, motions=motions, materials=materials))
+    assert [p.kind for p in found.pieces] == [p.kind for p in whole.pieces]
+    for one, other in zip(found.pieces, whole.pieces, strict=True):
+        allowed = 5.0 * np.sqrt(np.diag(other.covariance)) + 1e-4
+        np.testing.assert_allclose(one.torque, other.torque, atol=float(allowed.max()))
+
+
+def test_an_invalid_piece_is_left_out(two_strokes):
+    whole = segments_of(two_strokes)
+    usable = np.ones(len(two_strokes.tip), dtype=bool)
+    first = int(whole.pieces[1].ends[2])
+    usable[first : first + 3] = False
     invalid = segments_of(cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), usable=usable))
     assert [piece.kind for piece in invalid.pieces] == ["fresh", "loading", "unloading"]
 

@@ -169,7 +169,7 @@ def test_sweeps_have_the_curvature_of_the_fits_own_likelihood(friction: Friction
     known = friction.knowledge
     design = two_sweeps(friction)
     by_stroke = friction_information(design, known.point, friction.noise, 0.0)
-    assert sorted(by_stroke) == [0, 1, 2, 3, 4]
+    assert sorted(by_stroke) == [0, 1, 2, 3, 4, 5], "two, three from the middle, and the excitation"
     law = design.candidate(design.observed).reduced
     assert isinstance(law, ReducedLaw)
     total = sum(by_stroke.values(), Information.none(len(known.point)))

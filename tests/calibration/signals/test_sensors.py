@@ -178,3 +178,62 @@ def test_saturation_is_found_at_any_sampling_rate(factor):
     assert np.all(inspect_sensors((one,)).usable[0])
     found = inspect_sensors((clipped(one, 0.0155),))
     assert found.verdict.status == "fail"
+
+
+def rig_at_rest_or_in_motion(
+    length: int, noise_steps: float, load_N: float, rng: np.random.Generator
+) -> Recording:
+    """A tared force sensor with steps of 0.01 N and white noise; the load turns with the joint."""
+    time = 1e-3 * np.arange(length)
+    samples = np.zeros(length, SAMPLE_DTYPE)
+    samples["device_time_us"] = 1000 * np.arange(length)
+    samples["opening"] = np.round((0.5 + 0.3 * np.sin(0.8 * time)) / 5e-5) * 5e-5
+    samples["motor_torque"] = 0.02 * np.cos(0.8 * time) + rng.normal(0.0, 1e-3, length)
+    force = load_N * np.tanh(20.0 * np.cos(0.8 * time)) + rng.normal(
+        0.0, 0.01 * noise_steps, length
+    )
+    samples["handle_force"] = np.round(force / 0.01) * 0.01
+    samples["stroke"] = -1
+    return Recording("friction", samples, source="a.mcap", handle_radius_m=0.06)
+
+
+def false_alarms(length: int, noise_steps: float, load_N: float, count: int) -> int:
+    """Recordings of healthy sensors, seeds from 0 on, of which any sample is called invalid."""
+    found = 0
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        made = rig_at_rest_or_in_motion(length, noise_steps, load_N, rng)
+        found += not np.all(inspect_sensors((made,)).usable[0])
+    return found
+
+
+@pytest.mark.parametrize("load_N", [0.0, 0.05, 0.3])
+@pytest.mark.parametrize("noise_steps", [0.5, 1.0, 1.4, 2.0, 3.0])
+@pytest.mark.parametrize("length", [3_000, 66_000])
+def test_equal_readings_by_chance_are_no_fault_however_long_a_recording(
+    length: int, noise_steps: float, load_N: float
+) -> None:
+    """At 1 in 1,000 recordings one of these 120 fails with a chance of 0.11; none does."""
+    assert false_alarms(length, noise_steps, load_N, 4) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise_steps", [1.4, 2.0, 3.0])
+def test_false_alarms_of_a_tared_sensor_are_1_in_1000(noise_steps: float) -> None:
+    """Of 1,000 recordings 5 or more are expected in 4 of 1,000 such tests."""
+    assert false_alarms(6_000, noise_steps, 0.0, 1000) < 5
+
+
+@pytest.mark.parametrize("width_N", [0.1, 0.2])
+def test_a_dead_band_of_a_noisy_sensor_is_still_found(width_N: float) -> None:
+    rng = np.random.default_rng(3)
+    made = rig_at_rest_or_in_motion(20_000, 2.0, 0.3, rng)
+    samples = made.samples.copy()
+    slow = 0.3 * np.sin(1.7 * samples["device_time_us"] * 1e-6)
+    force = slow + rng.normal(0.0, 0.02, len(samples))
+    force = np.where(np.abs(force) < width_N, 0.0, force)
+    samples["handle_force"] = np.round(force / 0.01) * 0.01
+    found = inspect_sensors((dataclasses.replace(made, samples=samples),))
+    inside = np.abs(slow) < 0.5 * width_N
+    assert np.mean(~found.usable[0][inside]) > 0.9
+    assert any("a dead band" in note for note in found.notes)

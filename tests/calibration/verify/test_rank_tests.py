@@ -82,11 +82,16 @@ def test_intervals_too_narrow_by_one_and_a_half_are_found(count, least):
     assert np.mean(found) > least
 
 
-@pytest.mark.parametrize(("width", "shift"), [(1 / 1.5, 0.0), (1.0, 0.6)])
-def test_too_wide_and_shifted_intervals_are_found(width, shift):
+@pytest.mark.parametrize(("width", "shift", "least"), [(1 / 1.5, 0.0, 0.75), (1.0, 0.6, 0.85)])
+def test_too_wide_and_shifted_intervals_are_found(width, shift, least):
+    """At 1 in 1000: measured of 600 samples 0.92 if too wide by one and a half, all if shifted.
+
+    Of 40 such samples no more than allowed are found with a chance of 7e-4, and of 2e-7 even if one
+    in 160 shifted ones is not found (binomial).
+    """
     rng = np.random.default_rng(4)
     found = [ecdf_p_value(ranks_of(width, shift, 200, rng), LEVELS) < 1e-3 for _ in range(40)]
-    assert np.mean(found) > 0.85
+    assert np.mean(found) > least
 
 
 def test_ranks_of_a_calibrated_posterior_are_uniform_and_of_an_overconfident_one_are_not():

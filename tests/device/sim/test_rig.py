@@ -262,11 +262,8 @@ def test_a_sheet_cut_to_its_end_gives_no_force() -> None:
     assert rig.stored_energy == 0.0
 
 
-@settings(max_examples=20)
-@given(data=st.data())
-def test_no_specimen_and_no_command_ever_gives_a_number_that_is_not_finite(
-    data: st.DataObject,
-) -> None:
+def stays_finite(data: st.DataObject) -> None:
+    """No specimen and no command ever gives a number that is not finite."""
     truth = specimen(
         blade={
             "moving": data.draw(st.sampled_from(["both", "upper"])),
@@ -304,3 +301,18 @@ def test_no_specimen_and_no_command_ever_gives_a_number_that_is_not_finite(
             crack = rig.crack
     assert math.isfinite(rig.kinetic_energy)
     assert all(math.isfinite(value) for value in vars(rig.energy).values())
+
+
+@settings(max_examples=20)
+@given(data=st.data())
+def test_no_specimen_and_no_command_ever_gives_a_number_that_is_not_finite(
+    data: st.DataObject,
+) -> None:
+    stays_finite(data)
+
+
+@pytest.mark.slow
+@settings(max_examples=60)
+@given(data=st.data())
+def test_more_specimens_and_commands_give_finite_numbers(data: st.DataObject) -> None:
+    stays_finite(data)

@@ -39,7 +39,8 @@ def test_a_design_for_another_recipe_or_another_version_is_not_shown(designed: W
     text = designed.recipe_path.read_text(encoding="utf-8")
     kept = designed.design_path.read_text(encoding="utf-8")
     try:
-        changed = text.replace("contact_mm = [15.0", "contact_mm = [16.0")
+        changed = text.replace("contact_mm = [39.0", "contact_mm = [40.0")
+        assert changed != text
         designed.recipe_path.write_text(changed, encoding="utf-8")
         assert stored_design(Engine.of(designed)) is None
         designed.recipe_path.write_text(text, encoding="utf-8")
@@ -91,7 +92,7 @@ def test_a_designed_capture_is_whole_by_its_own_list(
     (path,) = workspace.recordings("friction")
     recording = read_recording(path)
     assert 'plan = "designed"' in recording.recipe_toml
-    assert len(recording.strokes) == 7
+    assert len(recording.strokes) == 8
 
     from scissorcal.device.counting import count_recorded
 

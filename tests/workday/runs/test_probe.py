@@ -14,7 +14,7 @@ from scissorcal.device.probe.probe import ProbeRefusedError
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording
 from scissorcal.recording.probe import probe_of
-from scissorcal.workday.runs.capture import capture_into, speeds_below_encoder
+from scissorcal.workday.runs.capture import capture_into
 from scissorcal.workday.runs.probe import ensure_probed, last_probe, probe_into, probe_state
 from scissorcal.workday.workspace import Workspace, create_workspace
 from tests.strange_device import FAULTS, StrangeDevice, VirtualPort
@@ -132,15 +132,3 @@ def test_the_plan_says_whether_the_probe_counts(workspace: Workspace) -> None:
     later = datetime.now(UTC) + timedelta(hours=5)
     assert "probed again before" in probe_state(workspace, recipe, later)
     assert "rig.motor_sign changed" in probe_state(workspace, changed(recipe, motor_sign=-1))
-
-
-def test_speeds_that_a_coarse_encoder_hides_are_named_before_the_capture(
-    workspace: Workspace,
-) -> None:
-    recipe = workspace.recipe()
-    identity = virtual_rig().identity
-    assert speeds_below_encoder(recipe, identity) == ""
-    coarse = identity._replace(opening_resolution=2.0 * np.pi / 20_000)
-    sentence = speeds_below_encoder(recipe, coarse)
-    assert sentence.startswith("Sweeps at 0.05 rad/s will not be used")
-    assert "from 0.081 rad/s on" in sentence

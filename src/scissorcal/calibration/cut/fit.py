@@ -95,6 +95,12 @@ class _Data:
         """The recordings' files, for messages."""
         return ", ".join(recording.source or "the recording" for recording in self.recordings)
 
+    @property
+    def cause(self) -> str:
+        """What the sensors lack, before what follows from it; empty where they lack nothing."""
+        verdict = self.sensors.verdict
+        return f"{verdict.why} Besides, " if verdict.status == "fail" else ""
+
 
 def fit_cut(
     recordings: tuple[Recording, ...],
@@ -212,9 +218,9 @@ def _scouted(data: _Data, laws: Sequence[CutLaw]) -> Scouted:
         return scout(data.motions, data.known, data.recipe, data.geometry, richest)
     except NoUnloadingError as error:
         raise InputError(
-            f"{data.names}: no stroke shows the blades unloading the material, so its response "
-            "cannot be separated from friction. Check rig.edge and the sheet's place, and open "
-            "the blades wide in every stroke."
+            f"{data.names}: {data.cause}no stroke shows the blades unloading the material, so its "
+            "response cannot be separated from friction. Check rig.edge and the sheet's place, and "
+            "open the blades wide in every stroke."
         ) from error
     except MisfitError as error:
         raise InputError(
@@ -371,7 +377,7 @@ def _refuse_no_contact(data: _Data) -> None:
         felt += float(np.abs(path[moved][torque > least]).sum())
     if felt < FEWEST_FELT_RAD:
         raise InputError(
-            f"{data.names}: the blades hardly touched the material (torque beyond friction over "
-            f"{felt:.2g} rad of closing). Check that the sheet lay between the blades and that "
-            "advance was zero at its near edge, then capture again."
+            f"{data.names}: {data.cause}the blades hardly touched the material (torque beyond "
+            f"friction over {felt:.2g} rad of closing). Check that the sheet lay between the "
+            "blades and that advance was zero at its near edge, then capture again."
         )

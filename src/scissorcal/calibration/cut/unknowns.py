@@ -11,7 +11,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.idle import idle_zero
 from scissorcal.calibration.signals.zeros import DriveZero
 from scissorcal.model import Cutting, edge_height, settled_contact
-from scissorcal.model.cutting import torque_at
+from scissorcal.model.cutting import torque_at, within_thickness
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, judge, not_evaluated
@@ -44,21 +44,27 @@ class Unknown:
 
 @dataclass(frozen=True)
 class SceneMean:
-    """Mean torque of the material over a grid (k,) of the scene's openings and contacts.
+    """Mean torque of the material over places (k,) of the scene's openings and contacts.
 
-    ``rate`` (rad/s) is the middle of the scene's, with the blades closing.
+    ``rate`` (rad/s) is the middle of the scene's, with the blades closing. Torque is held to
+    ``limit`` (N m), as the loop renders it.
     """
 
     cutting: Cutting
     opening: Array
     contact: Array
     rate: float
+    limit: float = np.inf
 
     @classmethod
-    def of(cls, fit: FitResult, recipe: Recipe) -> "SceneMean":
-        """The scene of a recipe, and the model at a cut's best point."""
+    def of(cls, fit: FitResult, recipe: Recipe, limit: float = np.inf) -> "SceneMean":
+        """The scene of a recipe, and the model at a cut's best point.
+
+        Places count where the blades can be: not where they would sink deeper than its thickness
+        into what is only pressed. ``limit`` (N m) is the rig's, the recipe's holds in any case.
+        """
         scene = recipe.scene
-        opening, contact = np.meshgrid(
+        grid = np.meshgrid(
             np.linspace(*scene.opening_rad, OPENINGS), np.linspace(*scene.contact_m, CONTACTS)
         )
         low, high = scene.opening_rate_rad_per_s
@@ -67,7 +73,12 @@ class SceneMean:
             for parameter, value in zip(fit.parameters, fit.map_point, strict=True)
         }
         rate = -float(np.sqrt(max(low, 1e-3) * high))
-        return cls(cutting_from(fit.structure, values), opening.ravel(), contact.ravel(), rate)
+        cutting = cutting_from(fit.structure, values)
+        opening, contact = (axis.ravel() for axis in grid)
+        view = edge_height(cutting.edge, contact, opening / cutting.moving_blades)
+        bears = within_thickness(cutting, cutting.upper_face_m - view.height)
+        held = min(limit, recipe.limits.torque_Nm)
+        return cls(cutting, opening[bears], contact[bears], rate, held)
 
     def torque(self, away_rad: float = 0.0, **edge: float) -> float:
         """Mean torque (N m), with openings or fields of the edge larger by so much."""
@@ -80,7 +91,7 @@ class SceneMean:
         view = edge_height(cutting.edge, place, opening / cutting.moving_blades)
         reached = view.station < cutting.edge.length_m
         felt = np.where(reached, torque_at(cutting, opening, place, self.rate), 0.0)
-        return float(np.mean(felt))
+        return float(np.mean(np.clip(felt, -self.limit, self.limit))) if len(felt) else 0.0
 
     def change(self, away_rad: float = 0.0, **edge: float) -> float:
         """The larger change (N m) of the mean torque, either way, for such an error."""
@@ -114,7 +125,7 @@ def find_unknowns(
     fit: FitResult, recipe: Recipe, friction: FitResult, recordings: tuple[Recording, ...]
 ) -> tuple[Unknown, ...]:
     """Bound the scene's mean torque by zeros, edge shape and friction by load."""
-    scene = SceneMean.of(fit, recipe)
+    scene = SceneMean.of(fit, recipe, _rig_limit(recordings))
     mean = scene.torque()
     rows = (
         ("opening zero", *_opening_zero(scene, recipe)),
@@ -126,6 +137,12 @@ def find_unknowns(
         Unknown(name, torque, torque / mean if mean > 0.0 else 0.0, spread, cure)
         for name, torque, spread, cure in rows
     )
+
+
+def _rig_limit(recordings: tuple[Recording, ...]) -> float:
+    """The least torque limit (N m) that the rigs of the recordings state, infinite if none does."""
+    stated = [one.device.get("torque_limit") for one in recordings]
+    return min((float(limit) for limit in stated if isinstance(limit, float)), default=np.inf)
 
 
 def _verdict(one: Unknown, limit: float) -> Verdict:

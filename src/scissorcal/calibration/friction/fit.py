@@ -39,6 +39,7 @@ from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.sensors import inspect_sensors
 from scissorcal.calibration.signals.soundness import refuse_unsound
+from scissorcal.calibration.signals.steadiness import Steadiness, steadiness
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros, zero_verdicts
@@ -91,7 +92,8 @@ def fit_friction(
     joint = recordings[0].joint if recordings else Joint()
     sensors = inspect_sensors(recordings)
     cleaned, zero = _cleaned(recordings, settings, simulated=prior is not None)
-    again = partial(weigh, cleaned, settings.cutoff_Hz, sensors.usable)
+    steady = steadiness(recordings)
+    again = partial(_slid, steady, cleaned, settings.cutoff_Hz, sensors.usable)
     every = again()
     windows = every.where(every.bins.moving)
     refuse_friction(recordings, settings, every, windows, sensors)
@@ -128,6 +130,7 @@ def fit_friction(
             start_verdict(law, chosen.optimum.point),
             _bandwidth(again, law, chosen, posterior, effort),
             sensors.verdict,
+            *((steady.verdict(),) if steady.rows else ()),
             *zero_verdicts("fit.friction", zero, recordings, _rms(law.observed)),
             *((between.verdict(),) if between else ()),
         ),
@@ -156,7 +159,8 @@ def friction_experiment(
     """
     joint = recordings[0].joint
     cleaned, zero = _cleaned(recordings, settings, simulated=False)
-    every = weigh(cleaned, settings.cutoff_Hz, inspect_sensors(recordings).usable)
+    usable = inspect_sensors(recordings).usable
+    every = _slid(steadiness(recordings), cleaned, settings.cutoff_Hz, usable)
     windows = every.where(every.bins.moving)
     law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
     adopt = tuple(fit.structure.get("adopt", ()))
@@ -174,6 +178,18 @@ def friction_experiment(
         zero_sd=zero.sd if zero and _has_offset(fit) else None,
     )
     return replace(found, tails=float(fit.structure.get("tails", np.inf)))
+
+
+def _slid(
+    steady: Steadiness,
+    recordings: tuple[Recording, ...],
+    cutoff_Hz: float,
+    usable: tuple[NDArray[np.bool_], ...],
+    *,
+    window_Hz: float | None = None,
+) -> Windows:
+    """Windows over the motion of recordings, without the slips of strokes that stuck."""
+    return steady.kept(weigh(recordings, cutoff_Hz, usable, window_Hz=window_Hz))
 
 
 def _cleaned(

@@ -1,5 +1,6 @@
 """Sensor faults in a recording: quantisation, saturation, dead bands, constant channels."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -22,6 +23,12 @@ INVALID_LIMIT = 0.05
 LONG_RUN_S = 0.005
 FEWEST_IN_RUN = 4
 """Least duration and least samples of a run of equal values."""
+FALSE_RUNS = 1e-3
+"""Runs of equal values by chance that are expected in a recording, of the length that counts."""
+EQUAL_HALF_STEPS = 0.55
+"""Half a step, and a tenth more for what the noise's own estimate may be off."""
+BLOCK = 50
+"""Second differences whose mean square is one estimate of the noise: known to 20 %."""
 FEWEST_INVALID_S = 0.02
 NEAR_S = 0.05
 """The joint moves where its position changes more than twice within this time before and after."""
@@ -131,7 +138,8 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
     hold, alike = _repetition(values)
     dead, ends = none, tuple[float, ...]()
     if alike < NOISY:
-        long_run = max(long_run, FEWEST_IN_RUN * hold)
+        by_chance = _longest_by_chance(values[::hold], step)
+        long_run = max(long_run, hold * max(FEWEST_IN_RUN, by_chance))
         ends = tuple(end for end in (low, high) if _long_runs(values == end, long_run) >= fewest)
         silent = (values == 0.0) & moves
         if low < 0.0 < high and _long_runs(silent, long_run) >= fewest:
@@ -139,6 +147,26 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
     else:
         ends = _held_ends(values, moves, step, long_run, fewest)
     return Channel(name, constant, step, np.isin(values, ends), dead, low, high)
+
+
+def _longest_by_chance(values: Array, step: float) -> int:
+    """Equal values in a row that noise alone does not give once in 1 / FALSE_RUNS recordings.
+
+    A value of white noise (standard deviation sd) lies in the same step as the one before with at
+    most p = 2 Phi(step / (2 sd)) - 1, so that n (1 - p) p^m runs of m are expected among n values
+    (m,). The noise is that of the second differences, less the steps' own step^2 / 12.
+    """
+    change = np.diff(values, 2)
+    if not math.isfinite(step) or len(change) < BLOCK:
+        return 0
+    whole = change[: len(change) // BLOCK * BLOCK].reshape(-1, BLOCK)
+    spread = float(np.median(np.mean(whole**2, axis=1))) / 6.0
+    sd = math.sqrt(max(spread - step**2 / 12.0, (EQUAL_HALF_STEPS * step / 5.0) ** 2))
+    equal = math.erf(EQUAL_HALF_STEPS * step / (sd * math.sqrt(2.0)))
+    if equal >= 1.0:
+        return len(values)
+    expected = len(values) * (1.0 - equal)
+    return max(0, math.ceil(math.log(FALSE_RUNS / expected) / math.log(equal)))
 
 
 def _repetition(values: Array) -> tuple[int, float]:

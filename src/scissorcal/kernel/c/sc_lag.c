@@ -7,6 +7,7 @@ void sc_lag_state(sc_lag *lag, uint32_t mode, uint32_t sequence)
     const uint32_t passed = sequence - lag->last;
     const uint32_t late = sequence - lag->answers;
     lag->last = sequence;
+    lag->late = lag->begun && late < HALF ? late : 0;
     if (!lag->begun || mode >= SC_LAG_MODES || passed == 0 || passed >= HALF || late < passed ||
         late >= HALF) {
         return;

@@ -18,7 +18,8 @@ typedef struct {
     uint64_t count[SC_LAG_MODES][SC_LAG_TICKS];
     uint64_t held[SC_LAG_MODES]; /* ticks without a new command since the tick before */
     uint32_t worst[SC_LAG_MODES];
-    uint32_t last;    /* newest tick */
+    uint32_t last;    /* newest tick ... */
+    uint32_t late;    /* ... and its lag */
     uint32_t answers; /* sequence that the newest command answers */
     uint32_t fresh;   /* a command was sent since the newest tick */
     uint32_t begun;   /* a command was sent at all */

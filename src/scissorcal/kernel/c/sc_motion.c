@@ -2,8 +2,6 @@
 
 #include <math.h>
 
-static const uint32_t FELL_BACK_US = 0x80000000u; /* half the clock's range: time ran backwards */
-
 static float low_pass(float old, float fresh, float cutoff_Hz, float dt)
 {
     const float weight = 6.2831853f * cutoff_Hz * dt;
@@ -11,34 +9,17 @@ static float low_pass(float old, float fresh, float cutoff_Hz, float dt)
     return isfinite(rate) ? rate : 0.0f;
 }
 
-float sc_motion_update(sc_motion *motion, float cutoff_Hz, uint32_t tick_us, uint32_t device_us,
-                       float opening, float advance)
+float sc_motion_update(sc_motion *motion, float cutoff_Hz, uint32_t passed_us, float opening,
+                       float advance)
 {
-    uint32_t passed_us = device_us - motion->last_us;
-    if (motion->started && passed_us == 0) {
-        if (opening == motion->opening && advance == motion->advance) {
-            return 0.0f;
-        }
-        passed_us = tick_us; /* the clock stands, the blades do not */
-    }
-    const int restart = !motion->started || passed_us > SC_LONGEST_GAP_US;
-    if (!motion->started) {
-        passed_us = 0;
-    } else if (passed_us >= FELL_BACK_US) {
-        passed_us = tick_us;
-    }
     const float dt = (float)passed_us * 1e-6f;
-    if (restart) {
-        motion->opening_rate = 0.0f;
-        motion->advance_rate = 0.0f;
-    } else {
+    if (motion->started && passed_us > 0) {
         motion->opening_rate =
             low_pass(motion->opening_rate, (opening - motion->opening) / dt, cutoff_Hz, dt);
         motion->advance_rate =
             low_pass(motion->advance_rate, (advance - motion->advance) / dt, cutoff_Hz, dt);
     }
     motion->device_time_us += passed_us;
-    motion->last_us = device_us;
     motion->started = 1;
     motion->opening = opening;
     motion->advance = advance;

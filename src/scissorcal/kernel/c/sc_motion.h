@@ -1,14 +1,11 @@
-/* What a stream of measured places says: an unwrapped clock, filtered rates; and a PID on them. */
+/* What a stream of measured places says: filtered rates; and a PID on them. */
 #ifndef SC_MOTION_H
 #define SC_MOTION_H
 
 #include <stdint.h>
 
-enum { SC_LONGEST_GAP_US = 100000 };
-
 typedef struct {
-    int64_t device_time_us; /* unwrapped, never falls */
-    uint32_t last_us;
+    int64_t device_time_us; /* since the first measurement; never falls */
     int32_t started;
     float opening;
     float opening_rate;
@@ -16,14 +13,12 @@ typedef struct {
     float advance_rate;
 } sc_motion;
 
-/* Take a measurement and return the seconds since the last one, by the device's clock.
+/* Take a measurement, passed_us after the last one; returns that in seconds.
  *
- * Rates are backward differences behind a first-order low-pass at cutoff_Hz (0: none). A gap of
- * time is divided by its true length; after more than 0.1 s, or when the clock decreased (a device
- * that restarted), the rates start again from 0. A repeated measurement changes
- * nothing and returns 0; another place at a repeated time counts as a tick later. */
-float sc_motion_update(sc_motion *motion, float cutoff_Hz, uint32_t tick_us, uint32_t device_us,
-                       float opening, float advance);
+ * Rates are backward differences behind a first-order low-pass at cutoff_Hz (0: none), and 0 at the
+ * first place. A gap is divided by its true length. */
+float sc_motion_update(sc_motion *motion, float cutoff_Hz, uint32_t passed_us, float opening,
+                       float advance);
 
 typedef struct {
     float kp;

@@ -1,4 +1,5 @@
 #include "sc_servo.h"
+#include "sc_servo_end.h"
 #include "sc_servo_plate.h"
 #include "sc_servo_control.h"
 #include "sc_servo_watch.h"
@@ -36,6 +37,7 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
     return is_level(config->torque_limit) && is_level(config->torque_slew) &&
            is_level(config->force_limit) && is_level(config->force_slew) &&
            is_level(config->ramp_s) && is_level(config->damping_Nm_s_per_rad) &&
+           is_level(config->let_go_damping_Nm_s_per_rad) &&
            is_level(config->rate_cutoff_Hz) && is_level(config->opening_kp) &&
            is_level(config->opening_kd) && is_level(config->opening_ki) &&
            is_level(config->advance_kp) && is_level(config->advance_kd) &&
@@ -107,7 +109,7 @@ static effort track(const sc_servo_config *config, const sc_reference *reference
     const float advance_error = reference->advance[at] - motion->advance;
     if (fabsf(opening_error) > config->opening_error_limit ||
         fabsf(advance_error) > config->advance_error_limit) {
-        sc_servo_stop(servo, SC_STOP_TRACKING_LOST);
+        sc_servo_let_go(servo, SC_STOP_TRACKING_LOST);
         return wanted;
     }
     const sc_pid_gains opening = {config->opening_kp, config->opening_kd, config->opening_ki,
@@ -205,27 +207,6 @@ static way way_since(const sc_servo_config *config, sc_servo *servo, const sc_mo
     return since;
 }
 
-static void count_frame(sc_servo *servo, const sc_state *state)
-{
-    const uint32_t passed = state->sequence - servo->sequence;
-    servo->frames++;
-    if (servo->started && passed > 1 && passed < 0x80000000u) {
-        servo->misses += passed - 1;
-        servo->sample.flags |= SC_SAMPLE_AFTER_GAP;
-    } else if (servo->started && passed >= 0x80000000u) {
-        sc_servo_stop(servo, SC_STOP_RESTARTED); /* the reference counts by sequence numbers */
-    }
-    servo->sequence = state->sequence;
-    servo->started = 1;
-    if (servo->begins) {
-        servo->engaged_at = servo->sequence;
-        servo->begins = 0;
-    }
-    if (state->flags & SC_STATE_TORQUE_SATURATED) {
-        servo->device_saturated++;
-    }
-}
-
 static void begin_sample(sc_servo *servo, const sc_state *state)
 {
     sc_sample *sample = &servo->sample;
@@ -321,23 +302,26 @@ static int step(const sc_servo_config *config, const sc_model *model,
         repeat_command(config, servo, command);
         return 0;
     }
-    const uint32_t passed_us = sc_servo_time_since(config, servo, state);
     begin_sample(servo, state);
-    count_frame(servo, state);
+    sc_servo_count_frame(config, servo, state);
     servo->stale_us = 0;
     sc_lag_state(&servo->lag, servo->mode, state->sequence);
-    const int valid = sc_servo_is_plausible(config, servo, state, passed_us);
+    const int valid = sc_servo_is_plausible(config, servo, state);
     way since = {0.0, 0.0, 0.0, 0.0f};
     if (valid) {
         const sc_motion before = servo->motion;
-        float dt = sc_motion_update(&servo->motion, config->rate_cutoff_Hz, config->tick_us,
-                              state->device_us, state->opening, state->advance);
+        float dt = sc_motion_update(&servo->motion, config->rate_cutoff_Hz,
+                                    servo->unused_us + servo->stamps.passed_us, state->opening,
+                                    state->advance);
+        servo->unused_us = 0;
         dt = fminf(dt, LONGEST_TICK_S); /* a gap neither ends the ramp nor fills an integral */
         since = way_since(config, servo, &before, state, dt);
         servo->engaged_s += dt;
+        sc_servo_follow_mean(servo, dt);
         sc_servo_move_plate(config, servo, dt);
         sc_servo_watch_speed(config, servo);
     } else {
+        sc_servo_pass_unused(servo);
         servo->invalid_frames++;
         servo->sample.flags |= SC_SAMPLE_INVALID;
     }
@@ -356,8 +340,7 @@ static int step(const sc_servo_config *config, const sc_model *model,
     }
     sc_servo_watch_state(config, servo, state, since.dt, valid);
     if (servo->ending) {
-        const effort none = {0.0f, 0.0f};
-        wanted = none;
+        sc_servo_ending(config, servo, &wanted.torque, &wanted.force);
         sc_servo_finish_ending(servo, valid && !faulty && servo->mode != SC_MODE_IDLE);
     }
     answer(config, servo, valid, faulty, wanted, command);

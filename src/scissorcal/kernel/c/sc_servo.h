@@ -23,12 +23,12 @@
 #include "sc_passivity.h"
 #include "sc_pieces.h"
 #include "sc_plate.h"
+#include "sc_stamp.h"
 #include "sc_watch.h"
 #include "sc_wire.h"
 
 enum {
-    SC_STUCK_UNTIL_STOP = 20, /* states in a row at which the device's clock stood still */
-    SC_LEAP_RATES = 2         /* times the limit of the rate, beyond which no motion is taken */
+    SC_LEAP_RATES = 2 /* times the limit of the rate, beyond which no motion is taken */
 };
 
 enum {
@@ -77,6 +77,7 @@ typedef struct {
     float force_slew;          /* [N/s] */
     float ramp_s;              /* from engaging RENDER to its full force */
     float damping_Nm_s_per_rad; /* of DAMP */
+    float let_go_damping_Nm_s_per_rad; /* while the servo ends gently */
     float rate_cutoff_Hz;      /* of the rate estimator; 0: none */
     float opening_kp, opening_kd, opening_ki;
     float advance_kp, advance_kd, advance_ki;
@@ -154,13 +155,17 @@ typedef struct {
     uint32_t silent_us; /* of the supervisor */
     uint32_t stale_us;  /* since the last state that was no repeat */
     uint32_t slew_us;   /* since the last command that was sent, at most a tick */
-    uint32_t implausible_frames; /* in a row */
-    uint32_t stuck_frames;       /* in a row, with an unchanged clock of the device */
+    sc_stamps stamps;
+    uint32_t unused_us;    /* passed over states before this one whose places were not usable */
+    uint32_t implausible;  /* history of places that were not usable: sc_count_recent */
     uint32_t fallback;
     uint32_t fallback_from; /* mode that the missing heartbeat ended */
     uint32_t stop_reason;
     uint32_t ending;     /* reason for which torque and force fall to zero before it stops, or 0 */
     uint32_t ending_us;
+    uint32_t fall_us;    /* over which they fall; 0: as fast as the slews let them */
+    float held_torque, held_force; /* from which they fall */
+    float mean_torque, mean_force; /* of the commands that were sent lately */
     uint32_t sequence;
     uint32_t begins;     /* the next frame is the first of its mode */
     uint32_t engaged_at; /* sequence at which the mode engaged, less the time in faults */
@@ -203,8 +208,9 @@ void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_se
  *
  * model and reference may be null: RENDER and TRACK then give no torque. A state whose opening or
  * advance is not usable (not finite, beyond the stops, or a leap that no motion makes) gets zero
- * torque and moves nothing; four in a row stop. A device whose clock decreases has restarted: its
- * rates start again from 0. One whose clock stands is taken at a tick a frame; 20 in a row stop. */
+ * torque and moves nothing; four among the last 20 stop. Where device_us and sequence contradict each
+ * other a state is taken as so many ticks as its sequence says, after a leap of it as one; eight among
+ * the last 20 stop. */
 int sc_servo_step(const sc_servo_config *config, const sc_model *model,
                   const sc_reference *reference, const sc_orders *orders, sc_servo *servo,
                   const sc_state *state, sc_command *command);

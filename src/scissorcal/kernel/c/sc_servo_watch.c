@@ -1,4 +1,5 @@
 #include "sc_servo_watch.h"
+#include "sc_servo_end.h"
 
 #include <math.h>
 #include <string.h>
@@ -8,24 +9,8 @@ static const float WIDEST_OPENING = 3.14159274f; /* rad; no scissors open wider 
 enum {
     SILENCE_UNTIL_STOP = 5,
     LONGEST_US = 0x40000000,
-    IMPLAUSIBLE_UNTIL_STOP = 4,
-    LONGEST_END_US = 100000
+    IMPLAUSIBLE_UNTIL_STOP = 4 /* among SC_RECENT_STATES: in a row, or every fifth one */
 };
-
-void sc_servo_stop(sc_servo *servo, uint32_t reason)
-{
-    if (servo->stop_reason == SC_STOP_NONE) {
-        servo->stop_reason = servo->ending != SC_STOP_NONE ? servo->ending : reason;
-    }
-}
-
-void sc_servo_end(sc_servo *servo, uint32_t reason)
-{
-    if (servo->stop_reason == SC_STOP_NONE && servo->ending == SC_STOP_NONE) {
-        servo->ending = reason;
-        servo->ending_us = 0;
-    }
-}
 
 void sc_servo_engage(sc_servo *servo, uint32_t mode)
 {
@@ -102,10 +87,7 @@ void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_se
     }
     sc_watch_pass(&servo->watch, elapsed_us);
     sc_plate_pass(&servo->plate, elapsed_us);
-    servo->ending_us = longer(servo->ending_us, elapsed_us);
-    if (servo->ending && servo->ending_us >= LONGEST_END_US) {
-        sc_servo_stop(servo, servo->ending); /* also where the device only repeats itself */
-    }
+    sc_servo_pass_ending(servo, elapsed_us);
     servo->stale_us = longer(servo->stale_us, elapsed_us);
     servo->slew_us = longer(servo->slew_us, elapsed_us);
     if (servo->slew_us > config->tick_us) {
@@ -113,48 +95,79 @@ void sc_servo_pass(const sc_servo_config *config, const sc_orders *orders, sc_se
     }
 }
 
-uint32_t sc_servo_time_since(const sc_servo_config *config, sc_servo *servo,
-                                    const sc_state *state)
+/* Returns the ticks that passed since the last state, 0 for the first. */
+static uint32_t take_stamps(const sc_servo_config *config, sc_servo *servo, const sc_state *state)
 {
-    if (!servo->motion.started) {
-        return 0;
-    }
-    const uint32_t passed_us = state->device_us - servo->motion.last_us;
-    if (passed_us > 0) {
-        servo->stuck_frames = 0;
-        return passed_us;
-    }
-    if (++servo->stuck_frames >= SC_STUCK_UNTIL_STOP) {
+    const int found =
+        sc_stamps_take(&servo->stamps, config->tick_us, state->sequence, state->device_us);
+    if (found == SC_STAMPS_OFF) {
+        sc_servo_stop(servo, SC_STOP_WATCHED + SC_WATCH_CLOCK);
+    } else if (found == SC_STAMPS_CONTRADICT) {
         sc_servo_stop(servo, SC_STOP_DEVICE_CLOCK);
     }
-    return config->tick_us;
+    return servo->stamps.ticks;
 }
 
-int sc_servo_is_plausible(const sc_servo_config *config, sc_servo *servo, const sc_state *state,
-                        uint32_t passed_us)
+void sc_servo_count_frame(const sc_servo_config *config, sc_servo *servo, const sc_state *state)
+{
+    const uint32_t passed = state->sequence - servo->sequence;
+    const uint32_t taken = take_stamps(config, servo, state);
+    servo->frames++;
+    if (taken > 1) {
+        servo->misses += taken - 1;
+        servo->sample.flags |= SC_SAMPLE_AFTER_GAP;
+    }
+    if (servo->started && passed >= 0x80000000u) {
+        sc_servo_stop(servo, SC_STOP_RESTARTED); /* the reference counts by sequence numbers */
+    }
+    if (taken != passed || taken > SC_LONGEST_GAP_US / config->tick_us) {
+        servo->engaged_at += passed - 1; /* the reference waits for blades that did not follow it */
+    }
+    servo->sequence = state->sequence;
+    servo->started = 1;
+    if (servo->begins) {
+        servo->engaged_at = servo->sequence;
+        servo->begins = 0;
+    }
+    if (state->flags & SC_STATE_TORQUE_SATURATED) {
+        servo->device_saturated++;
+    }
+}
+
+int sc_servo_is_plausible(const sc_servo_config *config, sc_servo *servo, const sc_state *state)
 {
     const sc_motion *last = &servo->motion;
     int plausible = isfinite(state->opening) && isfinite(state->advance) &&
                     fabsf(state->opening) <= WIDEST_OPENING &&
                     state->opening >= config->opening_low &&
                     state->opening <= config->opening_high;
-    if (plausible && last->started && passed_us <= SC_LONGEST_GAP_US) {
-        const float leap_s = (float)SC_LEAP_RATES * 1e-6f * (float)passed_us;
+    if (plausible && last->started) {
+        const float passed_us = (float)servo->unused_us + (float)servo->stamps.shortest_us;
+        const float leap_s = (float)SC_LEAP_RATES * 1e-6f * passed_us;
         plausible = fabsf(state->opening - last->opening) <= config->opening_rate_limit * leap_s &&
                     fabsf(state->advance - last->advance) <= config->advance_rate_limit * leap_s;
     }
-    servo->implausible_frames = plausible ? 0 : servo->implausible_frames + 1;
-    if (servo->implausible_frames >= IMPLAUSIBLE_UNTIL_STOP) {
+    if (sc_count_recent(&servo->implausible, !plausible) >= IMPLAUSIBLE_UNTIL_STOP) {
         sc_servo_stop(servo, SC_STOP_IMPLAUSIBLE);
     }
     return plausible;
 }
 
+void sc_servo_pass_unused(sc_servo *servo)
+{
+    servo->unused_us =
+        longer(servo->unused_us, servo->motion.started ? servo->stamps.shortest_us : 0);
+}
+
 void sc_servo_watch_speed(const sc_servo_config *config, sc_servo *servo)
 {
     const sc_motion *motion = &servo->motion;
-    const int fast = fabsf(motion->opening_rate) > config->opening_rate_limit ||
-                     fabsf(motion->advance_rate) > config->advance_rate_limit;
+    const sc_stamps *stamps = &servo->stamps;
+    const float faster = stamps->shortest_us > 0 /* than the rate, if less time passed */
+                             ? (float)stamps->passed_us / (float)stamps->shortest_us
+                             : 1.0f;
+    const int fast = faster * fabsf(motion->opening_rate) > config->opening_rate_limit ||
+                     faster * fabsf(motion->advance_rate) > config->advance_rate_limit;
     if (fast && servo->mode != SC_MODE_IDLE) {
         sc_servo_stop(servo, SC_STOP_OVERSPEED);
     }
@@ -186,9 +199,9 @@ static sc_watch_input watched(const sc_servo_config *config, const sc_servo *ser
         servo->aim_opening,
         servo->aim_rate,
         servo->aim_advance,
-        state->sequence,
-        state->device_us,
-        config->tick_us};
+        (float)servo->lag.late,
+        servo->stamps.ticks * config->tick_us,
+        servo->stamps.stated_us};
     return input;
 }
 
@@ -197,17 +210,20 @@ void sc_servo_watch_state(const sc_servo_config *config, sc_servo *servo, const 
 {
     const sc_watch_input input = watched(config, servo, state, time_s, usable);
     const int seen = sc_watch_take(&config->watch, &servo->watch, &input);
-    if (seen == SC_WATCH_RUNAWAY || seen == SC_WATCH_RUNAWAY_ADVANCE) {
-        sc_servo_stop(servo, SC_STOP_WATCHED + (uint32_t)seen);
-    } else if (seen != SC_WATCH_NOTHING) {
-        sc_servo_end(servo, SC_STOP_WATCHED + (uint32_t)seen);
-    }
-}
-
-void sc_servo_finish_ending(sc_servo *servo, int driven)
-{
-    const int let_go = servo->sent_torque == 0.0f && servo->sent_force == 0.0f;
-    if (servo->ending && (!driven || let_go)) {
-        sc_servo_stop(servo, servo->ending);
+    const uint32_t reason = SC_STOP_WATCHED + (uint32_t)seen;
+    switch (seen) {
+    case SC_WATCH_NOTHING:
+        break;
+    case SC_WATCH_SWING:
+    case SC_WATCH_HELD_UP:
+        sc_servo_let_swings_go(servo, reason);
+        break;
+    case SC_WATCH_HELD:
+    case SC_WATCH_DIFFERS:
+    case SC_WATCH_UNREADABLE:
+        sc_servo_let_go(servo, reason);
+        break;
+    default: /* with a motor, an encoder or a clock that is wrong torque and damping may drive */
+        sc_servo_stop(servo, reason);
     }
 }

@@ -11,24 +11,23 @@ void sc_servo_engage(sc_servo *servo, uint32_t mode);
 /* Follow the supervisor: a new order engages its mode, a new sheet moves the crack. */
 void sc_servo_obey(const sc_orders *orders, sc_servo *servo);
 
-/* Device time since the last usable state in us; a tick where its clock stands, which is counted.
- * Zero for the first. */
-uint32_t sc_servo_time_since(const sc_servo_config *config, sc_servo *servo,
-                             const sc_state *state);
+/* Take a state's time and sequence number. Stops where the two contradict each other too often, and
+ * where the sequence fell; the reference of TRACK moves by the ticks that passed, by one where they
+ * are in doubt. */
+void sc_servo_count_frame(const sc_servo_config *config, sc_servo *servo, const sc_state *state);
 
 /* Whether the place is one that the blades can have, and can have come to since the last one. */
-int sc_servo_is_plausible(const sc_servo_config *config, sc_servo *servo, const sc_state *state,
-                          uint32_t passed_us);
+int sc_servo_is_plausible(const sc_servo_config *config, sc_servo *servo, const sc_state *state);
+
+/* Let the time of a state pass whose place is not usable. */
+void sc_servo_pass_unused(sc_servo *servo);
 
 /* Stop where the blades move faster than allowed while a mode drives them. */
 void sc_servo_watch_speed(const sc_servo_config *config, sc_servo *servo);
 
-/* Have the watches take a state, after the command for it is known; what they see ends the servo. A
- * motor that turns the wrong way stops it at once. */
+/* Have the watches take a state, after the command for it is known; what they see ends the servo: at
+ * once where torque and damping may drive the blades, else gently. */
 void sc_servo_watch_state(const sc_servo_config *config, sc_servo *servo, const sc_state *state,
                           float time_s, int usable);
-
-/* Stop a servo that is ending, once nothing is left to let go of. */
-void sc_servo_finish_ending(sc_servo *servo, int driven);
 
 #endif

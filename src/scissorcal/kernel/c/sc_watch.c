@@ -1,13 +1,8 @@
 #include "sc_watch.h"
+#include "sc_stamp.h"
 
 #include <math.h>
 
-/* A limit cycle has repeated itself three times over; a jolt has not. One that grows to ten times the
- * amplitude has shown itself after two halves. */
-static const uint32_t SWINGS_UNTIL_STOP = 6;
-static const float WIDE = 4.0f;  /* times the amplitude: such a half of a swing counts as two ... */
-static const float WILD = 10.0f; /* ... and such a one as three */
-static const float NOISE_SHARE = 0.25f; /* of a swing's amplitude, within which it has no sign */
 /* An effort acts on the rate after wire, motor and filter: in less than this at delays that can be
  * controlled. Blades that speed up against it from then on are driven the wrong way. */
 static const float EFFORT_ACTS_S = 0.008f;
@@ -24,10 +19,11 @@ static const float REVERSED_ABOVE = -3.0f; /* ... and this has the wrong sign an
 static const float AT_LIMIT = 0.999f;
 static const float BRIEFLY = 0.99f;
 static const float RESTS = 0.05f; /* rad/s; motors that are off and turn give a torque */
-static const uint32_t CLOCK_US = 250000;  /* by ticks: 1 us of jitter is 4 ppm of it */
+static const int64_t CLOCK_US = 250000;  /* by ticks: 1 us of jitter is 4 ppm of it */
 static const uint32_t HOST_US = 2000000;  /* by this computer's clock: 20 ms of jitter are 1 % */
 static const uint32_t OFF_UNTIL_STOP = 3; /* windows in a row */
 static const uint32_t STATES_UNTIL_STOP = 20; /* in a row */
+static const uint32_t UNREADABLE_UNTIL_STOP = 8; /* among SC_RECENT_STATES, as for stamps */
 
 enum { LONGEST_US = 0x40000000 };
 
@@ -39,7 +35,8 @@ int sc_watch_config_is_sound(const sc_watch_config *config)
         config->rest_torque,  config->rest_share,   config->jitter_s,
         config->least_ratio,  config->most_ratio,   config->ratio_torque,     config->clock_share,
         config->host_clock_share, config->handle_radius, config->runaway_speed,
-        config->stop_margin};
+        config->stop_margin, config->swing_inertia,
+        config->swing_delay_ticks, config->held_up_ticks};
     for (unsigned i = 0; i < sizeof levels / sizeof levels[0]; i++) {
         if (!isfinite(levels[i]) || levels[i] < 0.0f) {
             return 0;
@@ -91,44 +88,21 @@ static int held(const sc_watch_config *config, sc_watch *watch, const sc_watch_i
     return over(watch, SC_WATCH_HELD, watch->held_s, config->held_s);
 }
 
-static void begin_half_swing(sc_watch *watch, int32_t sign, float torque)
-{
-    watch->swing_sign = sign;
-    watch->swing_s = 0.0f;
-    watch->swing_peak = 0.0f;
-    watch->swing_low = watch->swing_high = torque;
-}
-
-static uint32_t weight(float amplitude)
-{
-    return amplitude >= WILD ? 3 : amplitude >= WIDE ? 2 : 1;
-}
-
-/* Halves of swings in a row that are fast, wide and change the torque. The rate is taken from the
- * reference's, where there is one. */
 static int swings(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
 {
-    const float rate = in->opening_rate - (in->tracking ? in->aim_rate : 0.0f);
-    const float noise = NOISE_SHARE * config->swing_rate;
-    if (!(config->swing_rate > 0.0f && config->swing_Hz > 0.0f)) {
-        return 0;
+    const sc_swing_config level = {config->swing_rate,    config->swing_torque,
+                                   config->swing_Hz,      config->swing_inertia,
+                                   config->swing_delay_ticks, config->held_up_ticks};
+    const sc_swing_input now = {in->time_s, in->opening, in->opening_rate,
+                                in->tracking ? in->aim_rate : 0.0f, in->torque, in->late};
+    float share;
+    const int found = sc_swing_take(&level, &watch->swing, &now, &share);
+    if (found == SC_SWING_HELD_UP) {
+        keep(watch, SC_WATCH_HELD_UP, share);
+        return SC_WATCH_HELD_UP;
     }
-    if (watch->swing_sign == 0 || (float)watch->swing_sign * rate < -noise) {
-        const int counts = watch->swing_sign != 0 &&
-                           watch->swing_s * 2.0f * config->swing_Hz <= 1.0f &&
-                           watch->swing_peak >= config->swing_rate &&
-                           watch->swing_high - watch->swing_low >= config->swing_torque;
-        watch->swings = counts ? watch->swings + weight(watch->swing_peak / config->swing_rate) : 0;
-        begin_half_swing(watch, fabsf(rate) <= noise ? 0 : rate > 0.0f ? 1 : -1, in->torque);
-    }
-    watch->swing_s += in->time_s;
-    watch->swing_peak = fmaxf(watch->swing_peak, fabsf(rate));
-    watch->swing_low = fminf(watch->swing_low, in->torque);
-    watch->swing_high = fmaxf(watch->swing_high, in->torque);
-    if (watch->swing_s * 2.0f * config->swing_Hz > 1.0f) {
-        watch->swings = 0;
-    }
-    return over(watch, SC_WATCH_SWING, (float)watch->swings, (float)SWINGS_UNTIL_STOP);
+    keep(watch, SC_WATCH_SWING, share);
+    return found == SC_SWING_FED ? SC_WATCH_SWING : SC_WATCH_NOTHING;
 }
 
 /* How fast an axis is against an effort of one sign, and got since that effort could act. */
@@ -265,52 +239,39 @@ static int compare_torques(const sc_watch_config *config, sc_watch *watch, const
                                                                            : SC_WATCH_NOTHING;
 }
 
-static void begin_clock(sc_watch *watch, const sc_watch_input *in)
-{
-    watch->has_clock = 1;
-    watch->clock_sequence = in->sequence;
-    watch->clock_us = watch->host_from_us = in->device_us;
-    watch->host_us = watch->off_ticks = watch->off_host = 0;
-}
-
 /* Count the windows in a row in which a clock is off by more than allowed. */
-static int is_off(sc_watch *watch, uint32_t clock_us, uint32_t passed_us, float allowed,
+static int is_off(sc_watch *watch, int64_t clock_us, int64_t passed_us, float allowed,
                   uint32_t *windows)
 {
     if (!(allowed > 0.0f)) {
         return 0;
     }
-    const float share = fabsf((float)clock_us / (float)passed_us - 1.0f) / allowed;
+    const float share = fabsf((float)(clock_us - passed_us) / (float)passed_us) / allowed;
     *windows = share >= 1.0f ? *windows + 1 : 0;
     return over_for_long(watch, SC_WATCH_CLOCK, share, *windows >= OFF_UNTIL_STOP);
 }
 
-/* Time by the device's clock against what its sequence numbers, or this computer, say passed. A unit
- * that is wrong shows within a few states. */
+/* Time by the device's clock against what its sequence numbers, or this computer, say passed. Every
+ * stamp counts, also one that no rate is taken from. */
 static int clock_is_off(const sc_watch_config *config, sc_watch *watch, const sc_watch_input *in)
 {
-    const uint32_t ticks = in->sequence - watch->clock_sequence;
-    const uint32_t clock_us = in->device_us - watch->clock_us;
-    if (!watch->has_clock || ticks >= LONGEST_US / in->tick_us || clock_us >= LONGEST_US) {
-        begin_clock(watch, in);
-        return 0;
-    }
-    const uint32_t ticks_us = ticks * in->tick_us;
-    if (config->clock_share > 0.0f && ticks >= STATES_UNTIL_STOP &&
-        (clock_us > 2 * ticks_us || 2 * clock_us < ticks_us)) {
-        keep(watch, SC_WATCH_CLOCK, 1.0f);
-        return 1;
-    }
     int off = 0;
-    if (ticks_us >= CLOCK_US) {
-        off = is_off(watch, clock_us, ticks_us, config->clock_share, &watch->off_ticks);
-        watch->clock_sequence = in->sequence;
-        watch->clock_us = in->device_us;
+    if (!watch->has_clock) {
+        watch->has_clock = 1;
+        watch->host_us = 0;
+    }
+    watch->ticks_us += in->ticks_us;
+    watch->clock_us += in->stated_us;
+    watch->host_clock_us += in->stated_us;
+    if (watch->ticks_us >= CLOCK_US) {
+        off = is_off(watch, watch->clock_us, watch->ticks_us, config->clock_share,
+                     &watch->off_ticks);
+        watch->ticks_us = watch->clock_us = 0;
     }
     if (watch->host_us >= HOST_US) {
-        off |= is_off(watch, in->device_us - watch->host_from_us, watch->host_us,
-                      config->host_clock_share, &watch->off_host);
-        watch->host_from_us = in->device_us;
+        off |= is_off(watch, watch->host_clock_us, watch->host_us, config->host_clock_share,
+                      &watch->off_host);
+        watch->host_clock_us = 0;
         watch->host_us = 0;
     }
     return off;
@@ -320,17 +281,16 @@ static int unreadable(const sc_watch_config *config, sc_watch *watch, const sc_w
 {
     const int readable = isfinite(in->measured) &&
                          (isfinite(in->handle_force) || !(config->handle_radius > 0.0f));
-    watch->unreadable = readable ? 0 : watch->unreadable + 1;
-    return config->ratio_torque > 0.0f && over(watch, SC_WATCH_UNREADABLE, (float)watch->unreadable,
-                                               (float)STATES_UNTIL_STOP);
+    const uint32_t count = sc_count_recent(&watch->unreadable, !readable);
+    return config->ratio_torque > 0.0f &&
+           over(watch, SC_WATCH_UNREADABLE, (float)count, (float)UNREADABLE_UNTIL_STOP);
 }
 
 /* Begin again what counts over a time in which motors drive. */
 static void rest(sc_watch *watch)
 {
     watch->held_s = 0.0f;
-    watch->swing_sign = 0;
-    watch->swings = 0;
+    sc_swing_rest(&watch->swing);
     watch->torque.sign = watch->force.sign = 0;
     watch->has_still = 0;
     watch->smooth_torque = watch->smooth_measured = 0.0f;
@@ -361,8 +321,9 @@ int sc_watch_take(const sc_watch_config *config, sc_watch *watch, const sc_watch
     if (is_elsewhere(config, watch, in)) {
         return SC_WATCH_STOP;
     }
-    if (swings(config, watch, in)) {
-        return SC_WATCH_SWING;
+    const int swinging = swings(config, watch, in);
+    if (swinging != SC_WATCH_NOTHING) {
+        return swinging;
     }
     const int differing = compare_torques(config, watch, in);
     if (differing != SC_WATCH_NOTHING) {

@@ -6,6 +6,8 @@
 #ifndef SC_WATCH_H
 #define SC_WATCH_H
 
+#include "sc_swing.h"
+
 #include <stdint.h>
 
 enum {
@@ -21,14 +23,18 @@ enum {
     SC_WATCH_UNREADABLE = 8,    /* motor torque or handle force is no number */
     SC_WATCH_RUNAWAY_ADVANCE = 9,
     SC_WATCH_STOP = 10,         /* the device says that it is at a stop; the opening is elsewhere */
-    SC_WATCHES = 11
+    SC_WATCH_HELD_UP = 11,      /* as SWING, while commands came late */
+    SC_WATCHES = 12
 };
 
 typedef struct {
     float held_s;            /* at the limit so long, less the time below it since */
-    float swing_rate;        /* amplitude of a swing [rad/s] ... */
-    float swing_torque;      /* ... and the change of torque within it [N m] that count */
-    float swing_Hz;          /* slower swings are a hand's, or planned */
+    float swing_rate;        /* what swings count, and who drives them: sc_swing_config */
+    float swing_torque;
+    float swing_Hz;
+    float swing_inertia;
+    float swing_delay_ticks;
+    float held_up_ticks;
     float runaway_rate;      /* [rad/s] */
     float runaway_speed;     /* of the advance [m/s] */
     float still_rad;         /* motion of the reference while the opening stands ... */
@@ -70,9 +76,9 @@ typedef struct {
     float aim_opening;   /* of the reference, as its rate and the advance */
     float aim_rate;
     float aim_advance;
-    uint32_t sequence;
-    uint32_t device_us;
-    uint32_t tick_us;
+    float late;          /* ticks since the state that the newest command answers */
+    uint32_t ticks_us;   /* ticks since the last state, usable or not ... */
+    int32_t stated_us;   /* ... and what the device's clock says to that */
 } sc_watch_input;
 
 /* Of one axis: since when its effort has one sign, and how fast it was once that could act. */
@@ -85,11 +91,7 @@ typedef struct {
 typedef struct {
     float worst[SC_WATCHES]; /* largest value over threshold; 1 stops */
     float held_s;
-    int32_t swing_sign;
-    float swing_s;
-    float swing_peak;
-    float swing_low, swing_high; /* torque within this half of a swing */
-    uint32_t swings;
+    sc_swing swing;
     sc_watch_effort torque, force;
     uint32_t elsewhere;     /* states in a row at a stop that is none */
     int32_t has_still;
@@ -103,13 +105,13 @@ typedef struct {
     float sum_cc, sum_cm;   /* of smooth torques, forgetting */
     float differs_s;
     int32_t has_clock;
-    uint32_t clock_sequence;
-    uint32_t clock_us;
+    int64_t ticks_us;       /* of the window by ticks ... */
+    int64_t clock_us;       /* ... and the device's clock over it */
     uint32_t off_ticks;     /* windows in a row in which the clock was off its ticks */
-    uint32_t host_from_us;
-    uint32_t host_us;       /* this computer's time since */
+    int64_t host_clock_us;  /* the device's clock over the window by this computer's ... */
+    uint32_t host_us;       /* ... time */
     uint32_t off_host;      /* windows in a row in which it was off this computer's */
-    uint32_t unreadable;    /* states in a row */
+    uint32_t unreadable;    /* history of states: sc_count_recent */
 } sc_watch;
 
 /* 1 if every threshold is a finite number >= 0. */

@@ -82,6 +82,7 @@ def scene_sentence(found: SceneTorque) -> str:
             f"The band does not include what was not measured, as shares of the mean torque: "
             f"{named}. The verdicts say what to measure."
         )
+    said += found.beyond_data
     return " ".join(said)
 
 

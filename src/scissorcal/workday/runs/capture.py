@@ -14,6 +14,7 @@ from scissorcal.recipe.show import with_designed_captures
 from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.runs.design import designed_for
 from scissorcal.workday.runs.probe import Say, ensure_probed, last_probe
+from scissorcal.workday.runs.sweep_speeds import sliding_below_encoder, with_usable_sweeps
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from scissorcal.device.drive import CaptureProgress
     from scissorcal.device.link import Link
     from scissorcal.device.loading import Confirm
-    from scissorcal.kernel import Identity
     from scissorcal.recipe.schema import Recipe
     from scissorcal.recording import Recording
     from scissorcal.recording.probe import ProbeResult
@@ -142,9 +142,13 @@ def capture_into(
             recipe = parse_recipe(text, str(workspace.recipe_path))
             if say is not None:
                 say(sentence)
-        too_slow = speeds_below_encoder(recipe, link.identity) if kind == "friction" else ""
-        if too_slow and say is not None:
-            say(too_slow)
+        if kind == "friction":
+            usable, too_slow = with_usable_sweeps(recipe, link.identity, probe)
+            if too_slow:
+                text = with_designed_captures(usable, text)
+                recipe = parse_recipe(text, str(workspace.recipe_path))
+                if say is not None:
+                    say(too_slow)
         path = workspace.new_recording(kind)
         with open_writer(path, kind, link, recipe, text, hand=hand, probe=probe) as writer:
             if kind == "friction":
@@ -305,44 +309,3 @@ class _Once:
     def __call__(self, request: str) -> None:
         self._confirm(f"{request} {THEN}")
         self.asked = True
-
-
-def speeds_below_encoder(recipe: "Recipe", identity: "Identity") -> str:
-    """Which planned speeds of friction a fit will not use, as a sentence; empty where it uses all.
-
-    Below the rate's floor, which the encoder's step and the fit's cutoff give, the sign of the
-    rate is noise.
-    """
-    floor = _rate_floor(identity.opening_resolution, recipe.fit.friction.cutoff_Hz, identity)
-    slow = [speed for speed in recipe.capture.friction.speeds_rad_per_s if speed <= floor]
-    if not slow:
-        return ""
-    listed = ", ".join(f"{speed:g}" for speed in slow)
-    return (
-        f"Sweeps at {listed} rad/s will not be used: an encoder with a step of "
-        f"{identity.opening_resolution:.2g} rad tells the sense of motion from {floor:.2g} rad/s "
-        "on. Leave them out of capture.friction.speeds_rad_per_s, or lower fit.friction.cutoff_Hz."
-    )
-
-
-def sliding_below_encoder(recipe: "Recipe", identity: "Identity") -> str:
-    """As `speeds_below_encoder`, of the sledge."""
-    cutoff_Hz = recipe.fit.friction_advance.cutoff_Hz
-    floor = _rate_floor(identity.advance_resolution, cutoff_Hz, identity)
-    planned = recipe.capture.friction_advance.speeds_mm_per_s
-    slow = ", ".join(f"{speed:g}" for speed in planned if speed <= 1e3 * floor)
-    if not slow:
-        return ""
-    return (
-        f"Sweeps at {slow} mm/s will not be used: an encoder with a step of "
-        f"{1e6 * identity.advance_resolution:.2g} um tells the sense of motion from "
-        f"{1e3 * floor:.2g} mm/s on. Leave them out of capture.friction_advance.speeds_mm_per_s, "
-        "or lower fit.friction_advance.cutoff_Hz."
-    )
-
-
-def _rate_floor(resolution: float, cutoff_Hz: float, identity: "Identity") -> float:
-    from scissorcal.calibration.signals.filtering import rate_floor_of_step
-    from scissorcal.calibration.signals.weak_form import RATE_BAND
-
-    return rate_floor_of_step(resolution, RATE_BAND * cutoff_Hz, 1e6 / identity.tick_us)

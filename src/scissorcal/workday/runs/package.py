@@ -1,5 +1,6 @@
 """Build a workspace's model package from its fits, only where something changed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from scissorcal.workday.steps import BY_NAME
 
 if TYPE_CHECKING:
     from scissorcal.package import Manifest
+    from scissorcal.package.manifest import RigRecord
     from scissorcal.package.simplest.choice import SceneChoice
 
 
@@ -81,6 +83,7 @@ def build_workspace_package(
         review=review,
         plate=fits["plate"],
         drawn=plate_pieces(engine.recipe, engine.workspace.root),
+        rig=recorded_rig(engine.workspace.captures_dir, fits),
         inputs_hash=engine.identity("package build"),
         allow_failed=allow_failed,
     )
@@ -104,6 +107,30 @@ def _fits(engine: Engine) -> dict[str, Any]:
             fit = replace(fit, verdicts=(*fit.verdicts, *check.rejected))
         found[step.what] = fit
     return found
+
+
+def recorded_rig(captures: Path, fits: Mapping[str, Any]) -> "RigRecord | None":
+    """The rig of the recordings: of friction, which is the rig's own, else of the cut.
+
+    None where no recording is there that states one.
+    """
+    from scissorcal.device.rig_record import identity_of
+    from scissorcal.package.manifest import RigRecord
+    from scissorcal.recording.header import read_header
+
+    sources = [name for what in ("friction", "cut") if fits[what] for name in fits[what].sources]
+    for source in sources:
+        path = captures / Path(source.rpartition(" sha256:")[0]).name
+        device = read_header(path).device if path.is_file() else {}
+        if "schema_hash" in device:
+            stated = identity_of(device, path.name)
+            return RigRecord(
+                name=stated.name,
+                serial=stated.serial,
+                torque_limit_Nm=stated.torque_limit,
+                force_limit_N=stated.force_limit,
+            )
+    return None
 
 
 def _refuse_failed(engine: Engine) -> None:

@@ -87,20 +87,32 @@ def ensure_probed(
     """The workspace's probe of this rig, or a new one where there is none that still counts.
 
     One counts if it is of exactly this rig (all that it states) and this ``rig.motor_sign``, found
-    nothing wrong, and is not older than ``rig.probe.max_age_h``. ``say`` tells which it was.
+    nothing wrong, and is not older than ``rig.probe.max_age_h``. ``say`` tells which it was. Raises
+    DeviceError, besides what the probe raises, where blades of its inertia would get too fast
+    without commands (`refuse_unanswered`).
     """
     tell = say or (lambda sentence: None)
     last = _kept(workspace)
     why = _why_again(last, link, recipe, now or datetime.now(UTC))
     if not isinstance(last, str) and not why:
         tell(f"The rig was probed at {last.made_at} ('scissorcal device probe' repeats it).")
+        _refuse_unanswered(last, link, recipe, tell)
         return last
     tell(f"Probing the rig first, with up to {_most(recipe)} at the blades: {why}.")
     result = probe_into(workspace, link, recipe, progress=progress, confirm=confirm)
     for verdict in result.verdicts:
         if verdict.status == "not_evaluated" and verdict.value is not None:
             tell(verdict.why)
+    _refuse_unanswered(result, link, recipe, tell)
     return result
+
+
+def _refuse_unanswered(result: "ProbeResult", link: "Link", recipe: "Recipe", tell: Say) -> None:
+    from scissorcal.device.unanswered import refuse_unanswered
+
+    said = refuse_unanswered(recipe, link.identity, result.inertia_kg_m2)
+    if said:
+        tell(said)
 
 
 def last_probe(workspace: Workspace, link: "Link | None" = None) -> "ProbeResult | None":

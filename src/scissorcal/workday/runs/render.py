@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.errors import InputError, ScissorcalError, VerdictError
+from scissorcal.errors import InputError, MissingError, ScissorcalError, VerdictError
 from scissorcal.files import replacing
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from scissorcal.device.loading import Confirm
     from scissorcal.package import ModelPackage
     from scissorcal.recipe.plate_tracking import PlateTracking
+    from scissorcal.recipe.schema import Recipe
     from scissorcal.render import PoseSource, RenderResult, RigFacts, VirtualStrokes
     from scissorcal.render.watch import Progress
     from scissorcal.workday.tracking.plate_camera import PlateCamera, TrackedRun
@@ -57,6 +58,8 @@ def render_workspace(
     plate: "PoseSource | None" = None,
     camera: str = NONE,
     taps_s: float = 0.0,
+    accept_derated: bool = False,
+    allow_mismatch: bool = False,
 ) -> Rendered:
     """Render the workspace's package (or another) on ``device``, within the recipe's limits.
 
@@ -66,16 +69,26 @@ def render_workspace(
     probed first (`ensure_probed`), and ``say`` tells so. ``plate`` tracks a plate whose pose the
     scene estimates, or ``camera`` does (a camera's number, or "sim" with the device "sim"); without
     them the pose fitted to photographs is taken. Before the rendering a person taps the tracked
-    plate with the blade's tip for ``taps_s``, motors off. Raises MissingError where there is no
-    package or no pose, InputError where a camera is named for a known pose or does not go with the
-    device, and what opening them and the rendering raise.
+    plate with the blade's tip for ``taps_s``, motors off. ``accept_derated``: a person wants what
+    is felt to differ by more than the scene's tolerance, see `scissorcal.render.render`.
+
+    Raises MissingError where there is no package or no pose, or where the package is stale,
+    InputError where it is of another rig, both unless ``allow_mismatch``, InputError where a camera
+    is named for a known pose or does not go with the device, and what opening them and the
+    rendering raise.
     """
     from scissorcal.package import open_package
     from scissorcal.render import open_writer, render
+    from scissorcal.render.mismatch import refuse_other_rig
     from scissorcal.render.rig_facts import with_probe
 
     recipe = workspace.recipe()
     package = open_package(package_path or workspace.package_path(recipe), warn=False)
+    stale = "" if package_path else _stale(Engine.of(workspace))
+    if not allow_mismatch:
+        if stale:
+            raise MissingError(f"{stale} To render it all the same: --allow-mismatch.")
+        _refuse_other_blades(recipe, package)
     eye = _camera(workspace, package, camera, device, taps_s, seed=seed, realtime=realtime)
     line = line_of(recipe, baud)
     with ExitStack() as stack:
@@ -86,6 +99,8 @@ def render_workspace(
         )
         link = stack.enter_context(opened)
         rig = f"{link.identity.name} {link.identity.serial}"
+        if not allow_mismatch:
+            refuse_other_rig(package, link.identity)
         probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
         path = workspace.new_recording("render") if record else None
         text = read_text(workspace.recipe_path)
@@ -96,6 +111,8 @@ def render_workspace(
             else nullcontext()
         )
         with recording as writer, ExitStack() as seeing:
+            if stale and writer:
+                writer.note(stale)
             if eye:
                 plate = seeing.enter_context(eye.follow(link, writer, taps_s=taps_s, say=say))
             done = render(
@@ -110,10 +127,33 @@ def render_workspace(
                 confirm=confirm,
                 rig=with_probe(_known_rig(workspace, package), probe),
                 plate=plate,
+                accept_derated=accept_derated,
+                allow_mismatch=allow_mismatch,
             )
     if package_path is None:
         _write_admission(workspace.package_path(recipe), done, rig)
     return Rendered(done, path, rig, eye.tracked() if eye else None)
+
+
+def _stale(engine: Engine) -> str:
+    """A sentence where the workspace's own package is not of its fits and recipe, else empty."""
+    state = engine.state("package build")
+    if state.state != "stale":
+        return ""
+    return f"The package is stale: {state.found}. Run '{state.command}'."
+
+
+def _refuse_other_blades(recipe: "Recipe", package: "ModelPackage") -> None:
+    """Raise InputError where recipe and package are of rigs whose joints or blades differ."""
+    stated = json.loads(package.manifest.provenance.recipe)["rig"]
+    for key, now in (("joint", recipe.rig.joint), ("moving", recipe.rig.moving)):
+        was = stated.get(key, now)
+        if was != now:
+            raise InputError(
+                f"The package {package.manifest.name} is of another rig: its recipe has rig.{key} "
+                f'= "{was}", and this workspace\'s has "{now}". Take the workspace of that rig, or '
+                "render it all the same with --allow-mismatch."
+            )
 
 
 def _camera(
@@ -190,6 +230,7 @@ def _write_admission(package_path: Path, done: "RenderResult", rig: str) -> None
         "rig": rig,
         "derated": done.admission.derated,
         "factor": done.admission.factor,
+        "accepted_derated": done.accepted_derated,
         **plain,
     }
     with replacing(package_path.with_suffix(".admission.json")) as part:
@@ -222,10 +263,8 @@ def package_warnings(workspace: Workspace, package_path: Path | None = None) -> 
         return ()
     if package_path is not None:
         return package.warnings
-    state = engine.state("package build")
-    said = []
-    if state.state == "stale":
-        said.append(f"The package is stale: {state.found}. Run '{state.command}'.")
+    stale = _stale(engine)
+    said = [stale] if stale else []
     said += [
         f"The {name.replace('fit', 'fit of')} is unverified: no trust check says whether its "
         f"intervals hold ('{engine.state(name).command}')."

@@ -34,6 +34,10 @@ tenth of the slowest stroke's rate. Slower than four steps in 20 ms they may
 move back at 30 Hz by less than a step, which is unresolved."""
 RATE_WEIGHTS = np.array([-1.0, 8.0, 0.0, -8.0, 1.0]) / 12.0
 """Of five neighbouring positions, the last one first: exact for a polynomial of fourth degree."""
+BRIDGED_S = 0.003
+"""Invalid samples between usable ones no farther apart than this are replaced by the line between
+those: a torque that swings at 45 Hz, the fastest that a capture's control makes, leaves that line
+by at most (pi 45 Hz 3 ms)^2 / 2 = 9 % of its amplitude, on a few samples of a segment."""
 HELD = 0.5
 """Share of a tick by which a torque that follows its command is measured late, less the delay."""
 
@@ -46,10 +50,10 @@ class PathMotion:
     (N m) is the mean drive from each sample to the next, had it been measured without delay;
     ``drive_step`` its change over that tick, by which a delay of one tick would lower it.
     ``torque`` (N m) is what the drive and the acceleration leave unexplained at each sample, from
-    unsmoothed positions: rough, but with nothing filtered out. ``usable`` is false where a sensor
-    invalid a sample, ``standing`` true where the blades do not turn. ``rate_sd`` is the error of
-    the rate, ``resolution`` the encoder's step, ``advance_sd`` (m) the error of a place along the
-    cut.
+    unsmoothed positions: rough, but with nothing filtered out. ``usable`` is false where a sensor's
+    sample is invalid for longer than BRIDGED_S, ``standing`` true where the blades do not turn.
+    ``rate_sd`` is the error of the rate, ``resolution`` the encoder's step, ``advance_sd`` (m) the
+    error of a place along the cut.
     """
 
     recording: int
@@ -108,6 +112,7 @@ def _piece(
     tick_s = float((time[-1] - time[0]) / (len(time) - 1))
     position = np.asarray(samples["opening"], dtype=np.float64)
     measured = np.asarray(recording.drive_effort[part], dtype=np.float64)
+    measured, good = _bridged(measured, usable[part], round(BRIDGED_S / tick_s))
     step = np.append(np.diff(measured), 0.0)
     drive = measured + HELD * step
     seen = resolution_of(position)
@@ -131,7 +136,7 @@ def _piece(
         torque=rough,
         stroke=np.where(stroke >= 0, stroke + stroke_offset, -1),
         sheet=sheets[part],
-        usable=usable[part],
+        usable=good,
         standing=_standing(smooth, tick_s, resolution),
         tick_s=tick_s,
         inertia=inertia,
@@ -139,6 +144,19 @@ def _piece(
         resolution=resolution,
         advance_sd=_place_sd(np.asarray(samples["advance"], dtype=np.float64)),
     )
+
+
+def _bridged(measured: Array, usable: Mask, most_ticks: int) -> tuple[Array, Mask]:
+    """Values (n,) with brief invalid stretches replaced, and which of them can be used then."""
+    good = np.flatnonzero(usable)
+    if len(good) < 2:
+        return measured, usable
+    apart = np.diff(good)
+    whole, at = usable.copy(), np.searchsorted(good, np.arange(len(usable)), side="right") - 1
+    inside = (at >= 0) & (at < len(apart))
+    whole[inside] |= apart[at[inside]] <= most_ticks
+    line = np.interp(np.arange(len(usable)), good, measured[good])
+    return np.where(whole & ~usable, line, measured), whole
 
 
 def _rate(opening: Array, tick_s: float) -> Array:
