@@ -243,10 +243,13 @@ class _Problem:
         self._rests[0] = _rest_of(pushes[0])
         turn = float(np.mean(self._places))
         self._turn = turn
-        self._pushes, self._noise, self._plain_sd = pushes, noise_rad, None
+        self._pushes, self._noise = pushes, noise_rad
+        self._plain_sd: Array | None = None
         self._sd = np.concatenate([_errors_of(push, noise_rad) for push in pushes])
         self._known = noise_rad / self._sd
-        self._effects, self._shrunk, self._evidence = np.zeros((len(self._sd), 2)), None, 0.0
+        self._effects = np.zeros((len(self._sd), 2))
+        self._shrunk: Array | None = None
+        self._evidence = 0.0
         self._mean, self._prior_sd = _prior_of(prior)
 
     def rescale(self, x: Array) -> bool:
@@ -416,7 +419,8 @@ def _errors_of(push: Push, noise_rad: float, share: float = 1.0) -> Array:
     changed = np.flatnonzero(np.diff(push.places, prepend=math.nan) != 0.0)
     lasting = np.diff(changed, append=len(push.places))
     repeated = np.repeat(lasting, lasting)
-    return np.hypot(noise_rad * np.sqrt(repeated), share * (WAY_SHARE * push.way + SHAPE_RAD))
+    law = share * (WAY_SHARE * push.way + SHAPE_RAD)
+    return np.asarray(np.hypot(noise_rad * np.sqrt(repeated), law), dtype=np.float64)
 
 
 def _thinned(push: Push) -> Push:

@@ -57,6 +57,9 @@ deviations of the difference of two readings then are half of the bound."""
 FLAG_TO_DELAY_TICKS, DELAY_SD_TICKS = 0.25, 0.6
 """A flag shows at the end of the tick in which a torque began; where in the tick it was measured
 and began is the device's affair."""
+TOLD_SD = 0.25
+"""Of the logarithms of the Stribeck level and rate: beyond 50 % at 90 % they are the prior's, and a
+capture judges slow sweeps by a bound instead."""
 GAIN_HOLD_S, HELD_SHARE, HELD_PAIRS = 0.1, 0.6, 1
 """How long an effort is held for its gain, and its share of the one that moved the blades."""
 SLEDGE_FORCE_SHARE = 0.2
@@ -273,7 +276,10 @@ def _push(
     sensed = sense(talk, axis, found)
     finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand=hand))
     held = [
-        push(talk, axis, sign * HELD_SHARE * found.effort, GAIN_HOLD_S, hold=found.hold)
+        push(talk, axis, sign * HELD_SHARE * found.effort, TOLD_SD = 0.25
+"""Of the logarithms of the Stribeck level and rate: beyond 50 % at 90 % they are the prior's, and a
+capture judges slow sweeps by a bound instead."""
+GAIN_HOLD_S, hold=found.hold)
         for sign in (1, -1) * HELD_PAIRS
     ]
     tell(0.5, "swings, planned by what the last ones taught")
@@ -308,16 +314,17 @@ def _of_swings(swung: Swung) -> dict[str, object]:
     """Estimates and facts of the joint."""
     fit = swung.fit
     joint = fit.joint
+    fall = {"stribeck_Nm": joint.rise, "stribeck_rate_rad_per_s": joint.rise_rate}
+    told = max(fit.sd("log_rise_share"), fit.sd("log_rise_rate")) <= TOLD_SD
     return {
         "inertia_kg_m2": fit.inertia,
         "coulomb_Nm": fit.coulomb,
         "viscous_Nm_s_per_rad": fit.viscous,
         "delay_s": fit.delay,
         "facts": {
+            **(fall if told else {}),
             "coulomb_opening_Nm": joint.opening,
             "coulomb_closing_Nm": joint.closing,
-            "stribeck_Nm": joint.rise,
-            "stribeck_rate_rad_per_s": joint.rise_rate,
             "presliding_rad": joint.fine,
             "carrying_Nm": joint.carrying,
             "log_inertia_sd": fit.sd("log_inertia"),

@@ -116,7 +116,8 @@ def sense(talk: Talk, axis: Axis, found: Search) -> Sense:
     assert found.pulled is not None
     seconds = max(found.pushed.seconds, found.pulled.seconds)
     hold, effort = found.hold, found.effort
-    votes, factor, pushes = 0, PAIRS[0], []
+    votes, factor = 0, PAIRS[0]
+    pushes: list[Pushed] = []
     for wanted in PAIRS:
         if not pushes or max(one.rate for one in pushes[-2:]) < CALM * axis.rate:
             factor = wanted
