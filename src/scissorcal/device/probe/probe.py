@@ -276,10 +276,7 @@ def _push(
     sensed = sense(talk, axis, found)
     finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand=hand))
     held = [
-        push(talk, axis, sign * HELD_SHARE * found.effort, TOLD_SD = 0.25
-"""Of the logarithms of the Stribeck level and rate: beyond 50 % at 90 % they are the prior's, and a
-capture judges slow sweeps by a bound instead."""
-GAIN_HOLD_S, hold=found.hold)
+        push(talk, axis, sign * HELD_SHARE * found.effort, GAIN_HOLD_S, hold=found.hold)
         for sign in (1, -1) * HELD_PAIRS
     ]
     tell(0.5, "swings, planned by what the last ones taught")
