@@ -136,3 +136,10 @@ WRONG = {
 def wrong(kind: str, seed: int) -> RigParameters:
     """A healthy rig with one thing wrong."""
     return replace(healthy(seed), **WRONG[kind])  # type: ignore[arg-type]
+
+
+def falls(rig: RigParameters) -> bool:
+    """Whether gravity is more than the friction that holds the blades somewhere on their way."""
+    places = np.linspace(rig.low, rig.high, 50)
+    carried = np.abs(rig.gravity * np.cos(places - rig.gravity_phase)).max()
+    return bool(carried > min(rig.coulomb_opening, rig.coulomb_closing))

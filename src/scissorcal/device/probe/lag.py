@@ -15,7 +15,9 @@ LONGEST_TICKS_S = 0.1
 PAUSES = (7, 11, 5, 13, 9, 6)
 """Ticks between toggles: of different lengths, so that nothing periodic in the host aligns."""
 WITHHELD_TICKS = 3
-"""After the longest lag of the toggles: a single command has shown by then, or never will."""
+"""After the longest lag: how long commands are withheld before the device may brake."""
+NEVER_S = 0.05
+"""A command that has not shown by then will not: a busy computer is away for 20 ms now and then."""
 LAG_LIMIT_MS = 25.0
 """A loop that is so late holds a bandwidth of pi / 4 / 25 ms = 31 rad/s at a phase margin of 45
 degrees: blades then stay behind by 30 mrad at 1 rad/s, and no sweep is steady."""
@@ -112,27 +114,31 @@ def _toggled(talk: Talk) -> Stage[list[int]]:
 
 
 def _singles(talk: Talk, longest: int) -> Stage[tuple[int, int]]:
-    """ENABLE once, and nothing for some ticks: it shows if and only if that command arrived."""
+    """ENABLE once, and nothing until it shows: it does if and only if that command arrived."""
+    on = StateFlag.MOTOR_ENABLED | StateFlag.FAULT_LATCHED
     state = yield RELEASE
     asked = lost = 0
     for _ in range(ASKED):
-        cleared = talk.sequence
-        while state.flags & (StateFlag.MOTOR_ENABLED | StateFlag.FAULT_LATCHED) or (
-            talk.sequence - cleared <= longest + 1
-        ):
-            if talk.sequence - cleared > talk.ticks(LONGEST_TICKS_S) + 2 * longest:
+        since = talk.sequence
+        while state.flags & on or talk.sequence - since <= longest + 1:
+            if talk.sequence - since > talk.ticks(LONGEST_TICKS_S) + 2 * longest:
                 return asked, lost
-            off = not state.flags & (StateFlag.MOTOR_ENABLED | StateFlag.FAULT_LATCHED)
             faulty = bool(state.flags & StateFlag.FAULT_LATCHED)
-            state = yield None if off else RELEASE._replace(clear=faulty)
+            state = yield RELEASE._replace(clear=faulty) if state.flags & on else None
         begin, since = talk.mark(), talk.sequence
         state = yield Answer()
-        while talk.sequence - since < longest + WITHHELD_TICKS:
+        while not _shown(talk, begin) and talk.sequence - since < longest + talk.ticks(NEVER_S):
             state = yield None
         asked += 1
-        lost += _first(talk, begin, on=True) is None
+        lost += not _shown(talk, begin)
         state = yield RELEASE
     return asked, lost
+
+
+def _shown(talk: Talk, begin: int) -> bool:
+    """Whether ENABLE has arrived: the motors are on, or braked already for want of another."""
+    heard = talk.heard(begin)["flags"]
+    return bool(np.any(heard & int(StateFlag.MOTOR_ENABLED | StateFlag.FAULT_LATCHED)))
 
 
 def _first(talk: Talk, begin: int, *, on: bool) -> int | None:

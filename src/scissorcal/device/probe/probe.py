@@ -103,6 +103,7 @@ def probe(
     *,
     progress: Progress | None = None,
     confirm: Confirm | None = None,
+    then: str = "",
     now: datetime | None = None,
 ) -> ProbeResult:
     """Check a rig before its motors run: sensors, clock, line, watchdog, signs, gains, mechanics.
@@ -111,8 +112,9 @@ def probe(
     encoder show without torque. Then pushes of torque grow until the blades move each way, pairs of
     pushes tell which way, and swings are planned until a model of inertia, friction, load and delay
     is known. Torque, rate and the angle of each push stay within ``rig.probe``. ``confirm`` asks
-    the person; a simulator moves and clears the blades itself. Where nobody follows the requests,
-    pushes stay so small that light blades behind a stuck encoder keep within the bound of the rate.
+    the person, and tells what comes ``then``; a simulator moves and clears the blades itself. Where
+    nobody follows the requests, pushes stay so small that light blades behind a stuck encoder keep
+    within the bound of the rate.
 
     Raises ProbeRefusedError (a DeviceError) at the first stage that finds something wrong or cannot
     determine it, with the cause or what to do, before the next one moves anything; InputError where
@@ -131,21 +133,19 @@ def probe(
         ProbeResult(rig_name(identity), identity_digest(identity), made, recipe.rig.motor_sign)
     )
     with Talk(link, bounds_of(recipe, identity), recipe.rig.motor_sign) as talk:
+        tell(0.0, "the blades by hand, motors off")
         try:
-            _stages(talk, finding, recipe, confirm, tell)
+            hand = _by_hand(talk, finding, recipe, confirm, then)
+            _stages(talk, finding, recipe, hand, tell)
         except RunawayError as error:
             raise ProbeRefusedError(str(error), finding.result) from error
     tell(1.0, "done")
     return finding.result
 
 
-def _stages(
-    talk: Talk, finding: _Finding, recipe: Recipe, confirm: Confirm | None, tell: Progress
-) -> None:
-    """Everything from the pass by hand to the last motion; ends at the first that stops it."""
+def _stages(talk: Talk, finding: _Finding, recipe: Recipe, hand: bool, tell: Progress) -> None:
+    """Everything after the pass by hand to the last motion; ends at the first that stops it."""
     identity = talk.identity
-    tell(0.0, "the blades by hand, motors off")
-    hand = _by_hand(talk, finding, recipe, confirm)
     tell(0.1, "listening with the motors off")
     quiet = idle(talk)
     finding.add(
@@ -226,7 +226,9 @@ def _pushes_sledge(identity: Identity) -> bool:
     return bool(identity.capabilities & Capability.ADVANCE_MOTOR) and identity.force_limit > 0.0
 
 
-def _by_hand(talk: Talk, finding: _Finding, recipe: Recipe, confirm: Confirm | None) -> bool:
+def _by_hand(
+    talk: Talk, finding: _Finding, recipe: Recipe, confirm: Confirm | None, then: str
+) -> bool:
     """The pass by hand and its verdicts; whether the encoder was seen to move."""
     identity = talk.identity
     if is_simulator(identity):
@@ -235,7 +237,7 @@ def _by_hand(talk: Talk, finding: _Finding, recipe: Recipe, confirm: Confirm | N
     assert confirm is not None
     passed = hand_pass(talk, confirm)
     finding.add(judge_hand_pass(passed, identity), facts=_of_hand(passed, identity))
-    fell = let_go(talk, confirm, request_of(recipe, identity))
+    fell = let_go(talk, confirm, f"{request_of(recipe, identity)} {then}".strip())
     if fell is not None and passed.alive:
         finding.take(Outcome((fell,), fell.why))
     return passed.alive

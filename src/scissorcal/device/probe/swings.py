@@ -1,9 +1,11 @@
 """Planned swings: each is aimed by what the last ones taught, until the inertia is known."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scissorcal.device.probe.joint_fit import (
     NAMES,
@@ -17,6 +19,8 @@ from scissorcal.device.probe.joint_fit import (
 from scissorcal.device.probe.pushes import MOVED_STEPS, Axis, Pushed, push
 from scissorcal.device.probe.talk import Talk
 from scissorcal.kernel import CommandFlag
+
+Array = NDArray[np.float64]
 
 AIM_RAD, AIM_STEPS = 20e-3, 15.0
 """A swing shall go so far: beyond what most joints yield, and 15 steps are known to 2 %."""
@@ -56,7 +60,7 @@ def swings(
     pushes = list(before)
     least = TELLING * prior.breakaway_Nm
     strongest = max(abs(one.effort) for one in pushes)
-    fit = fit_joint(pushes_of(talk, pushes, least), prior, noise_rad)
+    fit = _fitted(talk, pushes, least, prior, noise_rad)
     for _ in range(MOST_PAIRS):
         if known(fit, strongest):
             break
@@ -66,10 +70,23 @@ def swings(
             pushes.append(one)
             if not one.disturbed:
                 strongest = max(strongest, abs(effort))
-        fit = fit_joint(pushes_of(talk, pushes, least), prior, noise_rad, starts=[fit.values])
+        fit = _fitted(talk, pushes, least, prior, noise_rad, [fit.values])
     starts = [fit.values, *perturbed(fit.values)]
-    fit = fit_joint(pushes_of(talk, pushes, least), prior, noise_rad, starts=starts)
+    fit = _fitted(talk, pushes, least, prior, noise_rad, starts)
     return Swung(tuple(pushes), fit, strongest)
+
+
+def _fitted(
+    talk: Talk,
+    pushes: list[Pushed],
+    least: float,
+    prior: Prior,
+    noise_rad: float,
+    starts: Sequence[Array] = (),
+) -> JointFit:
+    """Fit with motors and stream off: a device ends a stream after 5 s without a frame."""
+    with talk.paused():
+        return fit_joint(pushes_of(talk, pushes, least), prior, noise_rad, starts=starts)
 
 
 def known(fit: JointFit, strongest: float) -> bool:

@@ -122,7 +122,7 @@ def capture_into(
             probe = last_probe(workspace, link)
         else:
             once = _Once(confirm) if confirm else None
-            probe = ensure_probed(workspace, link, recipe, confirm=once, say=say)
+            probe = ensure_probed(workspace, link, recipe, confirm=once, then=THEN, say=say)
             cleared = once is not None and once.asked
         if until is not None and earlier is not None:
             return _capture_until(
@@ -189,7 +189,7 @@ def capture_advance_into(
         refuse_without_motor(link.identity)
         advance_plan(recipe, link.identity)
         once = _Once(confirm) if confirm else None
-        probe = ensure_probed(workspace, link, recipe, confirm=once, say=say)
+        probe = ensure_probed(workspace, link, recipe, confirm=once, then=THEN, say=say)
         too_slow = sliding_below_encoder(recipe, link.identity)
         if too_slow and say is not None:
             say(too_slow)
@@ -307,5 +307,5 @@ class _Once:
         self.asked = False
 
     def __call__(self, request: str) -> None:
-        self._confirm(f"{request} {THEN}")
+        self._confirm(request)
         self.asked = True

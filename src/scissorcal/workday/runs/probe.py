@@ -60,12 +60,13 @@ def probe_into(
     *,
     progress: Progress | None = None,
     confirm: "Confirm | None" = None,
+    then: str = "",
 ) -> "ProbeResult":
     """Probe the rig on a link, and keep what was found; as `probe_device`."""
     from scissorcal.device.probe.probe import ProbeRefusedError, probe
 
     try:
-        result = probe(link, recipe, progress=progress, confirm=confirm)
+        result = probe(link, recipe, progress=progress, confirm=confirm, then=then)
     except ProbeRefusedError as error:
         _store(workspace, error.result)
         error.kept = (workspace.probe_path,)
@@ -81,13 +82,15 @@ def ensure_probed(
     *,
     progress: Progress | None = None,
     confirm: "Confirm | None" = None,
+    then: str = "",
     say: Say | None = None,
     now: datetime | None = None,
 ) -> "ProbeResult":
     """The workspace's probe of this rig, or a new one where there is none that still counts.
 
     One counts if it is of exactly this rig (all that it states) and this ``rig.motor_sign``, found
-    nothing wrong, and is not older than ``rig.probe.max_age_h``. ``say`` tells which it was. Raises
+    nothing wrong, and is not older than ``rig.probe.max_age_h``. ``say`` tells which it was; a
+    person is told what comes ``then``. Raises
     DeviceError, besides what the probe raises, where blades of its inertia would get too fast
     without commands (`refuse_unanswered`).
     """
@@ -99,7 +102,7 @@ def ensure_probed(
         _refuse_unanswered(last, link, recipe, tell)
         return last
     tell(f"Probing the rig first, with up to {_most(recipe)} at the blades: {why}.")
-    result = probe_into(workspace, link, recipe, progress=progress, confirm=confirm)
+    result = probe_into(workspace, link, recipe, progress=progress, confirm=confirm, then=then)
     for verdict in result.verdicts:
         if verdict.status == "not_evaluated" and verdict.value is not None:
             tell(verdict.why)
@@ -182,6 +185,8 @@ def _outdated(last: "ProbeResult", recipe: "Recipe", now: datetime) -> str:
             return f"the recipe's {name} changed since (from {was:g} to {stated:g})"
     if failed(last.verdicts):
         return "the last probe refused it"
+    if last.inertia_kg_m2 is None:
+        return "the last probe did not determine how it moves"
     age_h = (now - datetime.fromisoformat(last.made_at)) / timedelta(hours=1)
     if age_h < 0.0:
         return f"the last probe is dated {last.made_at}, after this computer's clock"
