@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from scissorcal.device.probe.idle import CLEARINGS
 from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
 from scissorcal.errors import DeviceError
@@ -64,15 +66,17 @@ def _silenced(talk: Talk, longest_s: float) -> Stage[tuple[float | None, bool, b
         state = yield Answer(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
         if not state.flags & StateFlag.FAULT_LATCHED and state.flags & StateFlag.MOTOR_ENABLED:
             break
-    last = state.sequence
-    for _ in range(talk.ticks(longest_s)):
+    last, begin = talk.sequence, talk.mark()
+    while talk.sequence - last < talk.ticks(longest_s):
         state = yield None
-        if state.flags & (StateFlag.FAULT_LATCHED | StateFlag.COMMANDS_LOST):
-            silent = ((state.sequence - last) % 2**32) * talk.tick_s
+        braked = StateFlag.FAULT_LATCHED | StateFlag.COMMANDS_LOST
+        if state.flags & braked:
+            heard = talk.heard(begin)  # of several states at once the first tells when
+            first = int(np.argmax((heard["flags"] & int(braked)) != 0))
+            silent = (int(heard["sequence"][first]) - last) * talk.tick_s
             state = yield None
-            flags = state.flags
-            shown = bool(flags & StateFlag.COMMANDS_LOST)
-            return 1e3 * silent, bool(flags & StateFlag.FAULT_LATCHED), shown
+            shown = bool(state.flags & StateFlag.COMMANDS_LOST)
+            return 1e3 * silent, bool(state.flags & StateFlag.FAULT_LATCHED), shown
     return None, False, False
 
 

@@ -1,0 +1,86 @@
+"""The joint that a probe fits, against closed forms and at the extremes."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scissorcal.kernel.joint import Joint, follow_joint
+
+FREE = Joint(
+    inertia=3e-4, opening=0.0, closing=0.0, rise=0.0, rise_rate=0.1, viscous=0.0, fine=1e-3,
+    slow=1e-2, slow_share=0.0, bristle=0.0, carrying=0.0, carrying_slope=0.0, turn=0.0,
+    motor_lag=0.0,
+)  # fmt: skip
+TIMES = np.linspace(0.0, 0.2, 201)
+
+
+def places(
+    joint: Joint, torque: float, times: np.ndarray = TIMES, step_s: float = 1e-5
+) -> np.ndarray:
+    rests = np.full(len(times), np.nan)
+    rests[0] = 0.0
+    return follow_joint(joint, times, rests, np.array([0.0]), np.array([torque]), step_s)
+
+
+def test_a_free_joint_speeds_up_evenly() -> None:
+    assert places(FREE, 0.01) == pytest.approx(0.01 * TIMES**2 / (2.0 * 3e-4), rel=1e-3, abs=1e-8)
+
+
+def test_viscous_friction_ends_at_torque_over_friction() -> None:
+    joint = replace(FREE, viscous=0.01)
+    time = joint.inertia / joint.viscous
+    exact = 0.01 / joint.viscous * (TIMES - time * (1.0 - np.exp(-TIMES / time)))
+    assert places(joint, 0.01) == pytest.approx(exact, rel=1e-3, abs=1e-6)
+
+
+def test_a_motor_with_a_lag_acts_by_its_time_constant_later() -> None:
+    lag = 2e-3
+    late = np.maximum(TIMES - lag, 0.0)
+    found = places(replace(FREE, motor_lag=lag), 0.01)[100:]
+    exact = (0.01 / 3e-4) * (late**2 / 2.0 + lag**2 / 2.0)[100:]
+    assert found == pytest.approx(exact, rel=1e-3)
+
+
+def test_what_yields_takes_dahls_way_under_a_torque_below_friction() -> None:
+    """F (1 - exp(-x / l)) = u, reached without swinging where the bristles are damped."""
+    joint = replace(FREE, opening=0.02, closing=0.02, bristle=0.2)
+    times = np.linspace(0.0, 3.0, 301)
+    found = places(joint, 0.01, times, 1e-4)[-1]
+    assert found == pytest.approx(-1e-3 * math.log(1.0 - 0.01 / 0.02), rel=5e-3)
+
+
+def test_a_joint_that_is_carried_begins_at_rest() -> None:
+    joint = replace(FREE, opening=0.02, closing=0.02, carrying=0.005)
+    assert np.abs(places(joint, 0.0)).max() < 1e-5
+
+
+def test_it_is_put_to_rest_where_it_stands() -> None:
+    rests = np.full(len(TIMES), np.nan)
+    rests[[0, 100]] = 0.0, 0.5
+    found = follow_joint(FREE, TIMES, rests, np.array([0.0]), np.array([0.01]), 1e-4)
+    assert found[100] == 0.5
+    assert found[150] - 0.5 == pytest.approx(0.01 * 0.05**2 / (2.0 * 3e-4), rel=5e-3)
+
+
+@given(
+    st.floats(1e-6, 0.1),
+    st.floats(1e-5, 1.0),
+    st.floats(2e-5, 0.2),
+    st.floats(1e-7, 1.0),
+    st.floats(-1.0, 1.0),
+)
+def test_it_stays_finite_and_bounded_by_the_free_joint(
+    inertia: float, dry: float, length: float, bristle: float, torque: float
+) -> None:
+    joint = replace(
+        FREE, inertia=inertia, opening=dry, closing=dry, rise=0.3 * dry, fine=length,
+        slow=3.0 * length, slow_share=0.3, bristle=bristle,
+    )  # fmt: skip
+    found = places(joint, torque, TIMES[:51], 2.5e-4)
+    assert np.isfinite(found).all()
+    free = abs(torque) / inertia * TIMES[:51] ** 2
+    assert (np.abs(found) <= free + 3.0 * length + 1e-3).all()
