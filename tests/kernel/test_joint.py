@@ -17,7 +17,6 @@ FREE = Joint(
 )  # fmt: skip
 TIMES = np.linspace(0.0, 0.2, 201)
 STEP_S = 5e-5
-"""The shortest: places are ahead by half of it times the rate, as symplectic steps are."""
 
 
 def places(
@@ -29,7 +28,7 @@ def places(
 
 
 def test_a_free_joint_speeds_up_evenly() -> None:
-    exact = 0.01 * TIMES * (TIMES + STEP_S) / (2.0 * 3e-4)
+    exact = 0.01 * TIMES**2 / (2.0 * 3e-4)
     assert places(FREE, 0.01) == pytest.approx(exact, rel=1e-9, abs=1e-12)
 
 
@@ -37,7 +36,7 @@ def test_viscous_friction_ends_at_torque_over_friction() -> None:
     joint = replace(FREE, viscous=0.01)
     time = joint.inertia / joint.viscous
     exact = 0.01 / joint.viscous * (TIMES - time * (1.0 - np.exp(-TIMES / time)))
-    assert places(joint, 0.01) == pytest.approx(exact, abs=0.5 * STEP_S * 1.0 * 1.02)
+    assert places(joint, 0.01) == pytest.approx(exact, rel=2e-3, abs=1e-8)
 
 
 def test_a_motor_with_a_lag_acts_by_its_time_constant_later() -> None:

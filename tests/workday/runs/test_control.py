@@ -138,6 +138,12 @@ def test_a_person_puts_the_plate_in_before_a_camera_looks_for_it(
     events: list[tuple[str, float, float]] = []
 
     def note(what: str) -> None:
+        joint = link.rig.joint
+        joint.place = (
+            joint.low if "close the blades" in what else
+            joint.high if "open the blades" in what else
+            0.5 if "half open" in what else joint.place
+        )  # fmt: skip
         events.append((what, link.rig.opening, link.rig.advance))
 
     class Eye:

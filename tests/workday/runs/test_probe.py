@@ -17,7 +17,7 @@ from scissorcal.recording.probe import probe_of
 from scissorcal.workday.runs.capture import capture_into
 from scissorcal.workday.runs.probe import ensure_probed, last_probe, probe_into, probe_state
 from scissorcal.workday.workspace import Workspace, create_workspace
-from tests.strange_device import FAULTS, StrangeDevice, VirtualPort
+from tests.strange_device import FAULTS, Person, StrangeDevice, VirtualPort
 from tests.strange_device.trials import short_recipe
 
 
@@ -39,7 +39,7 @@ def test_the_first_run_probes_and_the_next_ones_do_not(workspace: Workspace) -> 
     said: list[str] = []
     first = ensure_probed(workspace, virtual_rig(), recipe, say=said.append)
     assert said[0] == (
-        "Probing the rig first, with up to 50 mN m at the blades: there is no probe of it yet."
+        "Probing the rig first, with up to 150 mN m at the blades: there is no probe of it yet."
     )
     said.clear()
     again = ensure_probed(workspace, virtual_rig(2), recipe, say=said.append)
@@ -61,24 +61,27 @@ def test_an_old_probe_another_rig_and_another_sign_do_not_count(workspace: Works
     assert "rig.motor_sign changed since" in said[-1]
     ensure_probed(workspace, virtual_rig(), changed(recipe, motor_sign=1), say=said.append)
     assert "rig.motor_sign changed since" in said[-1]
-    other = VirtualPort(StrangeDevice(seed=1))
-    ensure_probed(workspace, other, recipe, say=said.append, confirm=said.append)
-    assert f"another rig, firmware or line ({first.device})" in said[-2]
-    assert "let go of the handles and keep clear" in said[-1]
+    device = StrangeDevice(seed=1)
+    person = Person(device)
+    ensure_probed(workspace, VirtualPort(device), recipe, say=said.append, confirm=person)
+    assert f"another rig, firmware or line ({first.device})" in said[-1]
+    assert "let go of the handles and keep clear" in person.heard[-1]
 
 
 def test_a_refused_rig_is_probed_again(workspace: Workspace) -> None:
     recipe = workspace.recipe()
     said: list[str] = []
-    broken = VirtualPort(StrangeDevice(FAULTS["motor reversed"], seed=1))
+    broken = StrangeDevice(FAULTS["motor reversed"], seed=1)
     with pytest.raises(ProbeRefusedError) as caught:
-        probe_into(workspace, broken, recipe, confirm=lambda request: None)
+        probe_into(workspace, VirtualPort(broken), recipe, confirm=Person(broken))
     assert caught.value.kept == (workspace.probe_path,)
     kept = last_probe(workspace)
     assert kept is not None
     assert any(verdict.status == "fail" for verdict in kept.verdicts)
-    repaired = VirtualPort(StrangeDevice(seed=1))
-    ensure_probed(workspace, repaired, recipe, say=said.append, confirm=lambda request: None)
+    repaired = StrangeDevice(seed=1)
+    ensure_probed(
+        workspace, VirtualPort(repaired), recipe, say=said.append, confirm=Person(repaired)
+    )
     assert "the last probe refused it" in said[0]
 
 
@@ -112,14 +115,15 @@ def test_a_capture_probes_and_its_recording_holds_what_was_found(workspace: Work
 def test_probe_and_capture_ask_once_to_clear_the_blades(workspace: Workspace) -> None:
     """A capture without a probe asks by itself."""
     recipe = short_recipe()
-    asked: list[str] = []
-    for expected in ("The capture follows at once", "this capture needs them empty"):
-        port = nullcontext(VirtualPort(StrangeDevice(seed=1)))
+    for requests, expected in ((3, "The capture follows at once"), (1, "needs them empty")):
+        device = StrangeDevice(seed=1)
+        person = Person(device)
+        port = nullcontext(VirtualPort(device))
         rig = patch("scissorcal.workday.runs.capture.open_rig", return_value=port)
         with rig, patch.object(Workspace, "recipe", return_value=recipe):
-            capture_into(workspace, "friction", "a port", confirm=asked.append)
-        assert expected in asked.pop()
-        assert not asked
+            capture_into(workspace, "friction", "a port", confirm=person)
+        assert expected in person.heard[-1]
+        assert len(person.heard) == requests
 
 
 def test_the_plan_says_whether_the_probe_counts(workspace: Workspace) -> None:

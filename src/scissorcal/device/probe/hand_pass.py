@@ -151,6 +151,16 @@ def not_determined() -> Verdict:
     return not_evaluated(SENSORS, CHECK, why, RANGE_SHARE)
 
 
+def by_virtual_hand(alive: bool) -> Verdict:
+    """What the hand of a virtual rig leaves unchecked."""
+    seen = "shows that it moves" if alive else "did not move it"
+    why = (
+        f"Not checked on a virtual rig: scale and zero of the encoder; its own hand {seen}. A "
+        "person moves the blades of a real one to both stops."
+    )
+    return not_evaluated(SENSORS, CHECK, why, RANGE_SHARE)
+
+
 def _is_right(found: HandPass, identity: Identity) -> bool:
     stated = identity.opening_max - identity.opening_min
     zero = 0.5 * (found.closed[-1] - identity.opening_min + found.opened[-1] - identity.opening_max)

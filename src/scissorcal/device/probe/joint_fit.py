@@ -36,7 +36,7 @@ LEAST_SHARE, RESCALED_BELOW = 0.1, 0.7
 errors; and above 0.7 another fit would move nothing by a standard deviation."""
 FRICTION_SD = 0.03
 """Share by which friction differs from push to push: cogging, and friction along the angle."""
-LEFT_OUT_S = 4e-4
+LEFT_OUT_S = 2e-4
 """The same of the delay: friction that builds up otherwise looks like torque that comes later."""
 SHAPE_RAD = 1e-5
 """The same of the shortest way that yields (0.1 mrad), which all pushes have."""
@@ -245,6 +245,7 @@ class _Problem:
         self._turn = turn
         self._pushes, self._noise = pushes, noise_rad
         self._plain_sd: Array | None = None
+        self._friction_sd = FRICTION_SD
         self._sd = np.concatenate([_errors_of(push, noise_rad) for push in pushes])
         self._known = noise_rad / self._sd
         self._effects = np.zeros((len(self._sd), 2))
@@ -263,6 +264,7 @@ class _Problem:
         if share > RESCALED_BELOW:
             return False
         self._plain_sd = self._sd
+        self._friction_sd = share * FRICTION_SD
         self._sd = np.concatenate([_errors_of(push, self._noise, share) for push in self._pushes])
         self._known = self._noise / self._sd
         return True
@@ -271,10 +273,10 @@ class _Problem:
         """Let each push begin a reading off and rub a few percent more or less, near ``x``.
 
         Its residuals then have the covariance D + V V^T, of the place at which it began and of what
-        FRICTION_SD of the friction does to it; that of a weak push is most of its way.
+        a share of the friction does to it; that of a weak push is most of its way.
         """
         more = x.copy()
-        more[NAMES.index("log_coulomb")] += FRICTION_SD
+        more[NAMES.index("log_coulomb")] += self._friction_sd
         rubbed = (self._places_of(x) - self._places_of(more)) / self._sd
         columns = np.column_stack([self._known, rubbed])
         shrunk, evidence = [], 0.0
@@ -297,7 +299,7 @@ class _Problem:
             method="lm",
             x_scale=self._prior_sd,
             max_nfev=evaluations,
-            ftol=3e-4,
+            ftol=1e-4,
             xtol=1e-6,
             gtol=1e-8,
         )
@@ -403,13 +405,19 @@ def _stiffness(pushes: Sequence[Push], prior: Prior) -> float:
 
 
 def perturbed(values: Array) -> list[Array]:
-    """Starts from which another mode would be found: inertia and delay, or presliding, apart."""
+    """Starts from which another mode would be found: what pushes confuse, moved apart."""
     found = []
-    for inertia, delay, fine in ((0.5, -1.5e-3, 0.0), (-0.5, 1.5e-3, 0.0), (0.0, 0.0, 1.5)):
+    for moves in (
+        {"log_inertia": 0.5, "delay": -1.5e-3},
+        {"log_inertia": -0.5, "delay": 1.5e-3},
+        {"log_fine": 1.5},
+        {"log_lag": -0.7, "log_bristle": -1.0},
+        {"log_lag": 0.7, "delay": -7e-4},
+        {"log_inertia": 0.1, "log_lag": -0.5, "log_bristle": -3.0},
+    ):
         start = values.copy()
-        start[NAMES.index("log_inertia")] += inertia
-        start[NAMES.index("delay")] += delay
-        start[NAMES.index("log_fine")] += fine
+        for name, by in moves.items():
+            start[NAMES.index(name)] += by
         found.append(start)
     return found
 

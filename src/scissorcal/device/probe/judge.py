@@ -7,7 +7,7 @@ interval refuses nothing. Every limit has its reason beside it.
 import math
 
 from scissorcal.device.motion import STOP_MARGIN_RAD
-from scissorcal.device.probe.idle import REST_RAD, Idle
+from scissorcal.device.probe.idle import Idle
 from scissorcal.device.probe.lag import Lag
 from scissorcal.device.probe.measured_torque import Follow
 from scissorcal.device.probe.watchdog import Watchdog
@@ -50,7 +50,7 @@ def judge_idle(found: Idle, identity: Identity, radius_mm: float) -> list[Verdic
     """Verdicts on the idle second; ``radius_mm`` is the recipe's handle radius."""
     verdicts = [_numbers(found), _no_fault(found), _within_stops(found, identity)]
     verdicts += _clock(found, identity)
-    verdicts += [_lost(found), _jitter(found, identity), _rest(found)]
+    verdicts += [_lost(found), _jitter(found, identity)]
     verdicts += [*_zeros(found, identity), _radius(identity, radius_mm)]
     return [verdict for verdict in verdicts if verdict is not None]
 
@@ -215,14 +215,6 @@ def _jitter(found: Idle, identity: Identity) -> Verdict:
         why = f"{said}. Rates are averaged for longer, and slow ones are not used: {remedy}."
         return not_evaluated(SENSORS, "encoder jitter", why, JITTER_RAD, found.jitter_rad)
     return Verdict(SENSORS, "encoder jitter", "pass", found.jitter_rad, JITTER_RAD, f"{said}.")
-
-
-def _rest(found: Idle) -> Verdict:
-    bad = (
-        f"The blades moved by {found.moved_rad:.2g} rad with the motors off: let go of the "
-        "handles, fix what pulls them, and start again."
-    )
-    return judge(SENSORS, "rest", found.moved_rad, REST_RAD, "The blades are at rest.", bad)
 
 
 def _zeros(found: Idle, identity: Identity) -> list[Verdict]:

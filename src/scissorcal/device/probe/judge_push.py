@@ -7,12 +7,13 @@ as a verdict that fails does, without accusing anything.
 import math
 from dataclasses import dataclass
 
+from scissorcal.device.probe.idle import REST_RAD, Idle
 from scissorcal.device.probe.pushes import Axis
 from scissorcal.device.probe.search import LEAST_INERTIA, Search, Sense
 from scissorcal.device.probe.swings import Swung
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
-MOTORS = "probe.motors"
+MOTORS, SENSORS = "probe.motors", "probe.sensors"
 MISFIT_LIMIT = 15.0
 """Mean square of the residuals over their errors. Joints of another friction law stay below it, a
 loose coupling or blades that touch something do not (figures in decision 175)."""
@@ -62,6 +63,19 @@ class Outcome:
 
     verdicts: tuple[Verdict, ...]
     undetermined: str = ""
+
+
+def judge_rest(found: Idle) -> Outcome:
+    """Whether the blades rest with the motors off."""
+    moved = found.moved_rad
+    if moved <= REST_RAD:
+        good = "The blades are at rest."
+        return Outcome((Verdict(SENSORS, "rest", "pass", moved, REST_RAD, good),))
+    why = (
+        f"Not determined: the blades moved by {moved:.2g} rad in a second with the motors off. Let "
+        "go of the handles, wait until they hang still, fix what pulls them, and probe again."
+    )
+    return Outcome((not_evaluated(SENSORS, "rest", why, REST_RAD, moved),), why)
 
 
 def judge_search(found: Search, axis: Axis, words: Words, *, hand: bool) -> Outcome:

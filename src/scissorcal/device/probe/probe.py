@@ -10,6 +10,7 @@ from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.probe.clipping import clipping
 from scissorcal.device.probe.hand_pass import (
     HandPass,
+    by_virtual_hand,
     hand_pass,
     judge_hand_pass,
     let_go,
@@ -23,6 +24,7 @@ from scissorcal.device.probe.judge_push import (
     SLEDGE,
     Outcome,
     judge_joint,
+    judge_rest,
     judge_search,
     judge_sense,
 )
@@ -151,6 +153,7 @@ def _stages(talk: Talk, finding: _Finding, recipe: Recipe, hand: bool, tell: Pro
     finding.add(
         judge_idle(quiet, identity, recipe.rig.handle_radius_mm), **_of_idle(quiet, identity)
     )
+    finding.take(judge_rest(quiet))
     finding.add(
         [], facts={REAL_TIME: float(isinstance(talk.link, PortLink)), **recipe_facts(recipe)}
     )
@@ -233,7 +236,9 @@ def _by_hand(
     identity = talk.identity
     if is_simulator(identity):
         talk.link.configure(ConfigKey.MATERIAL, 0.0)
-        return virtual_hand(talk)
+        alive = virtual_hand(talk)
+        finding.add([by_virtual_hand(alive)])
+        return alive
     assert confirm is not None
     passed = hand_pass(talk, confirm)
     finding.add(judge_hand_pass(passed, identity), facts=_of_hand(passed, identity))

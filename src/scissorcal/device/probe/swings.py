@@ -31,7 +31,9 @@ ENOUGH_SD = 0.11
 """Of ln inertia: an interval of 90 % within +- 20 %, which a gain margin of 2 bears five times."""
 BEYOND = 1.5
 """The strongest push over the fitted friction: below it, all of the motion may be presliding."""
-MOST_PAIRS = 10
+LEAST_PAIRS, MOST_PAIRS = 3, 10
+"""Pushes that end after 3 mrad last a few lags of a motor and confuse lag and inertia; three pairs
+that go to the aim tell them apart."""
 TELLING = 0.3
 """Pushes below this share of breakaway move within the encoder's error: they only cost time."""
 LIGHT_SDS = 2.0
@@ -61,8 +63,8 @@ def swings(
     least = TELLING * prior.breakaway_Nm
     strongest = max(abs(one.effort) for one in pushes)
     fit = _fitted(talk, pushes, least, prior, noise_rad)
-    for _ in range(MOST_PAIRS):
-        if known(fit, strongest):
+    for pairs in range(MOST_PAIRS):
+        if pairs >= LEAST_PAIRS and known(fit, strongest):
             break
         for sign in (1, -1):
             effort, seconds = _planned(talk, axis, fit, sign, prior.breakaway_Nm, strongest)

@@ -330,10 +330,10 @@ class Talk(AbstractContextManager["Talk"]):
                 f"rig.probe.largest_rate_rad_per_s = {bounds.rate_rad_per_s:g}"
             )
             raise (StalledError if stalled else RunawayError)(
-                f"{self.name}: {what} after at most {1e3 * last:.3g} mN m of the probe, beyond "
-                f"what the recipe allows ({allowed}). Check that no hand, spring or gravity moves "
-                "them and that the encoder's counts are right, or raise these keys. The motors "
-                "are off."
+                f"Not determined: {what} after at most {1e3 * last:.3g} mN m of the probe, beyond "
+                f"what the recipe allows ({allowed}), at {self.name}. Check that no hand, spring "
+                "or gravity moves them and that the encoder's counts are right, or raise these "
+                "keys. The motors are off."
             )
 
     def _what_is_wrong(self, state: State) -> str:

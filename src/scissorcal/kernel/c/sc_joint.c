@@ -26,7 +26,7 @@ void sc_joint_follow(const sc_joint *joint, const double *times, const double *r
                      const double *switches, const double *torques, size_t commands, double step,
                      double *places)
 {
-    double place = 0.0, rate = 0.0, motor = 0.0, command = 0.0;
+    double place = 0.0, rate = 0.0, motor = 0.0, command = 0.0, ahead = 0.0;
     double fine = 0.0, slow = 0.0;
     const double longest = longest_step(joint, step);
     const double per_fine = 1.0 / joint->fine, per_slow = 1.0 / joint->slow;
@@ -42,17 +42,20 @@ void sc_joint_follow(const sc_joint *joint, const double *times, const double *r
             if (next < commands && switches[next] < until)
                 until = switches[next];
             const double left = until - now;
-            const double steps = ceil(left / longest);
+            const double steps = ceil(left / longest - 1e-9);
             const double dt = left / steps;
-            const double follow = joint->motor_lag > 0.0 ? -expm1(-dt / joint->motor_lag) : 1.0;
+            const double lag = joint->motor_lag;
+            const double follow = lag > 0.0 ? -expm1(-dt / lag) : 1.0;
+            const double missing = follow * lag / dt; /* of the command, on average over a step */
             for (double done = 0.0; done < steps; done += 1.0) {
                 const double share = joint->slow_share;
+                const double acting = command + missing * (motor - command);
                 motor += follow * (command - motor);
                 const double built = (1.0 - share) * fine + share * slow;
                 const double level = built > 0.0 ? joint->opening : joint->closing;
                 const double over = rate / joint->rise_rate;
                 const double rise = joint->rise > 0.0 ? joint->rise * decay(over * over) : 0.0;
-                const double torque = motor + joint->carrying +
+                const double torque = acting + joint->carrying +
                                       joint->carrying_slope * (place - joint->turn) -
                                       (level + rise) * built;
                 const double yields = 1.0 - (rate < 0.0 ? -fine : fine);
@@ -65,16 +68,17 @@ void sc_joint_follow(const sc_joint *joint, const double *times, const double *r
                 slow = sign - (sign - slow) * decay(fabs(way) * per_slow);
             }
             now = until;
+            ahead = 0.5 * dt * rate; /* a symplectic place is half a step ahead of its time */
         }
         if (i == 0 || isfinite(rests[i])) {
             place = isfinite(rests[i]) ? rests[i] : place;
-            rate = 0.0;
+            rate = ahead = 0.0;
             if (i == 0 && joint->carrying != 0.0) {
                 const double level = joint->carrying > 0.0 ? joint->opening : joint->closing;
                 const double built = joint->carrying / fmax(level + joint->rise, 1e-12);
                 fine = slow = fmax(-0.999, fmin(0.999, built));
             }
         }
-        places[i] = place;
+        places[i] = place - ahead;
     }
 }
