@@ -66,7 +66,7 @@ def test_a_reversed_motor_is_named_after_the_encoder_was_seen_right() -> None:
 def test_lost_commands_are_named_at_zero_torque() -> None:
     trial = trial_of(wrong("5 % lost", STILL))
     assert "single commands did not arrive" in trial.said
-    assert trial.largest_rate == 0.0
+    assert trial.largest_rate < 1e-3  # what has just been let go of settles
 
 
 def test_a_person_who_opens_where_asked_to_close_is_asked_again() -> None:

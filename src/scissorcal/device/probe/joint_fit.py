@@ -36,6 +36,8 @@ LEAST_SHARE, RESCALED_BELOW = 0.1, 0.7
 errors; and above 0.7 another fit would move nothing by a standard deviation."""
 FRICTION_SD = 0.03
 """Share by which friction differs from push to push: cogging, and friction along the angle."""
+LEFT_OUT_VISCOUS = 1e-3
+"""The same of viscous friction (N m s/rad): swings of 1 rad/s and less hardly show it."""
 LEFT_OUT_S = 2e-4
 """The same of the delay: friction that builds up otherwise looks like torque that comes later."""
 SHAPE_RAD = 1e-5
@@ -113,7 +115,8 @@ class JointFit:
 
     @property
     def viscous(self) -> Estimate:
-        return _of_log(self.value("log_viscous"), self.sd("log_viscous"))
+        found = _of_log(self.value("log_viscous"), self.sd("log_viscous"))
+        return Estimate(found.mean, math.hypot(found.sd, LEFT_OUT_VISCOUS))
 
     @property
     def delay(self) -> Estimate:
