@@ -49,10 +49,11 @@ def probe(
 ) -> Answer:
     """Check a rig before its motors run: line, sensors, watchdog, signs, delay, inertia, friction.
 
-    It listens for a second, then pushes the blades by a few encoder steps each way, within
-    rig.probe. Keep the space between the blades empty and let go of the handles. What it finds is
-    kept in device-probe.json; captures and renderings probe by themselves where that is missing or
-    old. What no motor may run with is refused with its cause (exit code 4).
+    It asks for the blades to be closed and opened by hand, motors off, listens for a second, then
+    pushes them each way and lets them swing, within rig.probe. Keep the space between the blades
+    empty and let go of the handles when asked. What it finds is kept in device-probe.json; captures
+    and renderings probe by themselves where that is missing or old. What no motor may run with is
+    refused with its cause, and what it cannot determine with what to do (exit code 4).
 
     \b
     Example:
