@@ -1,7 +1,7 @@
 """Verdicts on pushes: what moves, which way, and whether a joint's law explains it.
 
-Each is right, wrong with its name, or not determined with what to do. `Undetermined` ends a probe
-as a verdict that fails does, without accusing anything.
+Each is right, wrong with its name, or not determined with what to do. An `Outcome` that is not
+determined ends a probe as a verdict that fails does, without accusing anything.
 """
 
 import math
@@ -11,6 +11,7 @@ from scissorcal.device.probe.idle import REST_RAD, Idle
 from scissorcal.device.probe.pushes import Axis
 from scissorcal.device.probe.search import LEAST_INERTIA, Search, Sense
 from scissorcal.device.probe.swings import Swung
+from scissorcal.recording.probe import NORMAL_90
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 MOTORS, SENSORS = "probe.motors", "probe.sensors"
@@ -141,7 +142,7 @@ def judge_joint(swung: Swung, axis: Axis, tick_s: float, lag_ticks: float) -> Ou
     """Whether inertia and friction explain the pushes, and are known well enough."""
     check, fit = "inertia", swung.fit
     sd = fit.sd("log_inertia")
-    spread = math.exp(1.645 * sd)
+    spread = math.exp(NORMAL_90 * fit.inertia.sd / fit.inertia.mean)
     inertia = 1e6 * fit.inertia.mean
     if not fit.misfit <= MISFIT_LIMIT:
         why = (

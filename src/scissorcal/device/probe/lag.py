@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
 from scissorcal.kernel import StateFlag
-from scissorcal.verdicts import Verdict, not_evaluated
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 MOTORS, LINE = "probe.motors", "probe.line"
 TOGGLES, ASKED = 12, 200
@@ -69,9 +69,7 @@ def judge_lag(found: Lag, tick_ms: float) -> list[Verdict]:
         f"{said}: no loop through it follows a sweep. Shorten the way (no hub or network adapter; "
         "'scissorcal device doctor' measures the port)."
     )
-    status = "pass" if late <= LAG_LIMIT_MS else "fail"
-    why = f"{said}." if status == "pass" else bad
-    verdicts = [Verdict(MOTORS, "lag", status, late, LAG_LIMIT_MS, why)]  # type: ignore[arg-type]
+    verdicts = [judge(MOTORS, "lag", late, LAG_LIMIT_MS, f"{said}.", bad)]
     share = found.lost / found.asked
     said = f"{found.lost} of {found.asked} single commands did not arrive"
     if found.lost >= FEWEST_LOST:

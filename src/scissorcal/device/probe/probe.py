@@ -62,7 +62,7 @@ and began is the device's affair."""
 TOLD_SD = 0.25
 """Of the logarithms of the Stribeck level and rate: beyond 50 % at 90 % they are the prior's, and a
 capture judges slow sweeps by a bound instead."""
-GAIN_HOLD_S, HELD_SHARE, HELD_PAIRS = 0.1, 0.6, 1
+GAIN_HOLD_S, HELD_SHARE = 0.1, 0.6
 """How long an effort is held for its gain, and its share of the one that moved the blades."""
 SLEDGE_FORCE_SHARE = 0.2
 """Of the recipe's and the device's force limit, for the sledge."""
@@ -284,7 +284,7 @@ def _push(
     finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand=hand))
     held = [
         push(talk, axis, sign * HELD_SHARE * found.effort, GAIN_HOLD_S, hold=found.hold)
-        for sign in (1, -1) * HELD_PAIRS
+        for sign in (1, -1)
     ]
     tell(0.5, "swings, planned by what the last ones taught")
     lag_ticks = finding.result.facts["command_lag_ticks"]

@@ -130,14 +130,12 @@ def sense(talk: Talk, axis: Axis, found: Search) -> Sense:
         apart = pair[0].went - pair[1].went
         if not any(one.disturbed for one in pair) and abs(apart) >= axis.seen:
             votes += 1 if apart > 0.0 else -1
-    with_effort = found.pushed.went > 0.0 and found.pulled.went < 0.0
     against = found.pushed.went < 0.0 and found.pulled.went > 0.0
     direction: Direction = "not determined"
     if votes >= VOTES and not against:
         direction = "right"
     elif votes <= -VOTES and against:
         direction = "reversed"
-    del with_effort
     return Sense(votes, len(PAIRS), tuple(pushes), direction)
 
 
