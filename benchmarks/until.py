@@ -48,6 +48,7 @@ from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
 from scissorcal.recording.until import UntilMark
+from scissorcal.workday.runs.sweep_speeds import sweep_bounds
 from scissorcal.workday.stock import seconds_at_rig
 from scissorcal.workday.until import Earlier, Limits, UntilTolerance
 
@@ -156,7 +157,10 @@ def _capture(
     spent: list[float],
 ) -> tuple[Recording, UntilMark]:
     """Capture until the tolerance; ``spent`` gets the processor seconds of each choice."""
-    choice = UntilTolerance(kind, recipe, link.identity, earlier, Limits(minutes))
+    slowest = max(sweep_bounds(recipe, link.identity, probed)) if kind == "friction" else 0.0
+    choice = UntilTolerance(
+        kind, recipe, link.identity, earlier, Limits(minutes), slowest_sweep=slowest
+    )
 
     def timed(recorded: Recording, advance: float) -> Any:
         began = time.process_time()

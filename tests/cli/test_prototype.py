@@ -185,7 +185,7 @@ def test_nothing_moves_before_the_rigs_own_question_is_answered_on_the_page(
     with serve_on_pty(device) as port, served(packed, "--device", port) as (_, url):
         armed, asked = watch(url, act)
     assert armed == REQUEST
-    assert asked.startswith("Take everything out from between the blades, let go")
+    assert asked.startswith("Take everything out from between the blades. The motors are off")
     assert device.largest_torque < 0.01
     assert not packed.recordings("render")
 

@@ -44,14 +44,19 @@ LEAST_FLOORS = 1.5
 
 
 def capture_stock(
-    recipe: Recipe, identity: Identity, friction: FrictionState, cut: CutState
+    recipe: Recipe,
+    identity: Identity,
+    friction: FrictionState,
+    cut: CutState,
+    slowest_sweep: float = 0.0,
 ) -> Stock:
     """Offer empty sweeps, and strokes through material (or presses), at speeds of the scene.
 
+    Sweeps are at ``slowest_sweep`` (rad/s) and faster: below it the rig's blades stick and slip.
     Each stroke is planned as a capture plans it, moved as planned, and judged by the likelihood
     that the fits use. Raises what planning raises (DeviceError, InputError).
     """
-    sweeps, excitation = _sweeps(recipe, identity, friction)
+    sweeps, excitation = _sweeps(recipe, identity, friction, slowest_sweep)
     strokes = _strokes(recipe, identity, friction, cut)
     handling = recipe.capture.handling_s
     loads = handling + RETURN_S if recipe.scene.cut else 0.0
@@ -142,13 +147,13 @@ def nominal_identity(recipe: Recipe) -> Identity:
 
 
 def _sweeps(
-    recipe: Recipe, identity: Identity, friction: FrictionState
+    recipe: Recipe, identity: Identity, friction: FrictionState, slowest_sweep: float
 ) -> tuple[dict[float, Offer], Offer]:
     """Pairs of sweeps by speed, and the excitation, from one planned capture of all."""
     band_Hz = RATE_BAND * recipe.fit.friction.cutoff_Hz
     floor = rate_floor_of_step(identity.opening_resolution, band_Hz, 1e6 / identity.tick_us)
     slow, fast = recipe.scene.opening_rate_rad_per_s
-    slowest = max(slow, LEAST_FLOORS * floor)
+    slowest = max(slow, LEAST_FLOORS * floor, slowest_sweep)
     speeds = _rounded(np.geomspace(slowest, max(fast, 1.5 * slowest), SWEEP_SPEEDS))
     wanted = recipe.capture.friction.model_copy(
         update={"speeds_rad_per_s": speeds, "repeats": 1, "excitation_s": EXCITATION_S}

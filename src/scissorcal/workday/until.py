@@ -78,7 +78,8 @@ class UntilTolerance:
 
     The fit is brought up to date by what was recorded, the band of the torque over the scene is
     judged by the scene's tolerance and confidence, and the stroke comes next that lowers what is
-    beyond the tolerance the most per minute. ``marks`` has the state after each update.
+    beyond the tolerance the most per minute. ``marks`` has the state after each update. Empty
+    sweeps are at ``slowest_sweep`` (rad/s) and faster (`capture_stock`).
     """
 
     def __init__(
@@ -89,19 +90,19 @@ class UntilTolerance:
         earlier: Earlier,
         limits: Limits,
         *,
+        slowest_sweep: float = 0.0,
         seed: int = 0,
     ) -> None:
         self._kind, self._recipe, self._identity = kind, recipe, identity
         self._earlier, self._limits = earlier, limits
-        self._seed = seed
+        self._seed, self._slowest_sweep = seed, slowest_sweep
         self._taken = Taken()
         self._seconds = 0.0
         self._why_no_fit = ""
         self._used: dict[float, float] = {}
         self.marks: list[UntilMark] = []
         self._friction, self._cut = self._at_first()
-        self._stock = capture_stock(recipe, identity, self._friction, self._cut)
-        self._stock_of = (self._friction, self._cut)
+        self._renew_stock()
         self._seconds += self._stock.begin_s
 
     @property
@@ -222,8 +223,14 @@ class UntilTolerance:
             return
         self._why_no_fit = ""
         if self._moved():
-            self._stock = capture_stock(recipe, self._identity, self._friction, self._cut)
-            self._stock_of = (self._friction, self._cut)
+            self._renew_stock()
+
+    def _renew_stock(self) -> None:
+        """Judge the offers by the fits as they are."""
+        self._stock = capture_stock(
+            self._recipe, self._identity, self._friction, self._cut, self._slowest_sweep
+        )
+        self._stock_of = (self._friction, self._cut)
 
     def _moved(self) -> bool:
         """Whether the fits are no longer near those by which the offers were judged."""

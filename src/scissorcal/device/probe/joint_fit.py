@@ -188,11 +188,13 @@ def fit_joint(
     noise_rad: float,
     *,
     starts: Sequence[Array] = (),
+    modes: bool = True,
 ) -> JointFit:
     """Fit all pushes together, from ``starts`` or from several places of the prior.
 
-    ``noise_rad`` is the sd of the encoder: step and jitter. The best mode is returned; another one
-    that explains the pushes as well widens its interval.
+    ``noise_rad`` is the sd of the encoder: step and jitter. The best mode is returned. ``modes``:
+    others are sought around it, and one that explains the pushes as well widens its interval; a fit
+    that only plans the next push does without, at a fifth of the time.
     """
     problem = _Problem(pushes, prior, noise_rad)
     begun = sorted(
@@ -206,7 +208,7 @@ def fit_joint(
     best = min(found, key=lambda one: one[1])
     if problem.rescale(best[0]):
         found = []
-        for start in (best[0], *perturbed(best[0])):
+        for start in (best[0], *(perturbed(best[0]) if modes else ())):
             problem.vary(start)
             found.append(problem.solved(start, EVALUATIONS))
         best = min(found, key=lambda one: one[1])

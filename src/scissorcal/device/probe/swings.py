@@ -62,19 +62,20 @@ def swings(
     pushes = list(before)
     least = TELLING * prior.breakaway_Nm
     strongest = max(abs(one.effort) for one in pushes)
-    fit = _fitted(talk, pushes, least, prior, noise_rad)
-    for pairs in range(MOST_PAIRS):
-        if pairs >= LEAST_PAIRS and known(fit, strongest):
-            break
+    fit = _fitted(talk, pushes, least, prior, noise_rad, modes=False)
+    for pairs in range(MOST_PAIRS + 1):
+        if pairs == MOST_PAIRS or (pairs >= LEAST_PAIRS and known(fit, strongest)):
+            starts = [fit.values, *perturbed(fit.values)]
+            fit = _fitted(talk, pushes, least, prior, noise_rad, starts)
+            if pairs == MOST_PAIRS or known(fit, strongest):
+                break
         for sign in (1, -1):
             effort, seconds = _planned(talk, axis, fit, sign, prior.breakaway_Nm, strongest)
             one = push(talk, axis, effort, seconds, hold=hold, way=_most_way(axis), rate=MOST_RATE)
             pushes.append(one)
             if not one.disturbed:
                 strongest = max(strongest, abs(effort))
-        fit = _fitted(talk, pushes, least, prior, noise_rad, [fit.values])
-    starts = [fit.values, *perturbed(fit.values)]
-    fit = _fitted(talk, pushes, least, prior, noise_rad, starts)
+        fit = _fitted(talk, pushes, least, prior, noise_rad, [fit.values], modes=False)
     return Swung(tuple(pushes), fit, strongest)
 
 
@@ -85,10 +86,13 @@ def _fitted(
     prior: Prior,
     noise_rad: float,
     starts: Sequence[Array] = (),
+    *,
+    modes: bool = True,
 ) -> JointFit:
     """Fit with motors and stream off: a device ends a stream after 5 s without a frame."""
+    some = pushes_of(talk, pushes, least)
     with talk.paused():
-        return fit_joint(pushes_of(talk, pushes, least), prior, noise_rad, starts=starts)
+        return fit_joint(some, prior, noise_rad, starts=starts, modes=modes)
 
 
 def known(fit: JointFit, strongest: float) -> bool:

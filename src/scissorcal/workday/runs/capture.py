@@ -14,7 +14,11 @@ from scissorcal.recipe.show import with_designed_captures
 from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.runs.design import designed_for
 from scissorcal.workday.runs.probe import Say, ensure_probed, last_probe
-from scissorcal.workday.runs.sweep_speeds import sliding_below_encoder, with_usable_sweeps
+from scissorcal.workday.runs.sweep_speeds import (
+    sliding_below_encoder,
+    sweep_bounds,
+    with_usable_sweeps,
+)
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -242,7 +246,10 @@ def _capture_until(
     listed_min = seconds_at_rig(recipe, plan) / 60.0
     minutes = listed_min if until.max_minutes is None else until.max_minutes
     limits = Limits(minutes, until.at_least)
-    choice = UntilTolerance(kind, recipe, link.identity, earlier, limits)
+    slowest = max(sweep_bounds(recipe, link.identity, probe)) if kind == "friction" else 0.0
+    choice = UntilTolerance(
+        kind, recipe, link.identity, earlier, limits, slowest_sweep=slowest
+    )
     path = workspace.new_recording(kind)
     text = read_text(workspace.recipe_path)
     with open_writer(path, kind, link, recipe, text, by_parts=True, probe=probe) as writer:

@@ -24,13 +24,9 @@ def with_usable_sweeps(
     and slip whatever the gains (``capture_gains``). The slowest usable speed takes their place.
     Raises InputError where that is above every planned speed, DeviceError as ``capture_gains``.
     """
-    from scissorcal.device.capture_gains import Probed, capture_gains
     from scissorcal.workday.stock import LEAST_FLOORS
 
-    floor = LEAST_FLOORS * _rate_floor(
-        identity.opening_resolution, recipe.fit.friction.cutoff_Hz, identity
-    )
-    sticks = capture_gains(recipe, identity, "friction", Probed.of(probe)).sticks_below
+    floor, sticks = sweep_bounds(recipe, identity, probe)
     slowest = _rounded_up(max(floor, sticks))
     planned = recipe.capture.friction.speeds_rad_per_s
     slow = [speed for speed in planned if speed < max(floor, sticks)]
@@ -60,6 +56,21 @@ def with_usable_sweeps(
         f"Sweeps at {listed} rad/s are left out: {cause}. The slowest usable speed is about "
         f"{slowest:g} rad/s.{replaced}"
     )
+
+
+def sweep_bounds(
+    recipe: "Recipe", identity: "Identity", probe: "ProbeResult | None"
+) -> tuple[float, float]:
+    """Speeds (rad/s) below which an empty sweep is too slow: for the encoder, for the rig's gains.
+
+    The second is 0 where nothing is known of it. Raises DeviceError as ``capture_gains``.
+    """
+    from scissorcal.device.capture_gains import Probed, capture_gains
+    from scissorcal.workday.stock import LEAST_FLOORS
+
+    cutoff_Hz = recipe.fit.friction.cutoff_Hz
+    floor = LEAST_FLOORS * _rate_floor(identity.opening_resolution, cutoff_Hz, identity)
+    return floor, capture_gains(recipe, identity, "friction", Probed.of(probe)).sticks_below
 
 
 def sliding_below_encoder(recipe: "Recipe", identity: "Identity") -> str:
