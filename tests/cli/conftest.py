@@ -26,6 +26,7 @@ from scissorcal.vision.sim.sim_camera import (
 from scissorcal.workday.tracking import sim_world
 from scissorcal.workday.workspace import Workspace
 from tests.made_once import copied
+from tests.probed_once import probed_once as probed_once
 from tests.workday.made import fitted_copy
 
 

@@ -34,27 +34,37 @@ class Joint:
     motor_lag: float
 
 
-_NAMES = tuple(entry.name for entry in fields(Joint))
-
-
 def follow_joint(
     joint: Joint, times: Array, rests: Array, switches: Array, torques: Array, step_s: float
 ) -> Array:
-    """Places (rad) at ``times`` (n,), as sc_joint.h says.
+    """Places (rad) of one joint at ``times`` (n,), as `follow_joints` has those of several."""
+    values = np.array([[getattr(joint, entry.name) for entry in fields(Joint)]])
+    return follow_joints(values, times, rests, switches, torques, step_s)[0]
 
-    ``rests`` (n,) is finite where the joint stands, ``torques`` (m,) act from ``switches`` (m,) on.
+
+def follow_joints(
+    joints: Array, times: Array, rests: Array, switches: Array, torques: Array, step_s: float
+) -> Array:
+    """Places (rad) of joints (k, fields of `Joint`) at ``times`` (n,): (k, n), as sc_joint.h says.
+
+    ``rests`` (n,) is finite where the joints stand, ``torques`` (m,) act from ``switches`` (m,) on.
+    At most 16 joints; all take the steps that the first one needs.
     """
-    struct = ffi.new("sc_joint *", {name: getattr(joint, name) for name in _NAMES})
-    places = np.empty(len(times))
-    arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (times, rests, switches, torques)]
+    if len(joints) > lib.SC_JOINTS:
+        raise ValueError(f"at most {lib.SC_JOINTS} joints can be followed at once")
+    places = np.empty((len(joints), len(times)))
+    arrays = [
+        np.ascontiguousarray(a, dtype=np.float64) for a in (joints, times, rests, switches, torques)
+    ]
     buffers = [ffi.from_buffer("double[]", a) for a in arrays]
     lib.sc_joint_follow(
-        struct,
-        buffers[0],
+        ffi.cast("sc_joint *", buffers[0]),
+        len(joints),
         buffers[1],
-        len(times),
         buffers[2],
+        len(times),
         buffers[3],
+        buffers[4],
         len(torques),
         step_s,
         ffi.from_buffer("double[]", places),

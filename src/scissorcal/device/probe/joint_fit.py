@@ -12,13 +12,13 @@ inflated by the misfit and by how long residuals stay alike.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.probe.idle import correlation_time
-from scissorcal.kernel.joint import Joint, follow_joint
+from scissorcal.kernel.joint import Joint, follow_joint, follow_joints
 from scissorcal.recording.probe import Estimate
 
 Array = NDArray[np.float64]
@@ -44,6 +44,8 @@ SHAPE_RAD = 1e-5
 """The same of the shortest way that yields (0.1 mrad), which all pushes have."""
 MOST_SAMPLES, LONGEST_S = 120, 0.3
 STRANGE_SDS = 4.0
+RUNAWAY_RAD = 1e3
+"""A joint on a falling slope may run away in a trial of the search: so far and no farther."""
 COAST_S, TRAVEL_STEP_S = 0.15, 1e-3
 FIRST_EVALUATIONS, EVALUATIONS, KEPT = 8, 60, 2
 
@@ -162,24 +164,30 @@ HIGH = np.array(
 
 def joint_of(values: Array) -> Joint:
     """The joint of a vector of `NAMES`."""
-    x = dict(zip(NAMES, (float(value) for value in values), strict=True))
-    coulomb = math.exp(x["log_coulomb"])
-    return Joint(
-        inertia=math.exp(x["log_inertia"]),
-        opening=coulomb * (1.0 + x["asymmetry"]),
-        closing=coulomb * (1.0 - x["asymmetry"]),
-        rise=coulomb * math.exp(x["log_rise_share"]),
-        rise_rate=math.exp(x["log_rise_rate"]),
-        viscous=math.exp(x["log_viscous"]),
-        fine=math.exp(x["log_fine"]),
-        slow=math.exp(x["log_slow"]),
-        slow_share=1.0 / (1.0 + math.exp(-x["slow_logit"])),
-        bristle=math.exp(x["log_bristle"]),
-        carrying=x["carrying"],
-        carrying_slope=x["carrying_slope"],
-        turn=0.0,
-        motor_lag=math.exp(x["log_lag"]),
-    )
+    return Joint(*(float(value) for value in _joints_of(values[None, :], 0.0)[0]))
+
+
+def _joints_of(values: Array, turn: float) -> Array:
+    """Joints (k, fields of `Joint`) of vectors of `NAMES` (k, names), in `Joint`'s order."""
+    x = dict(zip(NAMES, values.T, strict=True))
+    coulomb = np.exp(x["log_coulomb"])
+    columns = {
+        "inertia": np.exp(x["log_inertia"]),
+        "opening": coulomb * (1.0 + x["asymmetry"]),
+        "closing": coulomb * (1.0 - x["asymmetry"]),
+        "rise": coulomb * np.exp(x["log_rise_share"]),
+        "rise_rate": np.exp(x["log_rise_rate"]),
+        "viscous": np.exp(x["log_viscous"]),
+        "fine": np.exp(x["log_fine"]),
+        "slow": np.exp(x["log_slow"]),
+        "slow_share": 1.0 / (1.0 + np.exp(-x["slow_logit"])),
+        "bristle": np.exp(x["log_bristle"]),
+        "carrying": x["carrying"],
+        "carrying_slope": x["carrying_slope"],
+        "turn": np.full(len(values), turn),
+        "motor_lag": np.exp(x["log_lag"]),
+    }
+    return np.column_stack([columns[entry.name] for entry in fields(Joint)])
 
 
 def fit_joint(
@@ -187,19 +195,21 @@ def fit_joint(
     prior: Prior,
     noise_rad: float,
     *,
-    starts: Sequence[Array] = (),
+    start: Array | None = None,
     modes: bool = True,
 ) -> JointFit:
-    """Fit all pushes together, from ``starts`` or from several places of the prior.
+    """Fit all pushes together, from ``start`` or from several places of the prior.
 
     ``noise_rad`` is the sd of the encoder: step and jitter. The best mode is returned. ``modes``:
     others are sought around it, and one that explains the pushes as well widens its interval; a fit
     that only plans the next push does without, at a fifth of the time.
     """
     problem = _Problem(pushes, prior, noise_rad)
+    starts = _starts(pushes, prior) if start is None else [start]
+    if start is not None and modes:
+        starts += perturbed(start)
     begun = sorted(
-        (problem.solved(start, FIRST_EVALUATIONS) for start in starts or _starts(pushes, prior)),
-        key=lambda one: one[1],
+        (problem.solved(one, FIRST_EVALUATIONS) for one in starts), key=lambda one: one[1]
     )
     found = []
     for x, _ in begun[:KEPT]:
@@ -208,10 +218,10 @@ def fit_joint(
     best = min(found, key=lambda one: one[1])
     if problem.rescale(best[0]):
         found = []
-        for start in (best[0], *(perturbed(best[0]) if modes else ())):
-            problem.vary(start)
-            found.append(problem.solved(start, EVALUATIONS))
-        best = min(found, key=lambda one: one[1])
+        for x in [best[0], *(perturbed(best[0]) if modes else [])]:
+            problem.vary(x)
+            found.append(problem.solved(x, EVALUATIONS))
+    best = min(found, key=lambda one: one[1])
     problem.vary(best[0])
     fit = problem.posterior(best[0])
     others = [x for x, cost in found if cost < best[1] + 3.0 * max(fit.misfit, 1.0)]
@@ -282,7 +292,8 @@ class _Problem:
         """
         more = x.copy()
         more[NAMES.index("log_coulomb")] += self._friction_sd
-        rubbed = (self._places_of(x) - self._places_of(more)) / self._sd
+        plain, more_rubbed = self._places_of(np.array([x, more]))
+        rubbed = (plain - more_rubbed) / self._sd
         columns = np.column_stack([self._known, rubbed])
         shrunk, evidence = [], 0.0
         for a, b in zip(self._begin[:-1], self._begin[1:], strict=True):
@@ -338,14 +349,20 @@ class _Problem:
         stated = float(np.mean((rest * self._sd / plain) ** 2))
         return JointFit(x, inflated * np.outer(scale, scale), stated, strange)
 
-    def _places_of(self, x: Array) -> Array:
-        inside = np.clip(x, LOW, HIGH)
-        joint = replace(joint_of(inside), turn=self._turn)
-        at = self._at + inside[NAMES.index("delay")]
-        return follow_joint(joint, self._times, self._rests, at, self._torques, STEP_S)
+    def _places_of(self, several: Array) -> Array:
+        """Places (k, samples) of vectors (k, names) whose delay is that of the first."""
+        inside = np.clip(several, LOW, HIGH)
+        at = self._at + inside[0, NAMES.index("delay")]
+        joints = _joints_of(inside, self._turn)
+        places = follow_joints(joints, self._times, self._rests, at, self._torques, STEP_S)
+        return np.nan_to_num(np.clip(places, -RUNAWAY_RAD, RUNAWAY_RAD), nan=RUNAWAY_RAD)
 
     def _residuals(self, x: Array) -> Array:
-        off = np.clip((self._places - self._places_of(x)) / self._sd, -1e6, 1e6)
+        return self._weighed(self._places_of(x[None, :])[0], x)
+
+    def _weighed(self, places: Array, x: Array) -> Array:
+        """Residuals of the pushes, in units of their errors, and of the prior."""
+        off = np.clip((self._places - places) / self._sd, -1e6, 1e6)
         if self._shrunk is not None:
             along = np.add.reduceat(self._effects * off[:, None], self._begin[:-1])
             repeated = np.repeat(along * self._shrunk, np.diff(self._begin), axis=0)
@@ -353,14 +370,16 @@ class _Problem:
         return np.concatenate([off, (x - self._mean) / self._prior_sd])
 
     def _jacobian(self, x: Array) -> Array:
-        base = self._residuals(x)
-        columns = []
-        for index, sd in enumerate(self._prior_sd):
-            step = 1e-3 * sd
-            moved = x.copy()
-            moved[index] += step
-            columns.append((self._residuals(moved) - base) / step)
-        return np.column_stack(columns)
+        """Differences over a thousandth of the prior; only a delay moves the commands in time."""
+        steps = 1e-3 * self._prior_sd
+        moved = x + np.vstack([np.zeros(len(x)), np.diag(steps)])
+        late = 1 + NAMES.index("delay")
+        together = np.delete(np.arange(len(moved)), late)
+        places = np.empty((len(moved), len(self._times)))
+        places[together] = self._places_of(moved[together])
+        places[late] = self._places_of(moved[[late]])[0]
+        rows = [self._weighed(one, at) for one, at in zip(places, moved, strict=True)]
+        return np.column_stack([(row - rows[0]) / by for row, by in zip(rows[1:], steps, strict=True)])
 
 
 def _prior_of(prior: Prior) -> tuple[Array, Array]:

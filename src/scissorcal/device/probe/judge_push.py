@@ -18,6 +18,8 @@ MOTORS, SENSORS = "probe.motors", "probe.sensors"
 MISFIT_LIMIT = 15.0
 """Mean square of the residuals over their errors. Joints of another friction law stay below it, a
 loose coupling or blades that touch something do not (figures in decision 175)."""
+MOST_LOG_SPREAD = math.log(1e3)
+"""An inertia that is known to a factor of a thousand is not known; its sd may be anything."""
 WIDEST_SD = 0.3
 """Of ln inertia: gains that hold at both ends of its interval of 90 % then lose half of their
 margin, which is what a gain margin of 2 allows."""
@@ -142,7 +144,7 @@ def judge_joint(swung: Swung, axis: Axis, tick_s: float, lag_ticks: float) -> Ou
     """Whether inertia and friction explain the pushes, and are known well enough."""
     check, fit = "inertia", swung.fit
     sd = fit.sd("log_inertia")
-    spread = math.exp(NORMAL_90 * fit.inertia.sd / fit.inertia.mean)
+    spread = math.exp(min(NORMAL_90 * fit.inertia.sd / fit.inertia.mean, MOST_LOG_SPREAD))
     inertia = 1e6 * fit.inertia.mean
     if not fit.misfit <= MISFIT_LIMIT:
         why = (

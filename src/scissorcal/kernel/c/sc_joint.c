@@ -7,6 +7,17 @@
 static const double PHASE = 0.6;
 static const double SHORTEST_STEP = 5e-5;
 
+/* What the steps take, a column for each joint, so that compilers do several at once. */
+typedef struct {
+    double place[SC_JOINTS], rate[SC_JOINTS], motor[SC_JOINTS];
+    double fine[SC_JOINTS], slow[SC_JOINTS];
+    double opening[SC_JOINTS], closing[SC_JOINTS], rise[SC_JOINTS], per_rate[SC_JOINTS];
+    double per_inertia[SC_JOINTS], viscous[SC_JOINTS], bristle[SC_JOINTS];
+    double per_fine[SC_JOINTS], per_slow[SC_JOINTS], share[SC_JOINTS];
+    double carrying[SC_JOINTS], slope[SC_JOINTS], turn[SC_JOINTS];
+    double follow[SC_JOINTS], missing[SC_JOINTS];
+} columns;
+
 /* exp(-x) for x >= 0: right to x^4 / 24 where x is small, and falling to 0 for all x. */
 static double decay(double x)
 {
@@ -22,18 +33,84 @@ static double longest_step(const sc_joint *joint, double most)
     return fmax(fmin(step, most), SHORTEST_STEP);
 }
 
-void sc_joint_follow(const sc_joint *joint, const double *times, const double *rests, size_t count,
-                     const double *switches, const double *torques, size_t commands, double step,
-                     double *places)
+static void set_up(columns *c, const sc_joint *joint, size_t joints)
 {
-    double place = 0.0, rate = 0.0, motor = 0.0, command = 0.0, ahead = 0.0;
-    double fine = 0.0, slow = 0.0;
-    const double longest = longest_step(joint, step);
-    const double per_fine = 1.0 / joint->fine, per_slow = 1.0 / joint->slow;
+    for (size_t j = 0; j < joints; j++) {
+        c->place[j] = c->rate[j] = c->motor[j] = c->fine[j] = c->slow[j] = 0.0;
+        c->opening[j] = joint[j].opening;
+        c->closing[j] = joint[j].closing;
+        c->rise[j] = joint[j].rise;
+        c->per_rate[j] = 1.0 / joint[j].rise_rate;
+        c->per_inertia[j] = 1.0 / joint[j].inertia;
+        c->viscous[j] = joint[j].viscous;
+        c->bristle[j] = joint[j].bristle;
+        c->per_fine[j] = 1.0 / joint[j].fine;
+        c->per_slow[j] = 1.0 / joint[j].slow;
+        c->share[j] = joint[j].slow_share;
+        c->carrying[j] = joint[j].carrying;
+        c->slope[j] = joint[j].carrying_slope;
+        c->turn[j] = joint[j].turn;
+    }
+}
+
+/* How the motors follow a command over a step, and what of it is missing on average. */
+static void set_lags(columns *c, const sc_joint *joint, size_t joints, double dt)
+{
+    for (size_t j = 0; j < joints; j++) {
+        const double lag = joint[j].motor_lag;
+        c->follow[j] = lag > 0.0 ? -expm1(-dt / lag) : 1.0;
+        c->missing[j] = c->follow[j] * lag / dt;
+    }
+}
+
+static void take_step(columns *c, size_t joints, double command, double dt)
+{
+    for (size_t j = 0; j < joints; j++) {
+        const double rate = c->rate[j], fine = c->fine[j], slow = c->slow[j];
+        const double short_of = c->motor[j] - command;
+        const double acting = command + c->missing[j] * short_of;
+        c->motor[j] -= c->follow[j] * short_of;
+        const double built = fine + c->share[j] * (slow - fine);
+        const double level = built > 0.0 ? c->opening[j] : c->closing[j];
+        const double over = rate * c->per_rate[j];
+        const double torque = acting + c->carrying[j] + c->slope[j] * (c->place[j] - c->turn[j]) -
+                              (level + c->rise[j] * decay(over * over)) * built;
+        const double yields = 1.0 - (rate < 0.0 ? -fine : fine);
+        const double damping = c->viscous[j] + c->bristle[j] * yields;
+        const double by = dt * c->per_inertia[j];
+        const double next = (rate + by * torque) / (1.0 + by * damping);
+        const double way = dt * next;
+        const double size = fabs(way), sign = way < 0.0 ? -1.0 : 1.0;
+        c->rate[j] = next;
+        c->place[j] += way;
+        c->fine[j] = sign - (sign - fine) * decay(size * c->per_fine[j]);
+        c->slow[j] = sign - (sign - slow) * decay(size * c->per_slow[j]);
+    }
+}
+
+/* What friction of a joint that something carries has built up before anything is known of it. */
+static void hold(columns *c, const sc_joint *joint, size_t joints)
+{
+    for (size_t j = 0; j < joints; j++) {
+        const double carrying = joint[j].carrying;
+        const double level = carrying > 0.0 ? joint[j].opening : joint[j].closing;
+        const double built = carrying / fmax(level + joint[j].rise, 1e-12);
+        c->fine[j] = c->slow[j] = fmax(-0.999, fmin(0.999, built));
+    }
+}
+
+void sc_joint_follow(const sc_joint *joint, size_t joints, const double *times, const double *rests,
+                     size_t count, const double *switches, const double *torques, size_t commands,
+                     double step, double *places)
+{
+    columns c;
+    double command = 0.0, ahead = 0.0, known_dt = -1.0;
     size_t next = 0;
-    if (count == 0)
+    if (count == 0 || joints == 0 || joints > SC_JOINTS)
         return;
+    const double longest = longest_step(joint, step);
     double now = times[0];
+    set_up(&c, joint, joints);
     for (size_t i = 0; i < count; i++) {
         while (now < times[i]) {
             double until = times[i];
@@ -41,44 +118,26 @@ void sc_joint_follow(const sc_joint *joint, const double *times, const double *r
                 command = torques[next++];
             if (next < commands && switches[next] < until)
                 until = switches[next];
-            const double left = until - now;
-            const double steps = ceil(left / longest - 1e-9);
-            const double dt = left / steps;
-            const double lag = joint->motor_lag;
-            const double follow = lag > 0.0 ? -expm1(-dt / lag) : 1.0;
-            const double missing = follow * lag / dt; /* of the command, on average over a step */
-            for (double done = 0.0; done < steps; done += 1.0) {
-                const double share = joint->slow_share;
-                const double acting = command + missing * (motor - command);
-                motor += follow * (command - motor);
-                const double built = (1.0 - share) * fine + share * slow;
-                const double level = built > 0.0 ? joint->opening : joint->closing;
-                const double over = rate / joint->rise_rate;
-                const double rise = joint->rise > 0.0 ? joint->rise * decay(over * over) : 0.0;
-                const double torque = acting + joint->carrying +
-                                      joint->carrying_slope * (place - joint->turn) -
-                                      (level + rise) * built;
-                const double yields = 1.0 - (rate < 0.0 ? -fine : fine);
-                const double damping = joint->viscous + joint->bristle * yields;
-                rate = (rate + dt * torque / joint->inertia) / (1.0 + dt * damping / joint->inertia);
-                const double way = dt * rate;
-                place += way;
-                const double sign = way < 0.0 ? -1.0 : 1.0;
-                fine = sign - (sign - fine) * decay(fabs(way) * per_fine);
-                slow = sign - (sign - slow) * decay(fabs(way) * per_slow);
+            const double steps = ceil((until - now) / longest - 1e-9);
+            const double dt = (until - now) / steps;
+            if (fabs(dt - known_dt) > 1e-9 * dt) {
+                set_lags(&c, joint, joints, dt);
+                known_dt = dt;
             }
+            for (double done = 0.0; done < steps; done += 1.0)
+                take_step(&c, joints, command, dt);
             now = until;
-            ahead = 0.5 * dt * rate; /* a symplectic place is half a step ahead of its time */
+            ahead = 0.5 * dt; /* a symplectic place is half a step ahead of its time */
         }
+        if (i == 0)
+            hold(&c, joint, joints);
         if (i == 0 || isfinite(rests[i])) {
-            place = isfinite(rests[i]) ? rests[i] : place;
-            rate = ahead = 0.0;
-            if (i == 0 && joint->carrying != 0.0) {
-                const double level = joint->carrying > 0.0 ? joint->opening : joint->closing;
-                const double built = joint->carrying / fmax(level + joint->rise, 1e-12);
-                fine = slow = fmax(-0.999, fmin(0.999, built));
+            for (size_t j = 0; j < joints; j++) {
+                c.place[j] = isfinite(rests[i]) ? rests[i] : c.place[j];
+                c.rate[j] = 0.0;
             }
         }
-        places[i] = place - ahead;
+        for (size_t j = 0; j < joints; j++)
+            places[j * count + i] = c.place[j] - ahead * c.rate[j];
     }
 }

@@ -1,13 +1,14 @@
-/* A joint pushed by a motor, simulated along a record: what a probe compares with the encoder. */
+/* Joints pushed by a motor, simulated along a record: what a probe compares with the encoder. */
 #ifndef SC_JOINT_H
 #define SC_JOINT_H
 
 #include <stddef.h>
 
 /* Inertia (kg m^2). Dry friction (N m) of each direction, reached over two lengths (rad) after a
- * reversal, the slow one for a share of it, and the damping of what yields (N m s/rad); what it is more at rest, falling by exp(-(w / rate)^2);
- * viscous (N m s/rad). The torque (N m) that carries the blades at `turn` (rad) and its slope over
- * the opening (N m/rad). Time constant of the motor (s). */
+ * reversal, the slow one for a share of it, and the damping of what yields (N m s/rad); what it is
+ * more at rest, falling by exp(-(w / rate)^2); viscous (N m s/rad). The torque (N m) that carries
+ * the blades at `turn` (rad) and its slope over the opening (N m/rad). Time constant of the motor
+ * (s). */
 typedef struct {
     double inertia;
     double opening, closing;
@@ -18,13 +19,17 @@ typedef struct {
     double motor_lag;
 } sc_joint;
 
-/* Places (rad) of the joint at `count` times (s, ascending). The motor's command changes to
- * `torques[k]` at `switches[k]` (s, ascending), and is 0 before. At the first time and wherever
- * `rests[i]` is finite the joint stands there: it is put to that place at rest, with what its
- * friction has built up. Steps are at most `step` (s) and short enough for the stiffest presliding.
- */
-void sc_joint_follow(const sc_joint *joint, const double *times, const double *rests, size_t count,
-                     const double *switches, const double *torques, size_t commands, double step,
-                     double *places);
+/* Most joints that are followed at once: the fit's joint beside those that differ in one value. */
+enum { SC_JOINTS = 16 };
+
+/* Places (rad) of `joints` joints (SC_JOINTS at most) at `count` times (s, ascending): those of
+ * joint j are places[j * count] and on. The motor's command changes to `torques[k]` at
+ * `switches[k]` (s, ascending), and is 0 before. At the first time and wherever `rests[i]` is
+ * finite the joint stands there: it is put to that place at rest, with what its friction has built
+ * up. Steps are at most `step` (s) and short enough for the stiffest presliding of the first joint;
+ * all take the same, so that places differ by the joints alone. */
+void sc_joint_follow(const sc_joint *joint, size_t joints, const double *times, const double *rests,
+                     size_t count, const double *switches, const double *torques, size_t commands,
+                     double step, double *places);
 
 #endif

@@ -1,0 +1,43 @@
+"""Commands that probe a virtual rig first get what one probe of it found, made once in a run."""
+
+import shutil
+from collections.abc import Iterator
+from hashlib import sha256
+from typing import Any
+
+import pytest
+
+from scissorcal.device.link import Link
+from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.probe.result import ProbeResult
+from scissorcal.recipe.schema import Recipe
+from scissorcal.workday.runs import probe
+from scissorcal.workday.workspace import Workspace
+from tests.made_once import made_once
+
+
+@pytest.fixture(autouse=True)
+def probed_once(
+    request: pytest.FixtureRequest,
+    tmp_path_factory: pytest.TempPathFactory,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Iterator[None]:
+    """Probe each virtual rig once in a run; a test marked ``probes`` probes by itself."""
+    real = probe.probe_into
+
+    def kept(workspace: Workspace, link: Link, recipe: Recipe, **how: Any) -> ProbeResult:
+        if type(link) is not LockstepLink:
+            return real(workspace, link, recipe, **how)
+        told = f"{link.identity!r} {recipe.specimen} {recipe.rig.model_dump_json()}"
+        key = sha256(told.encode()).hexdigest()[:16]
+        folder = made_once(
+            tmp_path_factory, f"probe {key}", lambda made: real(Workspace(made), link, recipe, **how)
+        )
+        shutil.copy(Workspace(folder).probe_path, workspace.probe_path)
+        found = probe.last_probe(workspace)
+        assert found is not None
+        return found
+
+    if request.node.get_closest_marker("probes") is None:
+        monkeypatch.setattr(probe, "probe_into", kept)
+    yield
