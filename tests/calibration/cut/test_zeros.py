@@ -48,9 +48,13 @@ def test_zeros_do_not_change_the_material() -> None:
     moved = np.flatnonzero(cut.samples["stroke"] >= 0)
     bare = replace(cut, samples=cut.samples[moved[0] - 200 : moved[-1] + 200])
     for fit in (shifted, fitted(recipe, empty, bare)):
-        for name in ("fracture_energy", "response_force"):
-            one, other = plain.parameter(name), fit.parameter(name)
-            assert other.mean == pytest.approx(one.mean, abs=0.5 * one.sd)
         verdict = next(one for one in fit.verdicts if one.check == "torque zero")
         assert verdict.status == "pass"
         assert "subtracted" in verdict.why
+        assert verdict.value is not None
+        # The bare recording rests for 0.4 s: its zero is another one, by no more than it states.
+        share = 0.0 if fit is shifted else verdict.value
+        for name in ("fracture_energy", "response_force"):
+            one, other = plain.parameter(name), fit.parameter(name)
+            allowed = 0.1 * one.sd + share * abs(one.mean)
+            assert other.mean == pytest.approx(one.mean, abs=allowed)

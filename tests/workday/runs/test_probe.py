@@ -49,6 +49,7 @@ def test_the_first_run_probes_and_the_next_ones_do_not(workspace: Workspace) -> 
     ]
 
 
+@pytest.mark.probes
 def test_an_old_probe_another_rig_and_another_sign_do_not_count(workspace: Workspace) -> None:
     recipe = workspace.recipe()
     first = ensure_probed(workspace, virtual_rig(), recipe)

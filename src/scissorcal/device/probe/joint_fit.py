@@ -208,19 +208,12 @@ def fit_joint(
     starts = _starts(pushes, prior) if start is None else [start]
     if start is not None and modes:
         starts += perturbed(start)
-    begun = sorted(
-        (problem.solved(one, FIRST_EVALUATIONS) for one in starts), key=lambda one: one[1]
-    )
-    found = []
-    for x, _ in begun[:KEPT]:
-        problem.vary(x)
-        found.append(problem.solved(x, EVALUATIONS))
+    found = problem.best_of(starts)
     best = min(found, key=lambda one: one[1])
     if problem.rescale(best[0]):
-        found = []
-        for x in [best[0], *(perturbed(best[0]) if modes else [])]:
-            problem.vary(x)
-            found.append(problem.solved(x, EVALUATIONS))
+        found = [problem.solved(best[0])]
+        if modes:
+            found += problem.best_of(perturbed(found[0][0]))
     best = min(found, key=lambda one: one[1])
     problem.vary(best[0])
     fit = problem.posterior(best[0])
@@ -304,8 +297,19 @@ class _Problem:
             evidence += float(np.log(root).sum())
         self._shrunk, self._evidence = np.array(shrunk), evidence
 
-    def solved(self, start: Array, evaluations: int) -> tuple[Array, float]:
-        """Values and half the sum of squares of a mode, or of the best so far."""
+    def best_of(self, starts: Sequence[Array]) -> list[tuple[Array, float]]:
+        """Modes from the KEPT starts that are the best after a few evaluations."""
+        self._shrunk, self._evidence = None, 0.0
+        begun = [self._climbed(start, FIRST_EVALUATIONS) for start in starts]
+        begun.sort(key=lambda one: one[1])
+        return [self.solved(x) for x, _ in begun[:KEPT]]
+
+    def solved(self, start: Array) -> tuple[Array, float]:
+        """Values and minus the log of the posterior at a mode, up to a constant."""
+        self.vary(start)
+        return self._climbed(start, EVALUATIONS)
+
+    def _climbed(self, start: Array, evaluations: int) -> tuple[Array, float]:
         from scipy.optimize import least_squares
 
         done = least_squares(
@@ -358,16 +362,17 @@ class _Problem:
         return np.nan_to_num(np.clip(places, -RUNAWAY_RAD, RUNAWAY_RAD), nan=RUNAWAY_RAD)
 
     def _residuals(self, x: Array) -> Array:
-        return self._weighed(self._places_of(x[None, :])[0], x)
+        return self._weighed(self._places_of(x[None, :]), x[None, :])[0]
 
-    def _weighed(self, places: Array, x: Array) -> Array:
-        """Residuals of the pushes, in units of their errors, and of the prior."""
+    def _weighed(self, places: Array, several: Array) -> Array:
+        """Residuals (k, samples and names) of pushes and prior, in units of their errors."""
         off = np.clip((self._places - places) / self._sd, -1e6, 1e6)
         if self._shrunk is not None:
-            along = np.add.reduceat(self._effects * off[:, None], self._begin[:-1])
-            repeated = np.repeat(along * self._shrunk, np.diff(self._begin), axis=0)
-            off -= (self._effects * repeated).sum(axis=1)
-        return np.concatenate([off, (x - self._mean) / self._prior_sd])
+            begin, sizes = self._begin[:-1], np.diff(self._begin)
+            for effect, shrunk in zip(self._effects.T, self._shrunk.T, strict=True):
+                along = np.add.reduceat(effect * off, begin, axis=1)
+                off = off - effect * np.repeat(along * shrunk, sizes, axis=1)
+        return np.hstack([off, (several - self._mean) / self._prior_sd])
 
     def _jacobian(self, x: Array) -> Array:
         """Differences over a thousandth of the prior; only a delay moves the commands in time."""
@@ -378,8 +383,8 @@ class _Problem:
         places = np.empty((len(moved), len(self._times)))
         places[together] = self._places_of(moved[together])
         places[late] = self._places_of(moved[[late]])[0]
-        rows = [self._weighed(one, at) for one, at in zip(places, moved, strict=True)]
-        return np.column_stack([(row - rows[0]) / by for row, by in zip(rows[1:], steps, strict=True)])
+        rows = self._weighed(places, moved)
+        return np.asarray((rows[1:] - rows[0]).T / steps)
 
 
 def _prior_of(prior: Prior) -> tuple[Array, Array]:
