@@ -1,12 +1,12 @@
 """Whole days on a rig that is not part of this project, in real time, through the command line.
 
-    python -m benchmarks.stranger_days --rig ../shared/rig/rig.py --count 12 [--first 1] [--json FILE]
+    python -m benchmarks.stranger_days --count 12 [--first 1] [--rig PROGRAM] [--json FILE]
 
 The rig is a program that serves a device on a pseudo-terminal and takes orders on a socket; where
 it is absent, this says so and ends. Each day has other parameters: the encoder's counts, the share
-of the load in friction, zeros of the sensors, paper or cotton. A person is played: who moves the
-blades by hand when asked, puts in a fresh piece, and presses Enter. A day is `device probe`, `capture
-friction`, `fit friction`, `capture cut`, `fit cut`, `package`, as a newcomer types them; nothing is
+of the load in friction, zeros of the sensors, paper or cotton. A person is played who moves the
+blades by hand when asked, puts in a fresh piece, and presses Enter. A day is what a newcomer types:
+`device probe`, `capture friction`, `fit friction`, `capture cut`, `fit cut`, `package`; nothing is
 overridden. It ends in a package, or at the first command that exits with something else.
 
 The package's torque is compared with the rig's own average torque minus its friction over closing
@@ -109,7 +109,15 @@ class Stranger:
         self._address = str(folder / "ctl")
         words = [part for name, value in changed.items() for part in ("-p", f"{name}={value}")]
         self._process = subprocess.Popen(
-            [sys.executable, str(program), "--link", str(self.port), "--control", self._address, *words],
+            [
+                sys.executable,
+                str(program),
+                "--link",
+                str(self.port),
+                "--control",
+                self._address,
+                *words,
+            ],
             stdout=subprocess.PIPE,
             text=True,
         )
@@ -131,12 +139,16 @@ class Stranger:
             return
         self.order("sheet 0")
         if "close the blades by hand" in request:
-            self._hold({"hand_closed": -0.05, "hand_open": 1.25, "hand_rest": 2.0}, lambda at: at < 0.05)
+            self._hold(
+                {"hand_closed": -0.05, "hand_open": 1.25, "hand_rest": 2.0}, lambda at: at < 0.05
+            )
         elif "open the blades by hand" in request:
             self._until(lambda at: at > 1.08)
         elif "half open" in request:
             time.sleep(4.5)
-            self._hold({"hand_closed": 0.5, "hand_open": 0.55, "hand_rest": 0.2}, lambda at: at > 0.45)
+            self._hold(
+                {"hand_closed": 0.5, "hand_open": 0.55, "hand_rest": 0.2}, lambda at: at > 0.45
+            )
             time.sleep(2.5)
             self.order("hand 0 0")
 
@@ -249,7 +261,11 @@ def one_day(program: Path, module: Any, seed: int, keep: Path | None) -> Row:
 
 def against_truth(folder: Path, truth: Any) -> tuple[float, float]:
     """Rms of the package's torque minus the truth over the largest; share of places in the band."""
-    (path,) = folder.glob("**/*.scissors") if list(folder.glob("**/*.scissors")) else folder.glob("package*")
+    (path,) = (
+        folder.glob("**/*.scissors")
+        if list(folder.glob("**/*.scissors"))
+        else folder.glob("package*")
+    )
     package = open_package(path, warn=False)
     ranges = package.manifest.ranges
     opening, contact, rate = (

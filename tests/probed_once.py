@@ -1,7 +1,6 @@
 """Commands that probe a virtual rig first get what one probe of it found, made once in a run."""
 
 import shutil
-from collections.abc import Iterator
 from hashlib import sha256
 from typing import Any
 
@@ -21,7 +20,7 @@ def probed_once(
     request: pytest.FixtureRequest,
     tmp_path_factory: pytest.TempPathFactory,
     monkeypatch: pytest.MonkeyPatch,
-) -> Iterator[None]:
+) -> None:
     """Probe each virtual rig once in a run; a test marked ``probes`` probes by itself."""
     real = probe.probe_into
 
@@ -31,7 +30,9 @@ def probed_once(
         told = f"{link.identity!r} {recipe.specimen} {recipe.rig.model_dump_json()}"
         key = sha256(told.encode()).hexdigest()[:16]
         folder = made_once(
-            tmp_path_factory, f"probe {key}", lambda made: real(Workspace(made), link, recipe, **how)
+            tmp_path_factory,
+            f"probe {key}",
+            lambda made: real(Workspace(made), link, recipe, **how),
         )
         shutil.copy(Workspace(folder).probe_path, workspace.probe_path)
         found = probe.last_probe(workspace)
@@ -40,4 +41,3 @@ def probed_once(
 
     if request.node.get_closest_marker("probes") is None:
         monkeypatch.setattr(probe, "probe_into", kept)
-    yield

@@ -39,7 +39,7 @@ def follow_joint(
 ) -> Array:
     """Places (rad) of one joint at ``times`` (n,), as `follow_joints` has those of several."""
     values = np.array([[getattr(joint, entry.name) for entry in fields(Joint)]])
-    return follow_joints(values, times, rests, switches, torques, step_s)[0]
+    return np.asarray(follow_joints(values, times, rests, switches, torques, step_s)[0])
 
 
 def follow_joints(

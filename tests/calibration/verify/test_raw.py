@@ -57,7 +57,7 @@ def day() -> Day:
 
 @pytest.mark.parametrize("load_share", [0.0, 0.1])
 def test_another_materials_parameters_and_teeth_are_recovered(day: Day, load_share: float) -> None:
-    """Force, exponent, energy and kappa within four standard deviations, and kappa to 1 %.
+    """Force, exponent, energy and kappa within four standard deviations; kappa to 1 % on average.
 
     The material has nothing of the one that was cut: what is found is what was put in.
     """
@@ -89,14 +89,17 @@ def test_another_materials_parameters_and_teeth_are_recovered(day: Day, load_sha
             stroke_sd=known.stroke_sd,
         ),
     )
-    rng = np.random.default_rng(5)
-    made = simulate_cut(motion_of((day.cuts,), known.inertia), truth, rng)
-    fit = fit_cut(made, recipe, day.friction, effort="standard", rng=rng)
-    assert not [note for note in fit.notes if "Kappa is poorly determined" in note]
-    for name, value in wanted.items():
-        found = fit.parameter(name)
-        assert abs(found.mean - value) < 4.0 * found.sd, name
-    assert fit.parameter("kappa").mean == pytest.approx(0.68, rel=0.01)
+    kappas = []
+    for seed in (5, 6, 7, 8):
+        rng = np.random.default_rng(seed)
+        made = simulate_cut(motion_of((day.cuts,), known.inertia), truth, rng)
+        fit = fit_cut(made, recipe, day.friction, effort="standard", rng=rng)
+        assert not [note for note in fit.notes if "Kappa is poorly determined" in note]
+        for name, value in wanted.items():
+            found = fit.parameter(name)
+            assert abs(found.mean - value) < 4.0 * found.sd, name
+        kappas.append(fit.parameter("kappa").mean)
+    assert np.mean(kappas) == pytest.approx(0.68, rel=0.01)  # one fit's sd is 0.3 to 1 %
 
 
 def test_the_fit_of_friction_is_calibrated_on_raw_samples(day: Day) -> None:

@@ -12,12 +12,25 @@ inflated by the misfit and by how long residuals stay alike.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.probe.idle import correlation_time
+from scissorcal.device.probe.joint_values import (
+    HIGH,
+    LOW,
+    NAMES,
+    WORDS,
+    Prior,
+    Push,
+    joint_of,
+    joints_of,
+    perturbed,
+    prior_of,
+    starts_of,
+)
 from scissorcal.kernel.joint import Joint, follow_joint, follow_joints
 from scissorcal.recording.probe import Estimate
 
@@ -48,36 +61,6 @@ RUNAWAY_RAD = 1e3
 """A joint on a falling slope may run away in a trial of the search: so far and no farther."""
 COAST_S, TRAVEL_STEP_S = 0.15, 1e-3
 FIRST_EVALUATIONS, EVALUATIONS, KEPT = 8, 60, 2
-
-
-@dataclass(frozen=True)
-class Push:
-    """One push as it was heard.
-
-    ``times`` (s) and ``places`` (rad) of its states from rest to rest; ``at`` and ``torques``:
-    when the states were measured that commands answer, and what they command (N m). ``rested``:
-    the blades stood when it began.
-    """
-
-    times: Array
-    places: Array
-    at: Array
-    torques: Array
-    rested: bool = True
-
-    @property
-    def way(self) -> float:
-        """The largest distance from where it began (rad)."""
-        return float(np.abs(self.places - self.places[0]).max())
-
-
-@dataclass(frozen=True)
-class Prior:
-    """What is known before: the delay (s) as flags show it, and the torque that first moved."""
-
-    delay_s: float
-    delay_sd_s: float
-    breakaway_Nm: float
 
 
 @dataclass(frozen=True)
@@ -130,66 +113,6 @@ class JointFit:
         return Estimate(self.value("delay") + lag, math.hypot(math.sqrt(variance), LEFT_OUT_S))
 
 
-NAMES = (
-    "log_inertia",
-    "log_coulomb",
-    "asymmetry",
-    "log_viscous",
-    "log_rise_share",
-    "log_rise_rate",
-    "log_fine",
-    "log_slow",
-    "slow_logit",
-    "log_bristle",
-    "carrying",
-    "carrying_slope",
-    "delay",
-    "log_lag",
-)
-WORDS = {
-    "log_inertia": "an inertia (kg m^2)",
-    "log_coulomb": "a dry friction (N m)",
-    "carrying": "a torque (N m) that carries the blades",
-}
-"""Values whose strangeness ends a probe, as people call them."""
-LOW = np.array(
-    [math.log(1e-6), math.log(1e-5), -0.8, math.log(1e-6), -7.0, math.log(5e-3), math.log(2e-5),
-     math.log(2e-5), -6.0, math.log(1e-7), -0.5, -3.0, -0.01, math.log(1e-5)]
-)  # fmt: skip
-HIGH = np.array(
-    [math.log(0.1), math.log(1.0), 0.8, math.log(1.0), 0.5, math.log(3.0), math.log(0.2),
-     math.log(0.4), 6.0, math.log(1.0), 0.5, 3.0, 0.2, math.log(0.03)]
-)  # fmt: skip
-
-
-def joint_of(values: Array) -> Joint:
-    """The joint of a vector of `NAMES`."""
-    return Joint(*(float(value) for value in _joints_of(values[None, :], 0.0)[0]))
-
-
-def _joints_of(values: Array, turn: float) -> Array:
-    """Joints (k, fields of `Joint`) of vectors of `NAMES` (k, names), in `Joint`'s order."""
-    x = dict(zip(NAMES, values.T, strict=True))
-    coulomb = np.exp(x["log_coulomb"])
-    columns = {
-        "inertia": np.exp(x["log_inertia"]),
-        "opening": coulomb * (1.0 + x["asymmetry"]),
-        "closing": coulomb * (1.0 - x["asymmetry"]),
-        "rise": coulomb * np.exp(x["log_rise_share"]),
-        "rise_rate": np.exp(x["log_rise_rate"]),
-        "viscous": np.exp(x["log_viscous"]),
-        "fine": np.exp(x["log_fine"]),
-        "slow": np.exp(x["log_slow"]),
-        "slow_share": 1.0 / (1.0 + np.exp(-x["slow_logit"])),
-        "bristle": np.exp(x["log_bristle"]),
-        "carrying": x["carrying"],
-        "carrying_slope": x["carrying_slope"],
-        "turn": np.full(len(values), turn),
-        "motor_lag": np.exp(x["log_lag"]),
-    }
-    return np.column_stack([columns[entry.name] for entry in fields(Joint)])
-
-
 def fit_joint(
     pushes: Sequence[Push],
     prior: Prior,
@@ -205,7 +128,7 @@ def fit_joint(
     that only plans the next push does without, at a fifth of the time.
     """
     problem = _Problem(pushes, prior, noise_rad)
-    starts = _starts(pushes, prior) if start is None else [start]
+    starts = starts_of(pushes, prior) if start is None else [start]
     if start is not None and modes:
         starts += perturbed(start)
     found = problem.best_of(starts)
@@ -259,7 +182,7 @@ class _Problem:
         self._effects = np.zeros((len(self._sd), 2))
         self._shrunk: Array | None = None
         self._evidence = 0.0
-        self._mean, self._prior_sd = _prior_of(prior)
+        self._mean, self._prior_sd = prior_of(prior)
 
     def rescale(self, x: Array) -> bool:
         """Lower the errors of the law to what the residuals at ``x`` show; False where they fit.
@@ -357,12 +280,12 @@ class _Problem:
         """Places (k, samples) of vectors (k, names) whose delay is that of the first."""
         inside = np.clip(several, LOW, HIGH)
         at = self._at + inside[0, NAMES.index("delay")]
-        joints = _joints_of(inside, self._turn)
+        joints = joints_of(inside, self._turn)
         places = follow_joints(joints, self._times, self._rests, at, self._torques, STEP_S)
         return np.nan_to_num(np.clip(places, -RUNAWAY_RAD, RUNAWAY_RAD), nan=RUNAWAY_RAD)
 
     def _residuals(self, x: Array) -> Array:
-        return self._weighed(self._places_of(x[None, :]), x[None, :])[0]
+        return np.asarray(self._weighed(self._places_of(x[None, :]), x[None, :])[0])
 
     def _weighed(self, places: Array, several: Array) -> Array:
         """Residuals (k, samples and names) of pushes and prior, in units of their errors."""
@@ -385,70 +308,6 @@ class _Problem:
         places[late] = self._places_of(moved[[late]])[0]
         rows = self._weighed(places, moved)
         return np.asarray((rows[1:] - rows[0]).T / steps)
-
-
-def _prior_of(prior: Prior) -> tuple[Array, Array]:
-    """Means and sds of `NAMES`, wide but for the delay.
-
-    Scissors and what is built like them: 5e-5 to 3e-3 kg m^2; what first moves the blades may be
-    breakaway, or a tenth of it where they yield far; presliding of 0.1 to 30 mrad.
-    """
-    mean = [math.log(4e-4), math.log(1.3 * prior.breakaway_Nm), 0.0, math.log(2e-3),
-            math.log(0.15), math.log(0.1), math.log(1e-3), math.log(6e-3), -1.0, math.log(3e-3),
-            0.0, 0.0, prior.delay_s, math.log(8e-4)]  # fmt: skip
-    sd = [1.5, 1.2, 0.15, 1.0, 1.0, 0.7, 1.3, 1.3, 1.5, 1.5, 0.3 * prior.breakaway_Nm + 2e-3,
-          0.03, prior.delay_sd_s, 1.0]  # fmt: skip
-    return np.array(mean), np.array(sd)
-
-
-def _starts(pushes: Sequence[Push], prior: Prior) -> list[Array]:
-    """Light, middle and heavy blades; all, a third or a tenth of the friction moved them.
-
-    What moves the blades may only yield, so friction is anything above; its presliding follows
-    from it and from how far the pushes went that returned.
-    """
-    mean, _ = _prior_of(prior)
-    stiffness = _stiffness(pushes, prior)
-    found = []
-    for log_inertia in (math.log(1e-4), math.log(4e-4), math.log(1.6e-3)):
-        for factor in (1.0, 3.0, 10.0):
-            start = mean.copy()
-            coulomb = factor * prior.breakaway_Nm
-            start[NAMES.index("log_inertia")] = log_inertia
-            start[NAMES.index("log_coulomb")] = math.log(coulomb)
-            start[NAMES.index("log_fine")] = math.log(coulomb / stiffness)
-            start[NAMES.index("log_slow")] = math.log(3.0 * coulomb / stiffness)
-            found.append(start)
-    return found
-
-
-def _stiffness(pushes: Sequence[Push], prior: Prior) -> float:
-    """Torque over way (N m/rad) of the pushes that breakaway exceeds: what yields."""
-    found = []
-    for push in pushes:
-        torque = float(np.abs(push.torques).max())
-        if torque <= prior.breakaway_Nm and push.way > 0.0:
-            found.append(torque / push.way)
-    stiffest = prior.breakaway_Nm / 1e-4
-    return min(float(np.median(found)), stiffest) if found else stiffest
-
-
-def perturbed(values: Array) -> list[Array]:
-    """Starts from which another mode would be found: what pushes confuse, moved apart."""
-    found = []
-    for moves in (
-        {"log_inertia": 0.5, "delay": -1.5e-3},
-        {"log_inertia": -0.5, "delay": 1.5e-3},
-        {"log_fine": 1.5},
-        {"log_lag": -0.7, "log_bristle": -1.0},
-        {"log_lag": 0.7, "delay": -7e-4},
-        {"log_inertia": 0.1, "log_lag": -0.5, "log_bristle": -3.0},
-    ):
-        start = values.copy()
-        for name, by in moves.items():
-            start[NAMES.index(name)] += by
-        found.append(start)
-    return found
 
 
 def _errors_of(push: Push, noise_rad: float, share: float = 1.0) -> Array:

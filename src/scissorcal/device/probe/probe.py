@@ -17,7 +17,7 @@ from scissorcal.device.probe.hand_pass import (
     virtual_hand,
 )
 from scissorcal.device.probe.idle import Idle, idle, jitters, observed_step
-from scissorcal.device.probe.joint_fit import Prior
+from scissorcal.device.probe.joint_values import Prior
 from scissorcal.device.probe.judge import judge_follow, judge_idle, judge_step, judge_watchdog
 from scissorcal.device.probe.judge_push import (
     BLADES,

@@ -6,14 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.probe.joint_fit import (
-    NAMES,
-    JointFit,
-    Prior,
-    Push,
-    fit_joint,
-    travel_of,
-)
+from scissorcal.device.probe.joint_fit import JointFit, fit_joint, travel_of
+from scissorcal.device.probe.joint_values import NAMES, Prior, Push
 from scissorcal.device.probe.pushes import MOVED_STEPS, Axis, Pushed, push
 from scissorcal.device.probe.talk import Talk
 from scissorcal.kernel import CommandFlag

@@ -247,9 +247,7 @@ def _capture_until(
     minutes = listed_min if until.max_minutes is None else until.max_minutes
     limits = Limits(minutes, until.at_least)
     slowest = max(sweep_bounds(recipe, link.identity, probe)) if kind == "friction" else 0.0
-    choice = UntilTolerance(
-        kind, recipe, link.identity, earlier, limits, slowest_sweep=slowest
-    )
+    choice = UntilTolerance(kind, recipe, link.identity, earlier, limits, slowest_sweep=slowest)
     path = workspace.new_recording(kind)
     text = read_text(workspace.recipe_path)
     with open_writer(path, kind, link, recipe, text, by_parts=True, probe=probe) as writer:

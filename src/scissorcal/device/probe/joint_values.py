@@ -1,0 +1,166 @@
+"""The values of a joint that pushes are fitted with: their names, prior, and where to begin."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.kernel.joint import Joint
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Push:
+    """One push as it was heard.
+
+    ``times`` (s) and ``places`` (rad) of its states from rest to rest; ``at`` and ``torques``:
+    when the states were measured that commands answer, and what they command (N m). ``rested``:
+    the blades stood when it began.
+    """
+
+    times: Array
+    places: Array
+    at: Array
+    torques: Array
+    rested: bool = True
+
+    @property
+    def way(self) -> float:
+        """The largest distance from where it began (rad)."""
+        return float(np.abs(self.places - self.places[0]).max())
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known before: the delay (s) as flags show it, and the torque that first moved."""
+
+    delay_s: float
+    delay_sd_s: float
+    breakaway_Nm: float
+
+
+NAMES = (
+    "log_inertia",
+    "log_coulomb",
+    "asymmetry",
+    "log_viscous",
+    "log_rise_share",
+    "log_rise_rate",
+    "log_fine",
+    "log_slow",
+    "slow_logit",
+    "log_bristle",
+    "carrying",
+    "carrying_slope",
+    "delay",
+    "log_lag",
+)
+WORDS = {
+    "log_inertia": "an inertia (kg m^2)",
+    "log_coulomb": "a dry friction (N m)",
+    "carrying": "a torque (N m) that carries the blades",
+}
+"""Values whose strangeness ends a probe, as people call them."""
+LOW = np.array(
+    [math.log(1e-6), math.log(1e-5), -0.8, math.log(1e-6), -7.0, math.log(5e-3), math.log(2e-5),
+     math.log(2e-5), -6.0, math.log(1e-7), -0.5, -3.0, -0.01, math.log(1e-5)]
+)  # fmt: skip
+HIGH = np.array(
+    [math.log(0.1), math.log(1.0), 0.8, math.log(1.0), 0.5, math.log(3.0), math.log(0.2),
+     math.log(0.4), 6.0, math.log(1.0), 0.5, 3.0, 0.2, math.log(0.03)]
+)  # fmt: skip
+
+
+def joint_of(values: Array) -> Joint:
+    """The joint of a vector of `NAMES`."""
+    return Joint(*(float(value) for value in joints_of(values[None, :], 0.0)[0]))
+
+
+def joints_of(values: Array, turn: float) -> Array:
+    """Joints (k, fields of `Joint`) of vectors of `NAMES` (k, names), in `Joint`'s order."""
+    x = dict(zip(NAMES, values.T, strict=True))
+    coulomb = np.exp(x["log_coulomb"])
+    columns = {
+        "inertia": np.exp(x["log_inertia"]),
+        "opening": coulomb * (1.0 + x["asymmetry"]),
+        "closing": coulomb * (1.0 - x["asymmetry"]),
+        "rise": coulomb * np.exp(x["log_rise_share"]),
+        "rise_rate": np.exp(x["log_rise_rate"]),
+        "viscous": np.exp(x["log_viscous"]),
+        "fine": np.exp(x["log_fine"]),
+        "slow": np.exp(x["log_slow"]),
+        "slow_share": 1.0 / (1.0 + np.exp(-x["slow_logit"])),
+        "bristle": np.exp(x["log_bristle"]),
+        "carrying": x["carrying"],
+        "carrying_slope": x["carrying_slope"],
+        "turn": np.full(len(values), turn),
+        "motor_lag": np.exp(x["log_lag"]),
+    }
+    return np.column_stack([columns[entry.name] for entry in fields(Joint)])
+
+
+def prior_of(prior: Prior) -> tuple[Array, Array]:
+    """Means and sds of `NAMES`, wide but for the delay.
+
+    Scissors and what is built like them: 5e-5 to 3e-3 kg m^2; what first moves the blades may be
+    breakaway, or a tenth of it where they yield far; presliding of 0.1 to 30 mrad.
+    """
+    mean = [math.log(4e-4), math.log(1.3 * prior.breakaway_Nm), 0.0, math.log(2e-3),
+            math.log(0.15), math.log(0.1), math.log(1e-3), math.log(6e-3), -1.0, math.log(3e-3),
+            0.0, 0.0, prior.delay_s, math.log(8e-4)]  # fmt: skip
+    sd = [1.5, 1.2, 0.15, 1.0, 1.0, 0.7, 1.3, 1.3, 1.5, 1.5, 0.3 * prior.breakaway_Nm + 2e-3,
+          0.03, prior.delay_sd_s, 1.0]  # fmt: skip
+    return np.array(mean), np.array(sd)
+
+
+def starts_of(pushes: Sequence[Push], prior: Prior) -> list[Array]:
+    """Light, middle and heavy blades; all, a third or a tenth of the friction moved them.
+
+    What moves the blades may only yield, so friction is anything above; its presliding follows
+    from it and from how far the pushes went that returned.
+    """
+    mean, _ = prior_of(prior)
+    stiffness = _stiffness(pushes, prior)
+    found = []
+    for log_inertia in (math.log(1e-4), math.log(4e-4), math.log(1.6e-3)):
+        for factor in (1.0, 3.0, 10.0):
+            start = mean.copy()
+            coulomb = factor * prior.breakaway_Nm
+            start[NAMES.index("log_inertia")] = log_inertia
+            start[NAMES.index("log_coulomb")] = math.log(coulomb)
+            start[NAMES.index("log_fine")] = math.log(coulomb / stiffness)
+            start[NAMES.index("log_slow")] = math.log(3.0 * coulomb / stiffness)
+            found.append(start)
+    return found
+
+
+def _stiffness(pushes: Sequence[Push], prior: Prior) -> float:
+    """Torque over way (N m/rad) of the pushes that breakaway exceeds: what yields."""
+    found = []
+    for push in pushes:
+        torque = float(np.abs(push.torques).max())
+        if torque <= prior.breakaway_Nm and push.way > 0.0:
+            found.append(torque / push.way)
+    stiffest = prior.breakaway_Nm / 1e-4
+    return min(float(np.median(found)), stiffest) if found else stiffest
+
+
+def perturbed(values: Array) -> list[Array]:
+    """Starts from which another mode would be found: what pushes confuse, moved apart."""
+    found = []
+    for moves in (
+        {"log_inertia": 0.5, "delay": -1.5e-3},
+        {"log_inertia": -0.5, "delay": 1.5e-3},
+        {"log_fine": 1.5},
+        {"log_lag": -0.7, "log_bristle": -1.0},
+        {"log_lag": 0.7, "delay": -7e-4},
+        {"log_inertia": 0.1, "log_lag": -0.5, "log_bristle": -3.0},
+    ):
+        start = values.copy()
+        for name, by in moves.items():
+            start[NAMES.index(name)] += by
+        found.append(start)
+    return found
