@@ -62,6 +62,31 @@ UNKNOWN_REST = RestFacts()
 
 
 @dataclass(frozen=True)
+class Posterior:
+    """What the pushes say of the joint: close to normal in ``names``, with ``covariance`` (n, n).
+
+    Names that begin with log_ are natural logarithms of values in SI units.
+    """
+
+    names: tuple[str, ...]
+    mean: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A push of ``torque_Nm`` as the encoder showed it, and as the fitted joint goes, all (n,).
+
+    ``times_s`` and places count from where the push began.
+    """
+
+    torque_Nm: float
+    times_s: tuple[float, ...]
+    places_rad: tuple[float, ...]
+    model_rad: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class ProbeResult:
     """What a probe found; an estimate is None where the device or the motion did not show it.
 
@@ -73,7 +98,8 @@ class ProbeResult:
     through line, host and motor, as far as `motor_torque` and the device's flags show it.
     ``torque_gain``: measured over commanded torque. Friction is at rest's edge (``coulomb_Nm``,
     the mean of both directions) and ``viscous_Nm_s_per_rad``, both with ``inertia_kg_m2`` from
-    small motions: rough, not what a friction fit gives.
+    small motions: rough, not what a friction fit gives. ``posterior`` has them together with what
+    they were fitted with, ``swings`` the strongest pushes beside the model.
 
     ``facts`` are plain numbers by name, with their unit in it.
     """
@@ -89,6 +115,8 @@ class ProbeResult:
     inertia_kg_m2: Estimate | None = None
     coulomb_Nm: Estimate | None = None
     viscous_Nm_s_per_rad: Estimate | None = None
+    posterior: Posterior | None = None
+    swings: tuple[Swing, ...] = ()
     facts: Mapping[str, float] = field(default_factory=dict)
     verdicts: tuple[Verdict, ...] = ()
     format: Literal["scissorcal-probe/1"] = FORMAT
@@ -133,6 +161,9 @@ def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:
     known = {item.name for item in fields(ProbeResult)}
     values = {name: value for name, value in plain.items() if name in known}
     try:
+        if values.get("posterior") is not None:
+            values["posterior"] = _posterior(values["posterior"])
+        values["swings"] = tuple(_swing(one) for one in values.get("swings", ()))
         for name, value in values.items():
             if isinstance(value, Mapping) and name != "facts":
                 values[name] = Estimate(float(value["mean"]), float(value["sd"]))
@@ -143,3 +174,24 @@ def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:
         return ProbeResult(**values)
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"it is not a whole probe ({error})") from None
+
+
+def _posterior(plain: Mapping[str, Any]) -> Posterior:
+    names = tuple(str(name) for name in plain["names"])
+    rows = tuple(_numbers(row) for row in plain["covariance"])
+    found = Posterior(names, _numbers(plain["mean"]), rows)
+    if not len(names) == len(found.mean) == len(rows) or any(len(r) != len(names) for r in rows):
+        raise ValueError("its posterior has not as many rows as names")
+    return found
+
+
+def _swing(plain: Mapping[str, Any]) -> Swing:
+    times, places = _numbers(plain["times_s"]), _numbers(plain["places_rad"])
+    model = _numbers(plain["model_rad"])
+    if not len(times) == len(places) == len(model):
+        raise ValueError("a swing of it has not as many places as times")
+    return Swing(float(plain["torque_Nm"]), times, places, model)
+
+
+def _numbers(plain: Any) -> tuple[float, ...]:
+    return tuple(float(value) for value in plain)

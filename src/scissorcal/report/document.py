@@ -22,6 +22,7 @@ from scissorcal.report.subjects.camera import camera_panels
 from scissorcal.report.subjects.closing import Provenance
 from scissorcal.report.subjects.friction import friction_panel
 from scissorcal.report.subjects.plate import plate_panels
+from scissorcal.report.subjects.rig import rig_panels
 from scissorcal.report.subjects.scene import scene_panels
 from scissorcal.report.subjects.trust import trust_panels
 from scissorcal.verdicts import Verdict
@@ -161,6 +162,7 @@ def compose(
         *own,
         *sheet_panels,
         closing.left_out_panel(recipe, fits, dict(missing.items())),
+        *rig_panels(evidence.recordings),
         closing.provenance_panel(provenance, evidence.recordings),
     )
     return ReportDocument(

@@ -121,6 +121,13 @@ def test_the_encoder_step_is_seen_through_float32() -> None:
 def test_a_result_survives_its_file() -> None:
     result = found(FAULTS["none"], seed=2)
     assert probe_from_dict(result.as_dict()) == result
+    assert result.posterior is not None
+    assert len(result.swings) == 6
+    plain = result.as_dict()
+    with pytest.raises(ValueError, match="not as many rows as names"):
+        probe_from_dict({**plain, "posterior": {**plain["posterior"], "mean": [0.0]}})
+    with pytest.raises(ValueError, match="not as many places as times"):
+        probe_from_dict({**plain, "swings": [{**plain["swings"][0], "times_s": [0.0]}]})
     with pytest.raises(ValueError, match="its format is"):
         probe_from_dict({})
     with pytest.raises(ValueError, match="not a whole probe"):

@@ -32,7 +32,7 @@ from scissorcal.device.probe.joint_values import (
     starts_of,
 )
 from scissorcal.kernel.joint import Joint, follow_joint, follow_joints
-from scissorcal.recording.probe import Estimate
+from scissorcal.recording.probe import Estimate, Posterior, Swing
 
 Array = NDArray[np.float64]
 
@@ -91,6 +91,12 @@ class JointFit:
         return joint_of(self.values)
 
     @property
+    def posterior(self) -> Posterior:
+        """As a probe's result carries it."""
+        rows = tuple(tuple(float(f"{value:.4g}") for value in row) for row in self.covariance)
+        return Posterior(NAMES, tuple(float(f"{value:.7g}") for value in self.values), rows)
+
+    @property
     def inertia(self) -> Estimate:
         return _of_log(self.value("log_inertia"), math.hypot(self.sd("log_inertia"), LEFT_OUT))
 
@@ -144,6 +150,16 @@ def fit_joint(
     spread = np.array([x - fit.values for x in others])
     widened = fit.covariance + spread.T @ spread / max(len(others), 1)
     return JointFit(fit.values, widened, fit.misfit, fit.strange)
+
+
+def swings_of(
+    pushes: Sequence[Push], prior: Prior, noise_rad: float, values: Array, most: int
+) -> tuple[Swing, ...]:
+    """The strongest ``most`` pushes in their order, thinned, beside the joint of ``values``."""
+    problem = _Problem(pushes, prior, noise_rad)
+    parts = problem.parts(values)
+    ranked = sorted(range(len(parts)), key=lambda place: -abs(parts[place].torque_Nm))
+    return tuple(parts[place] for place in sorted(ranked[:most]))
 
 
 def travel_of(values: Array, torque: float, seconds: float) -> tuple[float, float]:
@@ -247,6 +263,21 @@ class _Problem:
             gtol=1e-8,
         )
         return np.clip(done.x, LOW, HIGH), float(done.cost) + self._evidence
+
+    def parts(self, x: Array) -> list[Swing]:
+        """Each push beside the joint of ``x``, from where it began."""
+        model = self._places_of(x[None, :])[0]
+        found = []
+        for push, a, b in zip(self._pushes, self._begin[:-1], self._begin[1:], strict=True):
+            torque = float(push.torques[np.argmax(np.abs(push.torques))])
+            columns = (
+                self._times[a:b] - self._times[a],
+                self._places[a:b] - self._places[a],
+                model[a:b] - self._places[a],
+            )
+            times, places, goes = (tuple(np.round(one, 7).tolist()) for one in columns)
+            found.append(Swing(torque, times, places, goes))
+        return found
 
     def posterior(self, x: Array) -> JointFit:
         """The posterior near a mode."""

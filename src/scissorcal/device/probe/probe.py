@@ -325,6 +325,8 @@ def _of_swings(swung: Swung) -> dict[str, object]:
         "coulomb_Nm": fit.coulomb,
         "viscous_Nm_s_per_rad": fit.viscous,
         "delay_s": fit.delay,
+        "posterior": fit.posterior,
+        "swings": swung.shown,
         "facts": {
             **(fall if told else {}),
             "coulomb_opening_Nm": joint.opening,

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.probe.joint_fit import JointFit, fit_joint, travel_of
+from scissorcal.device.probe.joint_fit import JointFit, fit_joint, swings_of, travel_of
 from scissorcal.device.probe.joint_values import NAMES, Prior, Push
 from scissorcal.device.probe.pushes import MOVED_STEPS, Axis, Pushed, push
 from scissorcal.device.probe.talk import Talk
 from scissorcal.kernel import CommandFlag
+from scissorcal.recording.probe import Swing
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,8 @@ random rigs 0.6 took two thirds of the time, and 8 intervals of 45 missed the in
 3."""
 EXPLAINED = 1.0
 """Misfit up to which residuals are what the law is known to leave out."""
+SHOWN = 6
+"""Pushes that a result keeps for people to look at: three pairs."""
 LIGHT_SDS = 2.0
 AIM_SHARE, WAY_SHARE, RATE_SHARE = 0.6, 0.8, 0.7
 """Of the bounds: what the model aims at, and what it may reach with the lightest blades."""
@@ -39,11 +42,12 @@ AIM_SHARE, WAY_SHARE, RATE_SHARE = 0.6, 0.8, 0.7
 
 @dataclass(frozen=True)
 class Swung:
-    """All pushes of the blades and what the model says of them."""
+    """All pushes of the blades, what the model says of them, and the strongest beside it."""
 
     pushes: tuple[Pushed, ...]
     fit: JointFit
     strongest_Nm: float
+    shown: tuple[Swing, ...] = ()
 
 
 def swings(
@@ -71,7 +75,8 @@ def swings(
             if not one.disturbed:
                 strongest = max(strongest, abs(effort))
         fit = _fitted(talk, pushes, least, prior, noise_rad, fit.values)
-    return Swung(tuple(pushes), fit, strongest)
+    shown = swings_of(pushes_of(talk, pushes, least), prior, noise_rad, fit.values, SHOWN)
+    return Swung(tuple(pushes), fit, strongest, shown)
 
 
 def _fitted(
