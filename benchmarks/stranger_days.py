@@ -6,8 +6,8 @@ The rig is a program that serves a device on a pseudo-terminal and takes orders 
 it is absent, this says so and ends. Each day has other parameters: the encoder's counts, the share
 of the load in friction, zeros of the sensors, paper or cotton. A person is played who moves the
 blades by hand when asked, puts in a fresh piece, and presses Enter. A day is what a newcomer types:
-`device probe`, `capture friction`, `fit friction`, `capture cut`, `fit cut`, `package`; nothing is
-overridden. It ends in a package, or at the first command that exits with something else.
+`device probe`, `capture friction`, `fit friction`, `capture cut`, `fit cut`, `package build`;
+nothing is overridden. It ends in a package, or at the first command that exits with something else.
 
 The package's torque is compared with the rig's own average torque minus its friction over closing
 strokes in the scene: root mean square as a share of the largest, and the share of places in the
@@ -53,7 +53,7 @@ COMMANDS = (
     ("fit", "friction"),
     ("capture", "cut"),
     ("fit", "cut"),
-    ("package",),
+    ("package", "build"),
 )
 LONGEST_S = 1800.0
 RATES_rad_per_s = (0.1, 0.3, 0.6)
@@ -261,11 +261,7 @@ def one_day(program: Path, module: Any, seed: int, keep: Path | None) -> Row:
 
 def against_truth(folder: Path, truth: Any) -> tuple[float, float]:
     """Rms of the package's torque minus the truth over the largest; share of places in the band."""
-    (path,) = (
-        folder.glob("**/*.scissors")
-        if list(folder.glob("**/*.scissors"))
-        else folder.glob("package*")
-    )
+    (path,) = folder.glob("package/*.zip")
     package = open_package(path, warn=False)
     ranges = package.manifest.ranges
     opening, contact, rate = (

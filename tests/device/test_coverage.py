@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from scissorcal.device.coverage import CoverageGrid, cut_coverage, even_cells, friction_coverage
-from scissorcal.device.cut_trajectory import cut_plan
+from scissorcal.device.cut_trajectory import cut_openings, cut_plan
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recording import SAMPLE_DTYPE
@@ -67,6 +67,19 @@ def test_a_friction_plan_fills_every_cell() -> None:
 @pytest.mark.parametrize("name", ["paper-80gsm", "cotton-cloth", "press-only"])
 def test_a_cut_plan_fills_every_cell(name: str) -> None:
     recipe = builtin_recipe(name)
+    grid = cut_coverage(recipe, IDENTITY)
+    for number, segment in enumerate(cut_plan(recipe, IDENTITY).segments):
+        grid.add(samples_of(segment.reference.opening, start_us=number * 10**9))
+    assert grid.share == 1.0, grid.sentence()
+
+
+def test_a_cut_plan_fills_every_cell_of_blades_that_cross_the_sheet_in_part_of_the_scene() -> None:
+    recipe = builtin_recipe("paper-80gsm")
+    edge = recipe.rig.edge.model_copy(
+        update={"family": "arc", "offset_mm": -6.0, "taper_deg": 1.5, "curvature_per_m": 0.12}
+    )
+    recipe = recipe.model_copy(update={"rig": recipe.rig.model_copy(update={"edge": edge})})
+    assert cut_openings(recipe, IDENTITY)[1] < recipe.scene.opening_rad[1] - 0.05
     grid = cut_coverage(recipe, IDENTITY)
     for number, segment in enumerate(cut_plan(recipe, IDENTITY).segments):
         grid.add(samples_of(segment.reference.opening, start_us=number * 10**9))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.advance_trajectory import advance_range, sliding_speeds
-from scissorcal.device.cut_trajectory import press_openings
+from scissorcal.device.cut_trajectory import cut_openings, press_openings
 from scissorcal.device.trajectory import opening_range
 from scissorcal.kernel import Identity
 from scissorcal.recipe.schema import Recipe
@@ -227,8 +227,10 @@ def cut_coverage(recipe: Recipe, identity: Identity, *, hand: bool = False) -> C
     Planned presses have a cell for each place at which they press.
     """
     speeds = recipe.capture.cut.speeds_rad_per_s
-    if recipe.scene.cut or hand:
+    if hand:
         cells = even_cells(opening_range(recipe, identity))
+    elif recipe.scene.cut:
+        cells = even_cells(cut_openings(recipe, identity))
     else:
         cells = press_openings(recipe, identity)
     return CoverageGrid(speeds, cells, ("closing",))

@@ -74,6 +74,16 @@ def hand_requests(recipe: Recipe) -> tuple[str, ...]:
     )
 
 
+def cut_openings(recipe: Recipe, identity: Identity) -> tuple[float, float]:
+    """Openings (rad) of the scene between which the blades cross the sheet at its contacts."""
+    openings = Blade.of(recipe).cutting_range(
+        opening_range(recipe, identity), recipe.scene.contact_m
+    )
+    if openings is None:
+        raise InputError(_never_crosses(recipe))
+    return openings
+
+
 def press_openings(recipe: Recipe, identity: Identity) -> tuple[tuple[float, float], ...]:
     """Return the openings (rad) between which the presses of a recipe move: (deep, clear) each."""
     places = _press_places(recipe, identity, recipe.capture.cut.strokes_per_sheet)
@@ -123,10 +133,7 @@ def _through_sheets(recipe: Recipe, identity: Identity) -> Plan:
 def _cuts_of_a_sheet(recipe: Recipe, identity: Identity) -> tuple[_Cut, ...]:
     """Place up to strokes_per_sheet strokes on a sheet, within it and the sledge's travel."""
     blade = Blade.of(recipe)
-    openings = blade.cutting_range(opening_range(recipe, identity), recipe.scene.contact_m)
-    if openings is None:
-        raise InputError(_never_crosses(recipe))
-    bottom, top = openings
+    openings = bottom, top = cut_openings(recipe, identity)
     inner, outer = float(blade.crossing(top)), float(blade.crossing(bottom))
     end = recipe.material.sheet_length_mm * 1e-3 - SHEET_MARGIN_M
     first, last = _sledge_travel(identity)
