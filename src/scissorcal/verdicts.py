@@ -88,6 +88,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "at most",
         "friction at the slowest rates: share of time at rest in the sweeps that rested most",
     ),
+    "fit interrupted strokes": (
+        "at most",
+        "that strokes are as planned: share of those of one speed in which motors were let go",
+    ),
     "fit sensors": ("at most", "what was measured: share of samples that a sensor spoilt"),
     "fit sensor zeros": (
         "at most",

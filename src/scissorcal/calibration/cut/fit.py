@@ -20,7 +20,7 @@ from scissorcal.calibration.cut.averaging import (
 from scissorcal.calibration.cut.between import between_notes, compare_cuts
 from scissorcal.calibration.cut.checks import cut_diagnostics, cut_verdicts, line_notes
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.guess import NoUnloadingError
+from scissorcal.calibration.cut.guess import CoarseEncoderError, NoUnloadingError
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.lack_of_fit import budget_of
 from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws
@@ -40,6 +40,7 @@ from scissorcal.calibration.cut.usage import usage_of_segments, usage_sentence
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.signals.interruptions import Interruptions, interruptions
 from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
 from scissorcal.calibration.signals.soundness import farthest_torque, refuse_unsound
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros
@@ -73,6 +74,7 @@ class _Data:
     known: KnownFriction
     sensors: Sensors
     motions: tuple[PathMotion, ...]
+    broken: Interruptions
 
     @classmethod
     def of(
@@ -88,7 +90,8 @@ class _Data:
         sensors = inspect_sensors(recordings, "fit.cut")
         cleaned, known = _cleaned(recordings, recipe, friction, known)
         motions = path_motion(cleaned, known.inertia, sensors.usable)
-        return cls(recordings, recipe, friction, geometry, known, sensors, motions)
+        broken = interruptions(recordings)
+        return cls(recordings, recipe, friction, geometry, known, sensors, motions, broken)
 
     @property
     def names(self) -> str:
@@ -97,9 +100,10 @@ class _Data:
 
     @property
     def cause(self) -> str:
-        """What the sensors lack, before what follows from it; empty where they lack nothing."""
+        """What comes before what follows from it: sensors, interruptions; empty without any."""
         verdict = self.sensors.verdict
-        return f"{verdict.why} Besides, " if verdict.status == "fail" else ""
+        said = (verdict.why if verdict.status == "fail" else "", self.broken.sentence)
+        return "".join(f"{why} Besides, " for why in said if why)
 
 
 def fit_cut(
@@ -222,6 +226,8 @@ def _scouted(data: _Data, laws: Sequence[CutLaw]) -> Scouted:
             "response cannot be separated from friction. Check rig.edge and the sheet's place, and "
             "open the blades wide in every stroke."
         ) from error
+    except CoarseEncoderError as error:
+        raise InputError(f"{data.names}: {data.cause}{error}") from error
     except MisfitError as error:
         raise InputError(
             f"{data.names}: no law comes near the recorded torques ({error}). Look for a torque "
@@ -324,6 +330,7 @@ def _assembled(
         usage=usage,
         extra_verdicts=(
             *cut_verdicts(data.friction, edge_verdicts, scouted, data.sensors, recordings),
+            *((data.broken.verdict("fit.cut"),) if data.broken.interrupted else ()),
             *((between.verdict(),) if between else ()),
         ),
         extra_notes=(

@@ -99,6 +99,10 @@ class NoUnloadingError(ValueError):
     """No stroke shows the blades unloading the material, so the response is not identifiable."""
 
 
+class CoarseEncoderError(ValueError):
+    """The blades load and unload the material within too few steps of the encoder."""
+
+
 def first_guess(
     motions: tuple[PathMotion, ...],
     materials: tuple[Material, ...],

@@ -1,5 +1,6 @@
 """Preliminary fits: segments and the line of the teeth, from a first estimate."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -8,14 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.guess import Guess, NoUnloadingError, first_guess
+from scissorcal.calibration.cut.guess import (
+    CoarseEncoderError,
+    Guess,
+    NoUnloadingError,
+    first_guess,
+)
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.laws import CutLaw, cut_layout
 from scissorcal.calibration.cut.likelihood import CutLikelihood
 from scissorcal.calibration.cut.model import CutExperiment, starting_point
 from scissorcal.calibration.cut.path import Material, PathMotion
 from scissorcal.calibration.cut.path.runs import find_runs
-from scissorcal.calibration.cut.segments import Segments, cut_into_segments
+from scissorcal.calibration.cut.segments import LEAST_PIECE_COUNTS, Segments, cut_into_segments
 from scissorcal.calibration.cut.structure import edge_layout, geometry_of, response_from
 from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
 from scissorcal.inference import Counter, Optimum, find_optimum
@@ -73,7 +79,8 @@ def scout(
 ) -> Scouted:
     """Fit a power law twice, segment the recordings by its result, and look for the teeth.
 
-    Raises NoUnloadingError where none was seen, MisfitError where the law is nowhere near the data.
+    Raises NoUnloadingError where none was seen, CoarseEncoderError where the encoder shows too
+    little of it, MisfitError where the law is nowhere near the data.
     """
     materials = tuple(known.material(motion) for motion in motions)
     exponent = recipe.fit.cut.response_exponent
@@ -95,6 +102,7 @@ def scout(
                 motions, materials, geometry, guess, known.noise, known.stroke_sd, recipe.scene.cut
             )
             if not segments.pieces:
+                _refuse_coarse(segments)
                 raise NoUnloadingError("no stroke shows unloading")
             design = make_experiment(segments, geometry, recipe, law, known, values)
             optimum = _found(design)
@@ -105,6 +113,21 @@ def scout(
     if fracture != "rippled" or not segments.stretches:
         return found
     return _with_line(found, design, optimum, recipe, known, geometry)
+
+
+def _refuse_coarse(segments: Segments) -> None:
+    """Raise CoarseEncoderError where the longest loading or unloading has too few steps."""
+    step = max(motion.resolution for motion in segments.motions)
+    if not 0.0 < segments.longest < LEAST_PIECE_COUNTS * step:
+        return
+    needed = LEAST_PIECE_COUNTS * 2.0 * math.pi / segments.longest
+    raise CoarseEncoderError(
+        f"the blades load and unload the material over {1e3 * segments.longest:.2g} mrad of "
+        f"opening, {segments.longest / step:.2g} steps of the encoder ({1e3 * step:.2g} mrad), and "
+        f"its response takes {LEAST_PIECE_COUNTS:.0f}. Use an encoder of at least "
+        f"{math.ceil(needed / 1000.0) * 1000:,} counts a turn, or a material that the blades sink "
+        "into further."
+    )
 
 
 def make_experiment(

@@ -30,6 +30,8 @@ ELASTIC_SEGMENTS = 8
 """Segments between touching and the deepest point of an elastic piece."""
 LEAST_SEGMENT_COUNTS, SHORT_SEGMENT_COUNTS = 6.0, 4.0
 """Least encoder steps of an elastic segment; the second in a piece with too few segments."""
+LEAST_PIECE_COUNTS = (FEWEST_SEGMENTS + 0.5) * SHORT_SEGMENT_COUNTS
+"""Least encoder steps of a whole piece."""
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
 """Least length and least teeth of running segments: in shorter ones the teeth are
 fitted as short-range unevenness in place of the long-range one, and intervals get too narrow."""
@@ -110,12 +112,16 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Segments:
-    """The data of a likelihood of cuts."""
+    """The data of a likelihood of cuts.
+
+    ``longest`` is the longest path (rad) over which blades loaded or unloaded a crack at rest.
+    """
 
     motions: tuple[PathMotion, ...]
     rests: tuple[Rest, ...]
     pieces: tuple[Piece, ...]
     stretches: tuple[Stretch, ...]
+    longest: float = 0.0
 
 
 def cut_into_segments(
@@ -143,7 +149,13 @@ def cut_into_segments(
             builder.closing(run)
         else:
             builder.opening(run)
-    return Segments(motions, tuple(builder.rests), tuple(builder.pieces), tuple(builder.stretches))
+    return Segments(
+        motions,
+        tuple(builder.rests),
+        tuple(builder.pieces),
+        tuple(builder.stretches),
+        builder.longest,
+    )
 
 
 @dataclass
@@ -160,6 +172,7 @@ class _Builder:
     rests: list[Rest] = field(default_factory=list)
     pieces: list[Piece] = field(default_factory=list)
     stretches: list[Stretch] = field(default_factory=list)
+    longest: float = 0.0
     sheets: int = 0
     sheet: int = -1
 
@@ -256,6 +269,7 @@ class _Builder:
 
     def _piece(self, kind: str, index: int, low: int, high: int, length: float) -> None:
         motion = self.motions[index]
+        self.longest = max(self.longest, abs(float(motion.opening[high] - motion.opening[low])))
         step = max(length / ELASTIC_SEGMENTS, LEAST_SEGMENT_COUNTS * motion.resolution)
         fewest = abs(float(motion.opening[high] - motion.opening[low])) / (FEWEST_SEGMENTS + 0.5)
         step = min(step, max(fewest, SHORT_SEGMENT_COUNTS * motion.resolution))

@@ -37,6 +37,7 @@ from scissorcal.calibration.friction.noise import (
 from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.interruptions import interruptions
 from scissorcal.calibration.signals.sensors import inspect_sensors
 from scissorcal.calibration.signals.soundness import refuse_unsound
 from scissorcal.calibration.signals.steadiness import Steadiness, steadiness
@@ -92,7 +93,7 @@ def fit_friction(
     joint = recordings[0].joint if recordings else Joint()
     sensors = inspect_sensors(recordings)
     cleaned, zero = _cleaned(recordings, settings, simulated=prior is not None)
-    steady = steadiness(recordings)
+    steady, broken = steadiness(recordings), interruptions(recordings)
     again = partial(_slid, steady, cleaned, settings.cutoff_Hz, sensors.usable)
     every = again()
     windows = every.where(every.bins.moving)
@@ -130,6 +131,7 @@ def fit_friction(
             start_verdict(law, chosen.optimum.point),
             _bandwidth(again, law, chosen, posterior, effort),
             sensors.verdict,
+            *((broken.verdict("fit.friction"),) if broken.interrupted else ()),
             *((steady.verdict(),) if steady.rows else ()),
             *zero_verdicts("fit.friction", zero, recordings, _rms(law.observed)),
             *((between.verdict(),) if between else ()),

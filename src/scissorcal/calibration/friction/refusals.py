@@ -3,6 +3,7 @@
 import numpy as np
 
 from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.interruptions import SOME_WHOLE, interruptions
 from scissorcal.calibration.signals.sensors import Sensors
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.errors import InputError
@@ -37,6 +38,9 @@ def _refuse_poor_motion(
         travel = float(np.ptp(every.opening)) if len(every.opening) else 0.0
         if sensors.verdict.status == "fail":
             raise InputError(f"{names}: too few samples are left to fit. {sensors.verdict.why}")
+        broken = interruptions(recordings)
+        if broken.worst > SOME_WHOLE:
+            raise InputError(f"{names}: too few samples are left to fit. {broken.sentence}")
         if 0 < LEAST_TRAVEL_S * every.rate_floor < travel:
             raise InputError(
                 f"{names}: the joint travels {travel:.3g} {joint.position_unit}, but nearly always "
