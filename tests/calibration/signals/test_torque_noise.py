@@ -47,6 +47,16 @@ def test_white_noise_has_no_slow_part():
     assert found.slow_Nm**2 < 0.02 * found.white_Nm**2
 
 
+def test_noise_that_sensors_show_at_rest_is_there_in_motion():
+    """An error of momenta that is stated too large hides the white noise otherwise."""
+    stretches = drawn(1e-3, 6e-4, 0.012, np.random.default_rng(3))
+    momenta = tuple(np.zeros(len(one)) for one in stretches)
+    too_much = 3e-3 * TICK_S
+    assert torque_noise(stretches, TICK_S, momenta, too_much).white_Nm < 0.9e-3
+    found = torque_noise(stretches, TICK_S, momenta, too_much, idle_white=1e-3)
+    assert 1e-3 <= found.white_Nm < 1.05e-3
+
+
 def test_momentum_from_the_torque_is_not_noise():
     """Torque that moves the joint is inertia times its change of rate, whatever its spectrum."""
     rng = np.random.default_rng(2)

@@ -37,6 +37,7 @@ from scissorcal.calibration.friction.noise import (
 from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.idle import idle_noise
 from scissorcal.calibration.signals.interruptions import interruptions
 from scissorcal.calibration.signals.sensors import inspect_sensors
 from scissorcal.calibration.signals.soundness import refuse_unsound
@@ -145,7 +146,7 @@ def fit_friction(
             *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
         ),
         extra_diagnostics={
-            **_diagnostics(law, chosen, between),
+            **_diagnostics(law, chosen, between, idle_noise(recordings)),
             **(zero.as_dict() if zero else {}),
         },
     )
@@ -247,11 +248,14 @@ def _last_part(tell: Progress) -> Progress:
 
 
 def _diagnostics(
-    law: FrictionExperiment, chosen: FittedCandidate, between: BetweenRecordings | None
+    law: FrictionExperiment,
+    chosen: FittedCandidate,
+    between: BetweenRecordings | None,
+    idle_white: float,
 ) -> dict[str, Any]:
     """What a fit stores beside its parameters: noise, scatter of strokes and of recordings."""
     point = chosen.optimum.point
-    noise = sample_noise(law, point)
+    noise = sample_noise(law, point, idle_white)
     residuals = chosen.candidate.likelihood.residuals(point)
     return {
         "window_lengthening": law.windows.lengthening,

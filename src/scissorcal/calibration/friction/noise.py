@@ -22,11 +22,13 @@ FLOOR_SDS = 3.0
 """Standard deviations of the rate's noise that the rate floor stands for."""
 
 
-def sample_noise(law: FrictionExperiment, point: Array) -> TorqueNoise | None:
+def sample_noise(
+    law: FrictionExperiment, point: Array, idle_white: float = 0.0
+) -> TorqueNoise | None:
     """Noise of the drive at its samples, from what a law leaves of steady motion at ``point`` (p,).
 
     The law is evaluated at every sample that a moving window holds; where too little is left, the
-    noise is None.
+    noise is None. ``idle_white`` is the white noise that the sensors show at rest.
     """
     windows = law.windows
     values = law.layout.natural(point)
@@ -56,6 +58,7 @@ def sample_noise(law: FrictionExperiment, point: Array) -> TorqueNoise | None:
         windows.tick_s,
         tuple(momentum[a:b] for a, b in pairs),
         float(values["inertia"]) * windows.bins.rate_floor / FLOOR_SDS,
+        idle_white,
     )
 
 

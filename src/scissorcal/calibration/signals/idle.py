@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.segments import pieces_of, stretches
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.resolution import resolution_of
+from scissorcal.recording.resolution import noise_of, resolution_of
 
 Array = NDArray[np.float64]
 
@@ -52,6 +52,16 @@ def idle_zero(recordings: tuple[Recording, ...]) -> Zero | None:
     every = np.concatenate([recording.drive_effort[span] for recording, span in spans])
     seconds = sum(_tick(recording) * (span.stop - span.start) for recording, span in spans)
     return Zero(float(every.mean()), _standard_error(every, seconds), seconds)
+
+
+def idle_noise(recordings: tuple[Recording, ...]) -> float:
+    """White noise of the drive's sensors (sd, N m or N) over idle periods; 0 without any."""
+    found = [
+        noise_of(recording.drive_effort[span])
+        for recording in recordings
+        for span in idle_spans(recording)
+    ]
+    return float(np.median(found)) if found else 0.0
 
 
 def idle_periods(recording: Recording) -> tuple[IdlePeriod, ...]:

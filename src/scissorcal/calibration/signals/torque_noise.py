@@ -45,6 +45,7 @@ def torque_noise(
     tick_s: float,
     momenta: tuple[Array, ...] | None = None,
     momentum_sd: float = 0.0,
+    idle_white: float = 0.0,
 ) -> TorqueNoise | None:
     """Separate the noise's two time scales by the variance of sums over 4 to 128 ticks.
 
@@ -55,8 +56,9 @@ def torque_noise(
         B n + C sum_ij exp(-|i - j| tick / time) + 2 (momentum_sd / tick)^2,
 
     ``momentum_sd`` being the momenta's own noise, from the encoder's steps. B and C, both positive,
-    are fitted for each of a range of times. Stretches' own means are taken out. None where there
-    are fewer than 20 sums over 128 ticks.
+    are fitted for each of a range of times; B is at least the square of ``idle_white``, the
+    sensors' noise at rest, which a coarse encoder's momenta hide in motion. Stretches' own means
+    are taken out. None where there are fewer than 20 sums over 128 ticks.
     """
     kept = [k for k, one in enumerate(stretches) if len(one) > 2 * LENGTHS[0]]
     if not kept:
@@ -66,12 +68,12 @@ def torque_noise(
     if tables[:, -1, 1].sum() < FEWEST_SUMS:
         return None
     total, ends = tables.sum(axis=0), 2.0 * (momentum_sd / tick_s) ** 2
-    white, slow, time_s = _fitted(total, tick_s, ends)
+    white, slow, time_s = _fitted(total, tick_s, ends, idle_white)
     count = min(BLOCKS, len(tables))
     left = [total - tables[k::count].sum(axis=0) for k in range(count)]
     errors: list[float] = [float("nan")] * 3
     if min(table[-1, 1] for table in left) >= FEWEST_SUMS:
-        others = [_fitted(table, tick_s, ends) for table in left]
+        others = [_fitted(table, tick_s, ends, idle_white) for table in left]
         errors = np.sqrt((count - 1) * np.var(others, axis=0)).tolist()
     return TorqueNoise(white, slow, time_s, *errors)
 
@@ -88,7 +90,9 @@ def _squares(residuals: Array, momentum: Array) -> Array:
     return np.array(rows)
 
 
-def _fitted(table: Array, tick_s: float, ends: float) -> tuple[float, float, float]:
+def _fitted(
+    table: Array, tick_s: float, ends: float, idle_white: float
+) -> tuple[float, float, float]:
     """White, slow and time: the best over all times by weighted squares without negatives."""
     from scipy.optimize import nnls
 
@@ -96,7 +100,8 @@ def _fitted(table: Array, tick_s: float, ends: float) -> tuple[float, float, flo
     lengths = np.array(LENGTHS)[known]
     variance = table[known, 0] / table[known, 1]
     weight = np.sqrt(table[known, 1] / np.maximum(lengths / 4, 1.0)) / np.maximum(variance, 1e-300)
-    wanted = np.maximum(variance - ends, 0.0) * weight
+    known_part = ends + idle_white**2 * lengths
+    wanted = np.maximum(variance - known_part, 0.0) * weight
     fits = []
     for time_s in TIMES_S:
         memory = _memory(lengths, float(np.exp(-tick_s / time_s)))
@@ -105,7 +110,7 @@ def _fitted(table: Array, tick_s: float, ends: float) -> tuple[float, float, flo
         found, left = nnls(design / size, wanted)
         fits.append((float(left), time_s, np.sqrt(found / size)))
     _, time_s, sds = min(fits, key=lambda fit: fit[0])
-    return float(sds[0]), float(sds[1]), time_s
+    return float(np.hypot(sds[0], idle_white)), float(sds[1]), time_s
 
 
 def _memory(lengths: NDArray[np.int64], decay: float) -> Array:
