@@ -1,6 +1,6 @@
 """Whole days on a rig that is not part of this project, in real time, through the command line.
 
-    python -m benchmarks.stranger_days --count 12 [--first 1] [--rig PROGRAM] [--json FILE]
+    python -m benchmarks.stranger_days --count 12 [--first 1] [--rig PROGRAM] [--keep FOLDER]
 
 The rig is a program that serves a device on a pseudo-terminal and takes orders on a socket; where
 it is absent, this says so and ends. Each day has other parameters: the encoder's counts, the share
@@ -99,7 +99,7 @@ def parameters(seed: int) -> dict[str, float]:
         **joint,
         "opening_counts_per_turn": COUNTS[index % len(COUNTS)],
         "load_share": (0.10, 0.0)[index // 2 % 2],
-        **({} if index % 2 else NO_ZEROS),
+        **({} if (index + index // len(COUNTS)) % 2 else NO_ZEROS),
         **(COTTON if index // len(COUNTS) % 2 else {}),
         "seed": seed,
     }
@@ -232,7 +232,7 @@ def one_day(program: Path, module: Any, seed: int, keep: Path | None) -> Row:
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as made:
         folder = keep / f"day-{seed}" if keep else Path(made)
-        (folder / "day").mkdir(parents=True, exist_ok=True)
+        (folder / "day").mkdir(parents=True)
         workspace(folder / "day", truth, material)
         rig = Stranger(program, folder, changed)
         code, ended, said = 0, "a package", ""

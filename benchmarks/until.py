@@ -157,7 +157,7 @@ def _capture(
     spent: list[float],
 ) -> tuple[Recording, UntilMark]:
     """Capture until the tolerance; ``spent`` gets the processor seconds of each choice."""
-    slowest = max(sweep_bounds(recipe, link.identity, probed)) if kind == "friction" else 0.0
+    slowest = sweep_bounds(recipe, link.identity, probed)[1] if kind == "friction" else 0.0
     choice = UntilTolerance(
         kind, recipe, link.identity, earlier, Limits(minutes), slowest_sweep=slowest
     )

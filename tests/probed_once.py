@@ -3,6 +3,7 @@
 from hashlib import sha256
 from typing import Any
 
+import numpy as np
 import pytest
 
 from scissorcal.device.link import Link
@@ -12,6 +13,8 @@ from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.runs import probe
 from scissorcal.workday.workspace import Workspace
 from tests.made_once import made_once
+
+SEED = 0
 
 
 @pytest.fixture(autouse=True)
@@ -24,14 +27,15 @@ def probed_once(
     real = probe.probe_into
 
     def kept(workspace: Workspace, link: Link, recipe: Recipe, **how: Any) -> ProbeResult:
-        if type(link) is not LockstepLink:
+        if type(link) is not LockstepLink or recipe.specimen is None:
             return real(workspace, link, recipe, **how)
-        told = f"{link.identity!r} {recipe.specimen} {recipe.rig.model_dump_json()}"
+        own = LockstepLink(recipe.specimen, np.random.default_rng(SEED))
+        if own.identity != link.identity:
+            return real(workspace, link, recipe, **how)
+        told = f"{recipe.specimen} {recipe.rig.model_dump_json()}"
         key = sha256(told.encode()).hexdigest()[:16]
         folder = made_once(
-            tmp_path_factory,
-            f"probe {key}",
-            lambda made: real(Workspace(made), link, recipe, **how),
+            tmp_path_factory, f"probe {key}", lambda made: real(Workspace(made), own, recipe)
         )
         found = probe.last_probe(Workspace(folder))
         assert found is not None

@@ -68,7 +68,7 @@ def swept(folder: Path, recipe: Recipe, gains_of: str) -> Recording:
     return read_recording(folder / f"{gains_of}.mcap")
 
 
-def test_the_virtual_rig_slides_where_it_stuck(tmp_path: Path) -> None:
+def test_the_slowest_usable_sweeps_slide_where_slower_ones_stick(tmp_path: Path) -> None:
     recipe = changed("paper-80gsm", capture__friction=SHORT)
     stuck, slid = (swept(tmp_path, recipe, kind) for kind in (AS_STROKES, "friction"))
     assert at_rest(stuck) > 0.1

@@ -1,14 +1,15 @@
 """The joint that a probe fits, against closed forms and at the extremes."""
 
 import math
-from dataclasses import replace
+from dataclasses import astuple, fields, replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.kernel.joint import Joint, follow_joint
+from scissorcal.kernel._kernel import ffi, lib
+from scissorcal.kernel.joint import Joint, follow_joint, follow_joints
 
 FREE = Joint(
     inertia=3e-4, opening=0.0, closing=0.0, rise=0.0, rise_rate=0.1, viscous=0.0, fine=1e-3,
@@ -58,6 +59,51 @@ def test_what_yields_takes_dahls_way_under_a_torque_below_friction() -> None:
 def test_a_joint_that_is_carried_begins_at_rest() -> None:
     joint = replace(FREE, opening=0.02, closing=0.02, carrying=0.005)
     assert np.abs(places(joint, 0.0)).max() < 1e-5
+
+
+def test_joints_together_go_as_each_alone() -> None:
+    """Those that need no shorter steps than the first: the same operations, to the last bits."""
+    first = replace(FREE, opening=0.02, closing=0.018, rise=2e-3, bristle=0.05, viscous=2e-3)
+    first = replace(first, slow_share=0.3, carrying=1e-3, carrying_slope=-5e-3, motor_lag=1e-3)
+    others = [
+        replace(first, **{name: 1.1 * getattr(first, name)})
+        for name in ("inertia", "fine", "slow", "viscous", "bristle", "carrying", "motor_lag")
+    ]
+    joints = [first, *others]
+    rests = np.full(len(TIMES), np.nan)
+    rests[[0, 120]] = 0.3, 0.35
+    rest = (TIMES, rests, np.array([0.01, 0.05]), np.array([0.03, 0.0]), 2e-5)
+    together = follow_joints(np.array([astuple(one) for one in joints]), *rest)
+    for one, found in zip(joints, together, strict=True):
+        assert found == pytest.approx(follow_joint(one, *rest), abs=1e-12)
+
+
+def test_a_switch_just_before_a_time_takes_no_step_of_no_length() -> None:
+    rests = np.full(len(TIMES), np.nan)
+    rests[0] = 0.0
+    for at in (np.nextafter(TIMES[72], 0.0), np.nextafter(TIMES[72], 1.0)):
+        found = follow_joint(FREE, TIMES, rests, np.array([0.0, at]), np.array([0.01, 0.0]), 1e-3)
+        assert found[72] == pytest.approx(0.01 * TIMES[72] ** 2 / (2.0 * 3e-4), rel=1e-6)
+
+
+def test_what_is_no_set_of_joints_is_refused() -> None:
+    ends = (TIMES, TIMES, np.zeros(1), np.zeros(1), 1e-3)
+    row = np.array([astuple(FREE)])
+    with pytest.raises(ValueError, match="at most 16 joints"):
+        follow_joints(np.repeat(row, 17, axis=0), *ends)
+    with pytest.raises(ValueError, match="has 14 values"):
+        follow_joints(row[:, 1:], *ends)
+    with pytest.raises(ValueError, match="each time a rest"):
+        follow_joints(row, TIMES, TIMES[1:], np.zeros(1), np.zeros(1), 1e-3)
+    with pytest.raises(ValueError, match="each switch has a torque"):
+        follow_joints(row, TIMES, TIMES, np.zeros(2), np.zeros(1), 1e-3)
+
+
+def test_joints_of_both_languages_have_the_same_values_in_the_same_order() -> None:
+    assert [name for name, _ in ffi.typeof("sc_joint").fields] == [
+        one.name for one in fields(Joint)
+    ]
+    assert lib.SC_JOINTS == 16
 
 
 def test_it_is_put_to_rest_where_it_stands() -> None:

@@ -46,6 +46,16 @@ def test_friction_begins_with_three_speeds_and_an_excitation() -> None:
     assert (mark.strokes, mark.within, mark.ended) == (0, None, "")
 
 
+def test_no_sweep_is_slower_than_the_rig_makes_steadily() -> None:
+    choose = UntilTolerance(
+        "friction", RECIPE, IDENTITY, Earlier(), Limits(4.0), slowest_sweep=0.083
+    )
+    assert min(choose.recipe.capture.friction.speeds_rad_per_s) == 0.083
+    part = choose(NOTHING, 0.0)
+    assert part is not None
+    assert min(stroke.speed for stroke in part.strokes if np.isfinite(stroke.speed)) == 0.083
+
+
 def test_strokes_that_cannot_be_fitted_use_up_their_minutes_and_say_why() -> None:
     """Samples without motion: the fit refuses them, and the capture goes on until its limit."""
     choose = UntilTolerance("friction", RECIPE, IDENTITY, Earlier(), Limits(1.0))

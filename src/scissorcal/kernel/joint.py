@@ -48,10 +48,15 @@ def follow_joints(
     """Places (rad) of joints (k, fields of `Joint`) at ``times`` (n,): (k, n), as sc_joint.h says.
 
     ``rests`` (n,) is finite where the joints stand, ``torques`` (m,) act from ``switches`` (m,) on.
-    At most 16 joints; all take the steps that the first one needs.
+    At most 16 joints; all take the steps that the first one needs. Raises ValueError for more, or
+    for arrays of other shapes.
     """
     if len(joints) > lib.SC_JOINTS:
         raise ValueError(f"at most {lib.SC_JOINTS} joints can be followed at once")
+    if joints.shape[1] != len(fields(Joint)) or len(rests) != len(times):
+        raise ValueError(f"a joint has {len(fields(Joint))} values, and each time a rest")
+    if len(switches) != len(torques):
+        raise ValueError("each switch has a torque")
     places = np.empty((len(joints), len(times)))
     arrays = [
         np.ascontiguousarray(a, dtype=np.float64) for a in (joints, times, rests, switches, torques)

@@ -65,7 +65,7 @@ UNKNOWN_REST = RestFacts()
 class Posterior:
     """What the pushes say of the joint: close to normal in ``names``, with ``covariance`` (n, n).
 
-    Names that begin with log_ are natural logarithms of values in SI units.
+    docs/files.md explains the names.
     """
 
     names: tuple[str, ...]
@@ -98,8 +98,9 @@ class ProbeResult:
     through line, host and motor, as far as `motor_torque` and the device's flags show it.
     ``torque_gain``: measured over commanded torque. Friction is at rest's edge (``coulomb_Nm``,
     the mean of both directions) and ``viscous_Nm_s_per_rad``, both with ``inertia_kg_m2`` from
-    small motions: rough, not what a friction fit gives. ``posterior`` has them together with what
-    they were fitted with, ``swings`` the strongest pushes beside the model.
+    small motions: rough, not what a friction fit gives. ``posterior`` is what the
+    pushes say of the joint (docs/files.md; estimates have besides what its law leaves out),
+    ``swings`` are the strongest pushes beside the model.
 
     ``facts`` are plain numbers by name, with their unit in it.
     """

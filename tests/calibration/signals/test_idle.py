@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scissorcal.calibration.signals.idle import idle_zero
+from scissorcal.calibration.signals.idle import idle_noise, idle_zero
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 
 ZERO, NOISE = 4e-4, 1e-3
@@ -30,6 +30,7 @@ def test_an_idle_second_gives_the_drives_zero():
     assert abs(drive.mean - ZERO) < 3 * drive.sd
     assert drive.sd == pytest.approx(NOISE / np.sqrt(1500), rel=0.5)
     assert drive.seconds == pytest.approx(1.5)
+    assert idle_noise((recording(),)) == pytest.approx(NOISE, rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -39,3 +40,4 @@ def test_an_idle_second_gives_the_drives_zero():
 )
 def test_without_an_idle_second_there_is_no_zero(changes):
     assert idle_zero((recording(**changes),)) is None
+    assert idle_noise((recording(**changes),)) == 0.0

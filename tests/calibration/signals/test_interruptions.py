@@ -40,19 +40,37 @@ def test_whole_strokes_say_nothing() -> None:
 def test_one_of_two_strokes_of_a_speed_is_told_and_decides_nothing() -> None:
     found = interruptions((with_fault(recorded(), 1),))
     assert (found.interrupted, found.worst) == (1, 0.5)
-    assert "in 1 of 4 strokes, since commands came late. Close programs" in found.sentence
+    assert "in 1 of 4 strokes, in 1 of them since commands came late: close" in found.sentence
     assert found.verdict("fit.friction").status == "not_evaluated"
 
 
 def test_no_whole_stroke_of_a_speed_fails() -> None:
     found = interruptions((with_fault(recorded(), 2, 3),))
+    assert found.decide
     verdict = found.verdict("fit.cut")
     assert (verdict.status, verdict.value) == ("fail", pytest.approx(1.0))
 
 
 def test_other_faults_are_not_laid_to_late_commands() -> None:
     found = interruptions((with_fault(recorded(), 0, flags=2),))
-    assert "since a fault latched. Look up the faults" in found.sentence
+    assert found.late == 0
+    assert "look up the faults" in found.sentence
+    assert "close programs" not in found.sentence
+
+
+def test_another_recording_with_a_whole_stroke_shows_the_speed() -> None:
+    found = interruptions((with_fault(recorded(), 2, 3), recorded()))
+    assert (found.strokes, found.interrupted, found.worst) == (8, 2, 0.5)
+    assert not found.decide
+
+
+def test_a_fault_in_the_last_samples_of_a_stroke_counts() -> None:
+    for number in (1, 3):
+        samples = recorded().samples.copy()
+        last = int(np.flatnonzero(samples["stroke"] == number)[-1])
+        samples["flags"][last - 5 :] |= 6
+        samples["stroke"][last - 5 : last + 1] = -1
+        assert interruptions((replace(recorded(), samples=samples),)).interrupted == 1
 
 
 def test_a_fault_between_strokes_interrupts_none() -> None:

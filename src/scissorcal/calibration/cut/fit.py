@@ -102,7 +102,10 @@ class _Data:
     def cause(self) -> str:
         """What comes before what follows from it: sensors, interruptions; empty without any."""
         verdict = self.sensors.verdict
-        said = (verdict.why if verdict.status == "fail" else "", self.broken.sentence)
+        said = (
+            verdict.why if verdict.status == "fail" else "",
+            self.broken.sentence if self.broken.decide else "",
+        )
         return "".join(f"{why} Besides, " for why in said if why)
 
 

@@ -102,7 +102,7 @@ def scout(
                 motions, materials, geometry, guess, known.noise, known.stroke_sd, recipe.scene.cut
             )
             if not segments.pieces:
-                _refuse_coarse(segments)
+                refuse_coarse(segments)
                 raise NoUnloadingError("no stroke shows unloading")
             design = make_experiment(segments, geometry, recipe, law, known, values)
             optimum = _found(design)
@@ -115,18 +115,18 @@ def scout(
     return _with_line(found, design, optimum, recipe, known, geometry)
 
 
-def _refuse_coarse(segments: Segments) -> None:
-    """Raise CoarseEncoderError where the longest loading or unloading has too few steps."""
-    step = max(motion.resolution for motion in segments.motions)
-    if not 0.0 < segments.longest < LEAST_PIECE_COUNTS * step:
+def refuse_coarse(segments: Segments) -> None:
+    """Raise CoarseEncoderError where no loading or unloading has steps enough."""
+    if not 0.0 < segments.steps < LEAST_PIECE_COUNTS:
         return
     needed = LEAST_PIECE_COUNTS * 2.0 * math.pi / segments.longest
     raise CoarseEncoderError(
         f"the blades load and unload the material over {1e3 * segments.longest:.2g} mrad of "
-        f"opening, {segments.longest / step:.2g} steps of the encoder ({1e3 * step:.2g} mrad), and "
-        f"its response takes {LEAST_PIECE_COUNTS:.0f}. Use an encoder of at least "
-        f"{math.ceil(needed / 1000.0) * 1000:,} counts a turn, or a material that the blades sink "
-        "into further."
+        f"opening, {segments.steps:.2g} steps of the encoder "
+        f"({1e3 * segments.longest / segments.steps:.2g} mrad each), and its response takes "
+        f"{LEAST_PIECE_COUNTS:.0f}. If rig.edge and the sheet's place are right, use an encoder of "
+        f"at least {math.ceil(needed / 1000.0) * 1000:,} counts a turn, or a material that the "
+        "blades sink into further."
     )
 
 

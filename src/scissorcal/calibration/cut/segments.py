@@ -114,7 +114,8 @@ class Stretch:
 class Segments:
     """The data of a likelihood of cuts.
 
-    ``longest`` is the longest path (rad) over which blades loaded or unloaded a crack at rest.
+    ``longest`` is the path (rad) over which blades loaded or unloaded a crack at rest, where it is
+    the most steps of the encoder, and ``steps`` how many.
     """
 
     motions: tuple[PathMotion, ...]
@@ -122,6 +123,7 @@ class Segments:
     pieces: tuple[Piece, ...]
     stretches: tuple[Stretch, ...]
     longest: float = 0.0
+    steps: float = 0.0
 
 
 def cut_into_segments(
@@ -155,6 +157,7 @@ def cut_into_segments(
         tuple(builder.pieces),
         tuple(builder.stretches),
         builder.longest,
+        builder.steps,
     )
 
 
@@ -173,6 +176,7 @@ class _Builder:
     pieces: list[Piece] = field(default_factory=list)
     stretches: list[Stretch] = field(default_factory=list)
     longest: float = 0.0
+    steps: float = 0.0
     sheets: int = 0
     sheet: int = -1
 
@@ -269,7 +273,9 @@ class _Builder:
 
     def _piece(self, kind: str, index: int, low: int, high: int, length: float) -> None:
         motion = self.motions[index]
-        self.longest = max(self.longest, abs(float(motion.opening[high] - motion.opening[low])))
+        way = abs(float(motion.opening[high] - motion.opening[low]))
+        if motion.resolution > 0.0 and way > self.steps * motion.resolution:
+            self.longest, self.steps = way, way / motion.resolution
         step = max(length / ELASTIC_SEGMENTS, LEAST_SEGMENT_COUNTS * motion.resolution)
         fewest = abs(float(motion.opening[high] - motion.opening[low])) / (FEWEST_SEGMENTS + 0.5)
         step = min(step, max(fewest, SHORT_SEGMENT_COUNTS * motion.resolution))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.calibration.signals.interruptions import SOME_WHOLE, interruptions
+from scissorcal.calibration.signals.interruptions import interruptions
 from scissorcal.calibration.signals.sensors import Sensors
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.errors import InputError
@@ -39,7 +39,7 @@ def _refuse_poor_motion(
         if sensors.verdict.status == "fail":
             raise InputError(f"{names}: too few samples are left to fit. {sensors.verdict.why}")
         broken = interruptions(recordings)
-        if broken.worst > SOME_WHOLE:
+        if broken.decide:
             raise InputError(f"{names}: too few samples are left to fit. {broken.sentence}")
         if 0 < LEAST_TRAVEL_S * every.rate_floor < travel:
             raise InputError(

@@ -3,71 +3,93 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from scissorcal.kernel import StateFlag
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
-FAULT_LATCHED, COMMANDS_LOST = 2, 4
-SOME_WHOLE = float(np.nextafter(1.0, 0.0))
-"""Share of the strokes of one speed that may be interrupted: one whole stroke shows that speed."""
+SOME_WHOLE = 0.999
+"""Share of the strokes of one speed that may be interrupted: one whole stroke shows that speed, and
+no plan has a thousand of one."""
 
 
 @dataclass(frozen=True)
 class Interruptions:
     """``interrupted`` of ``strokes`` were, ``worst`` is the largest share of those of one speed.
 
-    ``late``: each time because no command came in time.
+    ``late`` of them were interrupted because no command came in time.
     """
 
     strokes: int
     interrupted: int
     worst: float
-    late: bool
+    late: int
 
     @property
     def sentence(self) -> str:
         """What happened and what to do; empty where no stroke was interrupted."""
         if not self.interrupted:
             return ""
-        why, remedy = "a fault latched", "Look up the faults with 'scissorcal recording show'"
+        remedies = []
         if self.late:
-            why = "commands came late"
-            remedy = "Close programs that load this computer, or give it a faster port"
+            remedies.append("close programs that load this computer, or give it a faster port")
+        if self.late < self.interrupted:
+            remedies.append("look up the faults with 'scissorcal recording show'")
+        remedy = "; ".join(remedies)
         return (
-            f"The device let go of its motors in {self.interrupted} of {self.strokes} strokes, "
-            f"since {why}. {remedy}, and record again."
+            f"The device let go of its motors in {self.interrupted} of {self.strokes} strokes, in "
+            f"{self.late} of them since commands came late: {remedy}, and record those speeds "
+            "again."
         )
+
+    @property
+    def decide(self) -> bool:
+        """Whether some speed was never recorded as planned."""
+        return self.worst > SOME_WHOLE
 
     def verdict(self, scope: str) -> Verdict:
         """Fails where every stroke of some speed was interrupted; some are *not evaluated*."""
         check = "interrupted strokes"
-        if self.worst > SOME_WHOLE:
+        if self.decide:
             return judge(scope, check, self.worst, SOME_WHOLE, self.sentence)
         return not_evaluated(scope, check, self.sentence, value=self.worst)
 
 
 def interruptions(recordings: tuple[Recording, ...]) -> Interruptions:
     """Count the strokes of captures during which a fault latched."""
-    shares, strokes, interrupted, late = [], 0, 0, True
+    kinds: dict[tuple[str, float], list[bool]] = {}
+    strokes = interrupted = late = 0
     for recording in recordings:
         if not recording.device:
             continue
-        label = np.asarray(recording.samples["stroke"])
-        flags = np.asarray(recording.samples["flags"])
-        planned = np.flatnonzero(label >= 0)
-        faulty = (flags & FAULT_LATCHED) != 0
-        latched = np.flatnonzero(faulty[1:] & ~faulty[:-1]) + 1
-        after = np.searchsorted(planned, latched)
-        within = (after > 0) & (after < len(planned))
-        before, later = label[planned[after[within] - 1]], label[planned[after[within]]]
-        cut_short = latched[within][before == later]
-        late &= bool(np.all(flags[cut_short] & COMMANDS_LOST))
-        hit = {int(number) for number in label[planned[np.searchsorted(planned, cut_short)]]}
-        kinds: dict[tuple[str, float], list[bool]] = {}
+        hit = _interrupted(recording)
         for stroke in recording.strokes:
             if np.isfinite(stroke.speed):
                 kinds.setdefault((stroke.kind, stroke.speed), []).append(stroke.index in hit)
-        shares += [float(np.mean(found)) for found in kinds.values()]
         strokes += len(recording.strokes)
         interrupted += len(hit)
-    return Interruptions(strokes, interrupted, max(shares, default=0.0), late)
+        late += sum(hit.values())
+    worst = max((float(np.mean(found)) for found in kinds.values()), default=0.0)
+    return Interruptions(strokes, interrupted, worst, late)
+
+
+def _interrupted(recording: Recording) -> dict[int, bool]:
+    """Numbers of the strokes in which a fault latched, and whether for want of commands.
+
+    A fault latches in the stroke that goes on after it, or whose sample came last before it.
+    """
+    label = np.asarray(recording.samples["stroke"], dtype=np.int64)
+    flags = np.asarray(recording.samples["flags"], dtype=np.int64)
+    faulty = (flags & int(StateFlag.FAULT_LATCHED)) != 0
+    latched: NDArray[np.intp] = np.flatnonzero(faulty[1:] & ~faulty[:-1]) + 1
+    planned = np.flatnonzero(label >= 0)
+    found: dict[int, bool] = {}
+    for at in latched:
+        place = int(np.searchsorted(planned, at))
+        before = int(label[planned[place - 1]]) if place else -1
+        later = int(label[planned[place]]) if place < len(planned) else -1
+        if before >= 0 and (before == later or label[at - 1] == before):
+            late = bool(flags[at] & int(StateFlag.COMMANDS_LOST))
+            found[before] = found.get(before, True) and late
+    return found

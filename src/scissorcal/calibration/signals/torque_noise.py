@@ -75,6 +75,8 @@ def torque_noise(
     if min(table[-1, 1] for table in left) >= FEWEST_SUMS:
         others = [_fitted(table, tick_s, ends, idle_white) for table in left]
         errors = np.sqrt((count - 1) * np.var(others, axis=0)).tolist()
+        if white <= idle_white:
+            errors[0] = float("nan")  # known from rest, not from these stretches
     return TorqueNoise(white, slow, time_s, *errors)
 
 

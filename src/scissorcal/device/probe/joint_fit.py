@@ -1,12 +1,12 @@
 """One physical model of the pushes: inertia, friction, load and delay with their uncertainty.
 
-The whole record of pushes is simulated (`scissorcal.kernel.follow_joint`), so that what friction
-has built up in one push is there in the next, and compared with the encoder. What a linear fit has
-to leave out is in the model: presliding over two lengths (Dahl 1968), friction that falls with the
-rate, a torque that carries the blades and its slope, a delay that need not be whole ticks, and the
-lag of the motor. Errors of samples are those of the encoder (step^2 / 12 and its jitter) and a
-share of the way that no such law follows; they are correlated within a push, so intervals are the
-larger of the sandwich estimate by pushes (White 1982, doi:10.2307/1912526) and the normal one
+The whole record of pushes is simulated (`scissorcal.kernel.joint.follow_joints`), so that what
+friction has built up in one push is there in the next, and compared with the encoder. What a linear
+fit has to leave out is in the model: presliding over two lengths (Dahl 1968), friction that falls
+with the rate, a torque that carries the blades and its slope, a delay that need not be whole ticks,
+and the lag of the motor. Errors of samples are those of the encoder (step^2 / 12 and its jitter)
+and a share of the way that no such law follows; they are correlated within a push, so intervals are
+the larger of the sandwich estimate by pushes (White 1982, doi:10.2307/1912526) and the normal one
 inflated by the misfit and by how long residuals stay alike.
 """
 
@@ -244,7 +244,10 @@ class _Problem:
         return [self.solved(x) for x, _ in begun[:KEPT]]
 
     def solved(self, start: Array) -> tuple[Array, float]:
-        """Values and minus the log of the posterior at a mode, up to a constant."""
+        """Values at a mode and minus the log of its posterior, nearly, up to a constant.
+
+        The pushes' covariance is that at ``start``.
+        """
         self.vary(start)
         return self._climbed(start, EVALUATIONS)
 
@@ -297,7 +300,7 @@ class _Problem:
         inflated = inverse * max(misfit * repeated, 1.0)
         scale = np.sqrt(np.maximum(1.0, np.diag(sandwich) / np.diag(inflated)))
         out = np.abs(x - self._mean) / self._prior_sd > STRANGE_SDS
-        out |= (x <= LOW) | (x >= HIGH)  # as `solved` clips them
+        out |= (x <= LOW) | (x >= HIGH)  # as `_climbed` clips them
         strange = tuple(
             f"{WORDS[name]} of {math.exp(value) if name.startswith('log') else value:.2g}"
             for name, value, wrong in zip(NAMES, x, out, strict=True)

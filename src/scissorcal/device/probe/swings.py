@@ -34,7 +34,7 @@ random rigs 0.6 took two thirds of the time, and 8 intervals of 45 missed the in
 EXPLAINED = 1.0
 """Misfit up to which residuals are what the law is known to leave out."""
 SHOWN = 6
-"""Pushes that a result keeps for people to look at: three pairs."""
+"""Pushes that a result keeps for people to look at: the strongest."""
 LIGHT_SDS = 2.0
 AIM_SHARE, WAY_SHARE, RATE_SHARE = 0.6, 0.8, 0.7
 """Of the bounds: what the model aims at, and what it may reach with the lightest blades."""

@@ -79,10 +79,9 @@ static void take_step(columns *c, size_t joints, double command, double dt)
         const double damping = c->viscous[j] + c->bristle[j] * yields;
         const double by = dt * c->per_inertia[j];
         const double next = (rate + by * torque) / (1.0 + by * damping);
-        const double way = dt * next;
-        const double size = fabs(way), sign = way < 0.0 ? -1.0 : 1.0;
+        const double size = dt * fabs(next), sign = next < 0.0 ? -1.0 : 1.0;
         c->rate[j] = next;
-        c->place[j] += way;
+        c->place[j] += 0.5 * dt * (rate + next); /* by dt * next it would be half a step ahead */
         c->fine[j] = sign - (sign - fine) * decay(size * c->per_fine[j]);
         c->slow[j] = sign - (sign - slow) * decay(size * c->per_slow[j]);
     }
@@ -104,7 +103,7 @@ void sc_joint_follow(const sc_joint *joint, size_t joints, const double *times, 
                      double step, double *places)
 {
     columns c;
-    double command = 0.0, ahead = 0.0, known_dt = -1.0;
+    double command = 0.0, known_dt = -1.0;
     size_t next = 0;
     if (count == 0 || joints == 0 || joints > SC_JOINTS)
         return;
@@ -118,7 +117,7 @@ void sc_joint_follow(const sc_joint *joint, size_t joints, const double *times, 
                 command = torques[next++];
             if (next < commands && switches[next] < until)
                 until = switches[next];
-            const double steps = ceil((until - now) / longest - 1e-9);
+            const double steps = fmax(1.0, ceil((until - now) / longest - 1e-9));
             const double dt = (until - now) / steps;
             if (fabs(dt - known_dt) > 1e-9 * dt) {
                 set_lags(&c, joint, joints, dt);
@@ -127,7 +126,6 @@ void sc_joint_follow(const sc_joint *joint, size_t joints, const double *times, 
             for (double done = 0.0; done < steps; done += 1.0)
                 take_step(&c, joints, command, dt);
             now = until;
-            ahead = 0.5 * dt; /* a symplectic place is half a step ahead of its time */
         }
         if (i == 0)
             hold(&c, joint, joints);
@@ -138,6 +136,6 @@ void sc_joint_follow(const sc_joint *joint, size_t joints, const double *times, 
             }
         }
         for (size_t j = 0; j < joints; j++)
-            places[j * count + i] = c.place[j] - ahead * c.rate[j];
+            places[j * count + i] = c.place[j];
     }
 }

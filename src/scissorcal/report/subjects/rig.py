@@ -1,4 +1,4 @@
-"""The rig as the last recording's probe found it: inertia, friction, delay; pushes and model."""
+"""The rig as the latest probe in the recordings found it, and its pushes beside the model."""
 
 from __future__ import annotations
 

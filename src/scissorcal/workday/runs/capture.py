@@ -246,7 +246,7 @@ def _capture_until(
     listed_min = seconds_at_rig(recipe, plan) / 60.0
     minutes = listed_min if until.max_minutes is None else until.max_minutes
     limits = Limits(minutes, until.at_least)
-    slowest = max(sweep_bounds(recipe, link.identity, probe)) if kind == "friction" else 0.0
+    slowest = sweep_bounds(recipe, link.identity, probe)[1] if kind == "friction" else 0.0
     choice = UntilTolerance(kind, recipe, link.identity, earlier, limits, slowest_sweep=slowest)
     path = workspace.new_recording(kind)
     text = read_text(workspace.recipe_path)

@@ -63,14 +63,22 @@ def sweep_bounds(
 ) -> tuple[float, float]:
     """Speeds (rad/s) below which an empty sweep is too slow: for the encoder, for the rig's gains.
 
-    The second is 0 where nothing is known of it. Raises DeviceError as ``capture_gains``.
+    The second, with two digits, is 0 where nothing is known of it. Raises DeviceError as
+    ``capture_gains``, InputError where the blades would stick at any speed.
     """
     from scissorcal.device.capture_gains import Probed, capture_gains
     from scissorcal.workday.stock import LEAST_FLOORS
 
     cutoff_Hz = recipe.fit.friction.cutoff_Hz
     floor = LEAST_FLOORS * _rate_floor(identity.opening_resolution, cutoff_Hz, identity)
-    return floor, capture_gains(recipe, identity, "friction", Probed.of(probe)).sticks_below
+    sticks = capture_gains(recipe, identity, "friction", Probed.of(probe)).sticks_below
+    if math.isinf(sticks):
+        raise InputError(
+            "No empty sweep of this rig is steady: within the margins that its delay allows, no "
+            "gains stand friction that falls with speed. Shorten the adapter's latency timer, "
+            "raise the baud rate, or take a faster tick, and probe again."
+        )
+    return floor, _rounded_up(sticks)
 
 
 def sliding_below_encoder(recipe: "Recipe", identity: "Identity") -> str:

@@ -1,0 +1,23 @@
+"""An encoder that shows too little of a material's unloading is named, with what would do."""
+
+from dataclasses import replace
+
+import pytest
+
+from scissorcal.calibration.cut.guess import CoarseEncoderError
+from scissorcal.calibration.cut.scout import refuse_coarse
+from scissorcal.calibration.cut.segments import LEAST_PIECE_COUNTS, Segments
+
+FEW = Segments((), (), (), (), longest=0.016, steps=20.9)
+
+
+def test_too_few_steps_are_named_with_the_counts_that_would_do() -> None:
+    with pytest.raises(
+        CoarseEncoderError, match=r"over 16 mrad.*21 steps.*0\.77 mrad.*9,000 counts"
+    ):
+        refuse_coarse(FEW)
+
+
+@pytest.mark.parametrize("steps", [0.0, LEAST_PIECE_COUNTS])
+def test_no_unloading_at_all_and_enough_steps_are_not_the_encoders(steps: float) -> None:
+    refuse_coarse(replace(FEW, steps=steps))
