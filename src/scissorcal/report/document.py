@@ -162,8 +162,8 @@ def compose(
         *own,
         *sheet_panels,
         closing.left_out_panel(recipe, fits, dict(missing.items())),
-        *rig_panels(evidence.recordings),
         closing.provenance_panel(provenance, evidence.recordings),
+        *rig_panels(evidence.recordings),
     )
     return ReportDocument(
         FORMAT, created, version, recipe.name, recipe.description, recipe.material.name, origin,
