@@ -17,10 +17,12 @@ from scissorcal.kernel import Capability
 from scissorcal.recording import read_attachments, read_recording, read_telemetry
 from scissorcal.recording.telemetry import CONTROL
 from scissorcal.verdicts import failed
+from scissorcal.workday.rigs import open_rig
 from scissorcal.workday.runs import control as runs_control
 from scissorcal.workday.runs.capture import capture_advance_into, capture_into
 from scissorcal.workday.runs.control import control_workspace, stated_pose
 from scissorcal.workday.runs.fit import fit_workspace
+from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.workspace import Workspace, create_workspace
 
 LONG = """speeds_rad_per_s = [0.05, 0.12, 0.3, 0.7, 1.5]
@@ -179,6 +181,8 @@ def test_the_surface_and_its_material_are_the_recipes(fitted: Workspace, tmp_pat
 
     other = Workspace(tmp_path / "paper")
     shutil.copytree(fitted.root, other.root)
+    with open_rig("sim", other.recipe().specimen, 0) as link:
+        ensure_probed(other, link, other.recipe())  # the last one may be of another test's rig
     late = json.loads(other.probe_path.read_text())
     late["delay_s"] = {"mean": 4e-3, "sd": 1e-4}
     other.probe_path.write_text(json.dumps(late))
