@@ -12,15 +12,6 @@ from scissorcal.cli.output import Answer, command, note, table
 if TYPE_CHECKING:
     from scissorcal.device.probe.result import ProbeResult
 
-_ROWS = (
-    ("torque zero", "torque_zero_Nm", 1e3, "mN m"),
-    ("force zero", "force_zero_N", 1.0, "N"),
-    ("delay", "delay_s", 1e3, "ms"),
-    ("measured over commanded torque", "torque_gain", 1.0, ""),
-    ("inertia", "inertia_kg_m2", 1e6, "kg mm^2"),
-    ("dry friction", "coulomb_Nm", 1e3, "mN m"),
-    ("viscous friction", "viscous_Nm_s_per_rad", 1e3, "mN m s/rad"),
-)
 _FACTS = (
     ("breakaway", "breakaway_Nm", 1e3, "mN m"),
     ("encoder step", "encoder_step_rad", 1e6, "urad"),
@@ -91,8 +82,10 @@ def probe(
 
 def _text(result: "ProbeResult") -> str:
     """Estimates with their standard deviation, and the facts that people ask for."""
+    from scissorcal.recording.probe import ESTIMATES
+
     rows = [["", "estimate", "sd", ""]]
-    for label, name, scale, unit in _ROWS:
+    for label, name, scale, unit in ESTIMATES:
         found = getattr(result, name)
         if found is not None:
             rows.append([label, f"{scale * found.mean:.4g}", f"{scale * found.sd:.2g}", unit])

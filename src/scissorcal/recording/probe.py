@@ -18,6 +18,17 @@ PROBE_KEY = "probe"
 NORMAL_90 = 1.6448536269514722
 """Half the width of an interval of 90 % of a normal distribution, in standard deviations."""
 
+ESTIMATES = (
+    ("torque zero", "torque_zero_Nm", 1e3, "mN m"),
+    ("force zero", "force_zero_N", 1.0, "N"),
+    ("delay", "delay_s", 1e3, "ms"),
+    ("measured over commanded torque", "torque_gain", 1.0, ""),
+    ("inertia", "inertia_kg_m2", 1e6, "kg mm^2"),
+    ("dry friction", "coulomb_Nm", 1e3, "mN m"),
+    ("viscous friction", "viscous_Nm_s_per_rad", 1e3, "mN m s/rad"),
+)
+"""Estimates of a probe as people read them: name, field, factor to the unit, unit."""
+
 
 @dataclass(frozen=True)
 class Estimate:

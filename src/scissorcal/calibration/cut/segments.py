@@ -30,8 +30,7 @@ ELASTIC_SEGMENTS = 8
 """Segments between touching and the deepest point of an elastic piece."""
 LEAST_SEGMENT_COUNTS, SHORT_SEGMENT_COUNTS = 6.0, 4.0
 """Least encoder steps of an elastic segment; the second in a piece with too few segments."""
-LEAST_PIECE_COUNTS = (FEWEST_SEGMENTS + 0.5) * SHORT_SEGMENT_COUNTS
-"""Least encoder steps of a whole piece."""
+LEAST_PIECE_COUNTS = (FEWEST_SEGMENTS + 0.5) * SHORT_SEGMENT_COUNTS  # encoder steps of a piece
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
 """Least length and least teeth of running segments: in shorter ones the teeth are
 fitted as short-range unevenness in place of the long-range one, and intervals get too narrow."""
@@ -114,8 +113,7 @@ class Stretch:
 class Segments:
     """The data of a likelihood of cuts.
 
-    ``longest`` is the path (rad) over which blades loaded or unloaded a crack at rest, where it is
-    the most steps of the encoder, and ``steps`` how many.
+    ``longest`` (rad) is the loading or unloading with the most steps of the encoder, ``steps``.
     """
 
     motions: tuple[PathMotion, ...]

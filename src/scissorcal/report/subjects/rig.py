@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scissorcal.recording.probe import Estimate, ProbeResult, Swing, probe_of
+from scissorcal.recording.probe import ESTIMATES, Estimate, ProbeResult, Swing, probe_of
 from scissorcal.report.inputs import RecordingSummary
 from scissorcal.report.panel import (
     Axis,
@@ -20,16 +20,6 @@ from scissorcal.report.panel import (
 )
 
 ID, PART, TITLE = "provenance-rig", "provenance", "The rig as it was probed"
-ESTIMATES = (
-    ("inertia", "inertia_kg_m2", 1e6, "kg mm^2"),
-    ("dry friction", "coulomb_Nm", 1e3, "mN m"),
-    ("viscous friction", "viscous_Nm_s_per_rad", 1e3, "mN m s/rad"),
-    ("delay", "delay_s", 1e3, "ms"),
-    ("torque measured over commanded", "torque_gain", 1.0, ""),
-    ("zero of the torque", "torque_zero_Nm", 1e3, "mN m"),
-    ("zero of the force", "force_zero_N", 1.0, "N"),
-)
-"""Name, field of the probe, factor to the unit that people read, and that unit."""
 LOOKS: tuple[Look, ...] = ("blue", "vermillion", "green", "purple", "orange", "ink")
 
 
