@@ -83,6 +83,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     ),
     "fit physical": ("at most", "signs of levels: sds by which one is below zero"),
     "fit start": ("at least", f"{_SEARCH}: least way from its start, in prior sds"),
+    "fit near rest": (
+        "at most",
+        "friction at half of the slowest swept rate: half width of its interval, share of it",
+    ),
     "fit bandwidth": ("at most", f"{_INTERVALS}: sds by which a parameter moves with the cutoff"),
     "fit steady sweeps": (
         "at most",

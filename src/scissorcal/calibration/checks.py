@@ -12,6 +12,7 @@ from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior, SearchStatus
 from scissorcal.inference.importance import ADAPTED_LIMIT, GOOD_MIXTURE_K
 from scissorcal.inference.importance import K_HAT_LIMIT as K_HAT_LIMIT
+from scissorcal.model.friction_terms import NEAR_REST
 from scissorcal.verdicts import Status, Verdict, judge, not_evaluated
 
 PRIOR_ONLY = 0.9
@@ -50,7 +51,7 @@ def trust_verdicts(
         _search(scope, posterior, nuisance),
         _importance(scope, effort, posterior),
         _bounds(scope, chosen),
-        _identified(scope, chosen, posterior, nuisance),
+        _identified(scope, chosen, posterior, (*nuisance, *NEAR_REST)),
         _null(scope, posterior, nuisance),
         _independent(scope, chosen, diagnostics, held_out),
         _explained(scope, diagnostics),
@@ -139,13 +140,18 @@ def _identified(
 def _null(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
     """Directions that data leave to the prior; those with nuisance parameters in them may be.
 
-    What is reported of a law's parameter then still has the width that the nuisance gives it.
+    What is reported of a law's parameter then still has the width that the nuisance gives it. What
+    only concerns friction near rest has a check of its own.
     """
 
     def names(direction: str) -> set[str]:
         return {part.partition(" (")[0] for part in direction.split(" + ")}
 
-    silent = [direction for direction in posterior.null if not names(direction) & set(nuisance)]
+    silent = [
+        direction
+        for direction in posterior.null
+        if not names(direction) & set(nuisance) and names(direction) - set(NEAR_REST)
+    ]
     bad = (
         f"The data leave {'; '.join(silent)} to the prior: the effects of parameters named "
         "together are not distinguishable. Record motion in which they act differently, or choose "

@@ -61,7 +61,7 @@ EFFORT, EFFORT_BY_RATE, FREE = (1, 0, 0), (1, -1, 1), (0, 0, 0)
 
 _STATIC = (
     "static friction is about 1.3 times Coulomb friction (Armstrong-Helouvry et al. 1994, "
-    "doi:10.1016/0005-1098(94)90209-7)"
+    "doi:10.1016/0005-1098(94)90209-7), and hardly 2.5 times; the factor is of their ratio"
 )
 _SURFACE = "lubricated metal has Stribeck speeds of 0.1 to 10 mm/s (Armstrong-Helouvry et al. 1994)"
 _METAL = "sliding pairs of metal have 0.05 to 0.3"
@@ -139,8 +139,9 @@ _LAW = (
         transform=LOG,
         scale="stribeck_rate",
         prior=Prior(
-            (6e-3, 15.0, _STATIC),
-            (3.0, 15.0, _STATIC),
+            (6e-3, 5.0, _STATIC),
+            (3.0, 5.0, _STATIC),
+            beside="coulomb",
         ),
         remedy="static friction would be below Coulomb friction: record slower sweeps, or choose "
         "a law without Stribeck friction",
@@ -307,6 +308,7 @@ PARAMETERS = {term.name: term for term in (*_LAW, *_NUISANCE)}
 TERMS = {term.name: term for term in _ADOPTED}
 """Terms that the critic proposes and a recipe adopts, by name, simple ones first."""
 NUISANCE = tuple(term.name for term in _NUISANCE)
+NEAR_REST = tuple(n for t in _LAW if t.scale for n in (t.name, t.scale))
 
 ADOPTED = Prior(
     (0.0, 0.1, "five times the usual Coulomb friction, at 1 rad, 1 rad/s and 0.1 N m"),

@@ -76,13 +76,16 @@ class Prior:
 
     By the row's transform: (median, factor_90) of a logarithm, (mean, sd) of the identity, (median,
     odds_factor_90) of a logit. ``key`` is the recipe's name without its unit, by default that of
-    the parameter. ``in_ticks`` priors are stated in samples of the recording.
+    the parameter. ``in_ticks`` priors are stated in samples of the recording. ``beside`` names a
+    level in whose proportion this one is: its median holds at that level's, its factor for their
+    ratio.
     """
 
     rotary: tuple[float, float, str]
     linear: tuple[float, float, str]
     key: str = ""
     in_ticks: bool = False
+    beside: str = ""
 
     def of(self, kind: JointKind) -> tuple[float, float, str]:
         """The default for one kind of joint."""

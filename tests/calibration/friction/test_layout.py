@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from scissorcal.calibration.friction.layout import Drive, friction_layout
+from scissorcal.calibration.friction.layout import Drive, friction_layout, friction_precision
 from scissorcal.calibration.friction.model import design
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.model.friction_terms import law_names
@@ -71,17 +71,32 @@ def test_every_law_has_parameters_with_units_and_proper_priors(law, kind):
 
 
 def test_nine_of_ten_draws_of_the_prior_are_hand_tools():
-    """Nine of ten draws have an inertia, levels and a Stribeck speed as hand tools have."""
+    """Nine of ten draws have an inertia, levels and a Stribeck speed as hand tools have, and static
+    friction between 1.06 and 2.5 times Coulomb friction."""
     layout = friction_layout("stribeck", True, Joint(), JointPriors().rotary)
     rng = np.random.default_rng(3)
-    u = layout.mean + layout.sd * rng.standard_normal((4000, len(layout.names)))
-    values = layout.natural(u)
+    covariance = np.linalg.inv(friction_precision(layout))
+    values = layout.natural(rng.multivariate_normal(layout.mean, covariance, 4000))
+    values["stribeck"] = values["stribeck"] / values["coulomb"]
     for name, low, high in (
         ("inertia", 3e-6, 3e-2),
         ("coulomb", 2e-4, 2.0),
         ("viscous", 2e-5, 0.2),
-        ("stribeck", 4e-4, 0.09),
+        ("stribeck", 0.06, 1.5),
         ("stribeck_rate", 0.01, 1.0),
     ):
         inside = np.mean((values[name] > low) & (values[name] < high))
         assert inside == pytest.approx(0.9, abs=0.025), name
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_static_friction_goes_with_coulomb_friction(symmetric):
+    """Friction ten times as large as the priors' centres has the same density of their ratio."""
+    layout = friction_layout("stribeck", symmetric, Joint(), JointPriors().rotary)
+    precision = friction_precision(layout)
+    larger = np.array([np.log(10.0) * n.startswith(("coulomb", "stribeck")) for n in layout.names])
+    larger[layout.names.index("stribeck_rate")] = 0.0
+    alone = larger * np.array([n.startswith("coulomb") for n in layout.names])
+    own = 0.5 * float(alone @ np.diag(1.0 / layout.sd**2) @ alone)
+    assert 0.5 * float(larger @ precision @ larger) == pytest.approx(own)
+    assert 0.5 * float(alone @ precision @ alone) > own + 2.0

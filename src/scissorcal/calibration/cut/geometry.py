@@ -1,5 +1,6 @@
 """The edge over the sheet, linearised about an estimate of the crack's place."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -69,6 +70,17 @@ class Geometry:
     def edge(self) -> Edge:
         """The most probable edge."""
         return self.belief.edge
+
+    def at(self, values: Mapping[str, float]) -> "Geometry":
+        """The geometry with the edge that parameters by name give, those that are missing as here.
+
+        Cracks are placed by it: where the blades have nearly closed, an edge off by 30 um moves a
+        crack by 0.3 mm, and loading would seem to end where the crack runs already.
+        """
+        edge = self.belief.with_values(
+            {name: values[f"edge_{name}"] for name in self.belief.names if f"edge_{name}" in values}
+        )
+        return replace(self, belief=replace(self.belief, edge=edge))
 
     def depth_and_lever(self, edge: Edge, opening: Array, contact: Array) -> tuple[Array, Array]:
         """Indentation (m) at a contact, and the lever (m) by which force becomes torque."""

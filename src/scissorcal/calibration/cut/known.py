@@ -35,8 +35,9 @@ class KnownFriction:
     to the posterior median: along a curved ridge the mean lies beside it. ``closing_sd`` and
     ``opening_sd`` (N m) are how well friction is known in either direction over all strokes,
     ``stroke_sd`` what single strokes differ by. ``cogging`` is (cosine, sine, periods per turn) of
-    what the motor adds to the measured drive. ``prior`` takes the recipe's place where a study of
-    simulated data states one.
+    what the motor adds to the measured drive. ``fine_rad`` is the length over which the part of dry
+    friction builds up that the law lets jump, 0 where no probe found it. ``prior`` takes the
+    recipe's place where a study of simulated data states one.
     """
 
     law: FrictionLaw
@@ -47,6 +48,7 @@ class KnownFriction:
     closing_sd: float
     opening_sd: float
     stroke_sd: float
+    fine_rad: float = 0.0
     prior: StatedPrior | None = None
 
     @classmethod
@@ -71,6 +73,7 @@ class KnownFriction:
             closing_sd=closing,
             opening_sd=opening,
             stroke_sd=max(floor, stroke),
+            fine_rad=float(friction.diagnostics.get("fine_presliding_rad", 0.0)),
         )
 
     def with_zero(self, own: DriveZero | None, before: DriveZero | None) -> "KnownFriction":
@@ -90,7 +93,20 @@ class KnownFriction:
 
     def material(self, motion: PathMotion) -> Material:
         """Work and torque of the material along a motion, friction and cogging taken off."""
-        return material_of(motion, self.law, self.offset, self.cogging)
+        return material_of(motion, self.law, self.offset, self.cogging, self.reversal_rad)
+
+    @property
+    def reversal_rad(self) -> float:
+        """The way after a turn until what the law lets jump has come within its sd.
+
+        Dahl's friction reverses by 2 F e^(-x / length) less than all; F is the level without the
+        part for which the law has a length of its own.
+        """
+        share = float(np.asarray(self.law["presliding_share"]))
+        rates = np.array([-USUAL_RATE, USUAL_RATE])
+        level = np.abs(friction_torque(self.law, self.law.angle_center, rates)).max()
+        left = 2.0 * (1.0 - share) * float(level) / max(self.closing_sd, self.opening_sd)
+        return self.fine_rad * max(float(np.log(max(left, 1.0))), 0.0)
 
 
 def _middle(friction: FitResult, centre: float) -> dict[str, Array]:

@@ -99,7 +99,13 @@ def scout(
         law = CutLaw("power", fracture, loaded=loaded)
         for _ in range(ROUNDS if loaded else 1):
             segments = cut_into_segments(
-                motions, materials, geometry, guess, known.noise, known.stroke_sd, recipe.scene.cut
+                motions,
+                materials,
+                geometry.at(values),
+                guess,
+                known.noise,
+                known.stroke_sd,
+                recipe.scene.cut,
             )
             if not segments.pieces:
                 refuse_coarse(segments)

@@ -25,7 +25,7 @@ from scissorcal.calibration.design.information import (
 )
 from scissorcal.calibration.design.knowledge import Knowledge
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.calibration.friction.layout import Drive, friction_layout
+from scissorcal.calibration.friction.layout import Drive, friction_layout, friction_precision
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
@@ -84,7 +84,7 @@ def fitted_friction(
     knowledge = Knowledge(
         design.layout,
         point,
-        np.diag(1.0 / design.layout.sd**2),
+        design.prior_precision,
         _by_recording(told, owners, len(point)),
         between=_between(design.layout, fit),
     )
@@ -155,7 +155,7 @@ def expected_friction(recipe: Recipe) -> FrictionState:
         opening_sd=floor,
         stroke_sd=floor,
     )
-    knowledge = Knowledge(layout, layout.mean, np.diag(1.0 / layout.sd**2))
+    knowledge = Knowledge(layout, layout.mean, friction_precision(layout))
     return FrictionState(knowledge, structure, noise, floor, zero_sd, known)
 
 

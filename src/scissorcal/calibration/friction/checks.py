@@ -1,4 +1,4 @@
-"""Verdicts on a friction law: physical levels, a search that moved, no effect of the cutoff."""
+"""Verdicts on a friction law: physical levels, a search that moved, rates near rest, the cutoff."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.parameters import Layout
+from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, side_of
-from scissorcal.verdicts import Verdict, judge
+from scissorcal.model.transforms import LOG
+from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 Array = NDArray[np.float64]
 
@@ -19,6 +21,15 @@ CERTAIN = 3.0
 MOVED_LIMIT = 4.0
 """Posterior standard deviations by which a parameter may change with the cutoff."""
 UNMOVED = 1e-9
+MOST_STEPS = 30
+LOGS = (-60.0, 60.0)
+PASSING = 0.01
+"""Share of the motion below whose rate a joint only passes through."""
+NEAR_REST = 0.05
+"""Half width of an interval, share of friction: with as much from the rest, a recipe's tolerance of
+7 % of the torque is kept."""
+SLOWER = 2.0
+"""From twice the rate that the encoder can tell, a sweep at half the speed is worth while."""
 NOTHING = 0.02
 """Share of the drive's standard deviation below which Stribeck friction counts as absent."""
 
@@ -28,13 +39,16 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
 
     Levels are fitted by their logarithms, so data that call for a negative one leave it near zero
     without a sign of trouble. One step of least squares from the optimum ``point`` (p,), without
-    that constraint and without priors, shows it. Laws without viscous friction get it for this
-    step. ``share`` is the share of bins that are independent.
+    that constraint and without priors, suspects it. Far from the optimum such a step is none of
+    the law any more, so two searches that settle decide, with free signs and without: a level is
+    negative where the first explains the data better by CERTAIN standard deviations. Laws without
+    viscous friction get it for both. ``share`` is the share of bins that are independent.
     """
     values = {name: float(value) for name, value in experiment.layout.natural(point).items()}
     rows = _rated(experiment, values)
     found = [level for row in rows for level in _freed(experiment, row, share)]
-    negative = sorted(level for level in found if level.sds_below > CERTAIN)
+    suspected = [level for level in found if level.sds_below > CERTAIN]
+    negative = sorted(_settled(experiment, rows, share) if suspected else [])
     good = "No friction level is negative in an unconstrained fit, and the inertia is not."
     worst = {level.name: level for level in negative}.values()
     listed = ", ".join(f"{one.name} = {one.value:.2g} (sd {one.sd:.1g})" for one in worst)
@@ -62,6 +76,37 @@ def start_verdict(experiment: FrictionExperiment, point: Array) -> Verdict:
     )
     good = "Every parameter moved from where the search began."
     return judge(SCOPE, "start", value, UNMOVED, good, bad)
+
+
+def near_rest_verdict(experiment: FrictionExperiment, draws: Array) -> Verdict:
+    """Judge whether friction is known below the rates that were swept.
+
+    There a law extrapolates: Stribeck's level and rate keep what the prior says of them where no
+    sweep was slow enough. ``draws`` (k, p) are the posterior's, unconstrained. A wide interval is
+    no fault of the fit, so the check never fails.
+    """
+    rates = np.abs(experiment.bins.rate)
+    slowest = float(np.quantile(rates, PASSING))
+    centre, unit = float(experiment.key["angle_center"]), f"{experiment.joint.position_unit}/s"
+    named = {name: value[:, None] for name, value in experiment.layout.natural(draws).items()}
+    wanted = 0.5 * slowest * np.array([-1.0, 1.0])
+    levels = friction_torque(FrictionLaw.of_fit(named, centre), centre, wanted)
+    low, middle, high = np.quantile(levels, [0.05, 0.5, 0.95], axis=0)
+    share = float(np.max(0.5 * (high - low) / np.maximum(np.abs(middle), 1e-300)))
+    said = (
+        f"Friction at {0.5 * slowest:.2g} {unit}, half of the slowest rate that was swept, is "
+        f"known to {share:.1%} (90 %)"
+    )
+    if share <= NEAR_REST:
+        return judge(SCOPE, "near rest", share, NEAR_REST, f"{said}.")
+    floor = experiment.bins.rate_floor
+    cure = (
+        f"sweep more slowly: the encoder tells the sense of motion from {floor:.2g} {unit} on"
+        if slowest > SLOWER * floor
+        else f"a finer encoder or a longer tick would show slower sweeps than {floor:.2g} {unit}"
+    )
+    why = f"{said}. Slower friction is extrapolated, and bands are as wide; to measure it, {cure}."
+    return not_evaluated(SCOPE, "near rest", why, NEAR_REST, share)
 
 
 def bandwidth_verdict(
@@ -125,13 +170,7 @@ def _rated(experiment: FrictionExperiment, values: dict[str, float]) -> list[dic
 
 def _freed(experiment: FrictionExperiment, values: dict[str, float], share: float) -> list[_Level]:
     """Levels of a free least-squares fit near a point."""
-    layout = experiment.layout
-    offered = []
-    if side_of("viscous_pos", values) is None:
-        sides = ("",) if experiment.key["symmetric"] else ("_pos", "_neg")
-        offered = [f"viscous{side}" for side in sides]
-    fixed = ("noise", *(one.name for one in layout.parameters if one.believed))
-    names = [*(name for name in layout.names if name not in fixed), *offered]
+    names = _names(experiment, values)
     columns = np.stack([_slope(experiment, values, name) for name in names], axis=1)
     residuals = experiment.observed - experiment.mean_at(_arrays(values))
     size = np.sqrt(np.mean(columns**2, axis=0))
@@ -146,6 +185,86 @@ def _freed(experiment: FrictionExperiment, values: dict[str, float], share: floa
         below = -value / float(sd / unit) if sd > 0 and np.isfinite(unit) else 0.0
         levels.append(_Level(below, name, value, float(sd / unit)))
     return [level for level in levels if level.remedy]
+
+
+def _names(experiment: FrictionExperiment, values: Mapping[str, float]) -> list[str]:
+    """Parameters of an unconstrained fit: what is fitted, and viscous friction in any case."""
+    layout, offered = experiment.layout, []
+    if side_of("viscous_pos", values) is None:
+        sides = ("",) if experiment.key["symmetric"] else ("_pos", "_neg")
+        offered = [f"viscous{side}" for side in sides]
+    fixed = ("noise", *(one.name for one in layout.parameters if one.believed))
+    return [*(name for name in layout.names if name not in fixed), *offered]
+
+
+def _settled(
+    experiment: FrictionExperiment, rows: list[dict[str, float]], share: float
+) -> list[_Level]:
+    """Negative levels of the best fit with free signs; none where one without is as good."""
+    weights = _student_weights(experiment, rows[0])
+    held, free = (
+        min(
+            (_searched(experiment, row, weights, free=free) for row in rows),
+            key=lambda one: one[0],
+        )
+        for free in (False, True)
+    )
+    # Twice the gain of a likelihood whose noise is known from what the better fit leaves.
+    count = share * len(experiment.observed)
+    away = float(np.sqrt(max(count * np.log(held[0] / max(free[0], 1e-300)), 0.0)))
+    if away <= CERTAIN:
+        return []
+    below = [_Level(away, n, v, abs(v) / away) for n, v in free[1].items() if v < 0.0]
+    return [level for level in below if level.remedy]
+
+
+def _student_weights(experiment: FrictionExperiment, values: Mapping[str, float]) -> Array:
+    """Square roots of the weights (n,) that the law's noise gives at its optimum ``values``."""
+    residuals = experiment.observed - experiment.mean_at(_arrays(values))
+    tails = experiment.tails
+    if np.isinf(tails):
+        return np.ones_like(residuals)
+    away = residuals / values["noise"]
+    return np.asarray(np.sqrt((tails + 1.0) / (tails + away**2)))
+
+
+def _searched(
+    experiment: FrictionExperiment, values: dict[str, float], weights: Array, *, free: bool
+) -> tuple[float, dict[str, float]]:
+    """Sum of squares and parameters of a least-squares fit that begins at ``values``.
+
+    Parameters that may be negative nowhere are searched by their logarithm: Stribeck's rate,
+    lengths, and levels where signs are not ``free``.
+    """
+    from scipy.optimize import least_squares
+
+    names = _names(experiment, values)
+    unit = float(np.std(experiment.observed))
+    floor = 1e-6 * unit
+    begin = {name: values.get(name, 0.0) for name in names}
+    kinds = {one.name: one.transform for one in experiment.layout.parameters}
+    logs = [name for name in names if kinds.get(name, LOG) == LOG and not (free and _signed(name))]
+    begin |= {name: max(begin[name], floor) for name in logs}
+    scale = {name: max(abs(begin[name]), floor) for name in names}
+
+    def named(x: Array) -> dict[str, float]:
+        found = dict(values)
+        for name, at in zip(names, x, strict=True):
+            found[name] = float(np.exp(np.clip(at, *LOGS)) if name in logs else at * scale[name])
+        return found
+
+    def left(x: Array) -> Array:
+        return (experiment.observed - experiment.mean_at(_arrays(named(x)))) * weights / unit
+
+    start = [np.log(begin[n]) if n in logs else begin[n] / scale[n] for n in names]
+    fit = least_squares(left, np.array(start), max_nfev=MOST_STEPS)
+    return 2.0 * float(fit.cost), named(fit.x)
+
+
+def _signed(name: str) -> bool:
+    """Whether a parameter is a level, whose sign is judged."""
+    row = side_of(name, PARAMETERS)
+    return row is not None and bool(PARAMETERS[row].remedy)
 
 
 def _slope(experiment: FrictionExperiment, values: Mapping[str, float], name: str) -> Array:

@@ -22,6 +22,7 @@ from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.friction.checks import (
     bandwidth_verdict,
+    near_rest_verdict,
     physical_verdict,
     start_verdict,
 )
@@ -49,6 +50,7 @@ from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import Posterior, Stop, infer, tails_of
 from scissorcal.model.friction_terms import NUISANCE, needs_load
 from scissorcal.recipe.schema import FitFriction
+from scissorcal.recording.probe import probe_of
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict, not_evaluated
 
@@ -59,6 +61,9 @@ DRAFT_LAWS = {
     "linear": "coulomb + viscous, symmetric",
 }
 """What draft effort fits to a joint where nothing says otherwise."""
+
+FINE = "presliding_rad"
+"""The shorter of the two lengths over which a probe sees friction build up."""
 
 OUTLIERS = 4.0
 """Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
@@ -130,6 +135,7 @@ def fit_friction(
         extra_verdicts=(
             physical_verdict(law, chosen.optimum.point, chosen.share),
             start_verdict(law, chosen.optimum.point),
+            near_rest_verdict(law, posterior.draws),
             _bandwidth(again, law, chosen, posterior, effort),
             sensors.verdict,
             *((broken.verdict("fit.friction"),) if broken.interrupted else ()),
@@ -146,7 +152,7 @@ def fit_friction(
             *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
         ),
         extra_diagnostics={
-            **_diagnostics(law, chosen, between, idle_noise(recordings)),
+            **_diagnostics(law, chosen, between, recordings),
             **(zero.as_dict() if zero else {}),
         },
     )
@@ -251,15 +257,17 @@ def _diagnostics(
     law: FrictionExperiment,
     chosen: FittedCandidate,
     between: BetweenRecordings | None,
-    idle_white: float,
+    recordings: tuple[Recording, ...],
 ) -> dict[str, Any]:
     """What a fit stores beside its parameters: noise, scatter of strokes and of recordings."""
     point = chosen.optimum.point
-    noise = sample_noise(law, point, idle_white)
+    noise = sample_noise(law, point, idle_noise(recordings))
+    probes = [probe for one in recordings if (probe := probe_of(one.device)) is not None]
     residuals = chosen.candidate.likelihood.residuals(point)
     return {
         "window_lengthening": law.windows.lengthening,
         "jackknife_sd": jackknife(law, point, NUISANCE),
+        "fine_presliding_rad": max((p.facts.get(FINE, 0.0) for p in probes), default=0.0),
         **(between.diagnostics() if between else {}),
         **noise_diagnostics(noise),
         "stroke_offset_sd_Nm": stroke_offsets(residuals, law.strokes, law.windows, noise),
@@ -380,16 +388,8 @@ def _laws(
         return design(windows, strokes, law, symmetric, joint, priors, adopt, periods, prior, sd)
 
     plain = one(names[0], False)
-    cogging = NO_COGGING if joint.kind == "linear" else find_cogging(_clear_of_turns(plain).moments)
+    cogging = NO_COGGING if joint.kind == "linear" else find_cogging(plain.moments)
     periods = cogging.periods_per_turn if cogging.found else 0.0
     laws = [one(law, symmetric, periods) for law in names for symmetric in both[settings.symmetry]]
     shared = laws[0].moments if periods else plain.moments
     return [replace(law, shared=shared) for law in laws], cogging
-
-
-def _clear_of_turns(law: FrictionExperiment) -> FrictionExperiment:
-    """The same law over the windows that hold no turn."""
-    steady = law.windows.without_turns
-    if np.all(steady):
-        return law
-    return replace(law, windows=law.windows.where(steady), strokes=law.strokes[steady])

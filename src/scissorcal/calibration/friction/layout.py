@@ -2,11 +2,16 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.model.friction_terms import PARAMETERS, REFERENCE, TERMS, terms_of
 from scissorcal.model.terms import Term
 from scissorcal.recipe.priors import FrictionPriors
 from scissorcal.recording.recording import Joint
+
+Array = NDArray[np.float64]
 
 SIDES = {"": "", "_pos": ", positive rate", "_neg": ", negative rate"}
 
@@ -60,6 +65,23 @@ def friction_layout(
             continue
         rows += _rows(term, symmetric, joint, priors, drive.held_tick_s or 1.0)
     return Layout(tuple(rows))
+
+
+def friction_precision(layout: Layout) -> Array:
+    """Precision (p, p) of the prior: levels that stand in proportion to others go with them."""
+    precision = np.diag(1.0 / layout.sd**2)
+    for place, name in enumerate(layout.names):
+        term = PARAMETERS.get(name)
+        if term is None or term.prior is None or not term.prior.beside:
+            continue
+        symmetric = term.prior.beside in layout.names
+        levels = PARAMETERS[term.prior.beside].names(symmetric)
+        ratio = np.zeros(len(layout.names))
+        ratio[[layout.names.index(level) for level in levels]] = -1.0 / len(levels)
+        ratio[place] = 1.0
+        precision[place, place] = 0.0
+        precision += np.outer(ratio, ratio) / layout.sd[place] ** 2
+    return precision
 
 
 def _rows(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.fit_candidate import Candidate, Likelihood
 from scissorcal.calibration.friction.columns import SCALES, FrictionBasis
-from scissorcal.calibration.friction.layout import Drive, friction_layout
+from scissorcal.calibration.friction.layout import Drive, friction_layout, friction_precision
 from scissorcal.calibration.friction.moments import ReducedLaw, StrokeMoments
 from scissorcal.calibration.friction.search import search
 from scissorcal.calibration.parameters import Layout
@@ -46,19 +46,19 @@ class FrictionExperiment:
     discrete choices: ``law``, ``symmetric``, ``angle_center``, ``adopt``, the names of adopted
     terms, and ``cogging_periods_per_turn`` where cogging was found. ``tails`` are the degrees of
     freedom of the noise. ``shared`` are moments that another law over the same windows has made
-    already, if any. ``prior_precision`` (p, p) takes the place of the layout's own, if given.
+    already, if any. ``prior_precision`` (p, p) is that of all parameters together.
     """
 
     windows: Windows
     strokes: Integers
     key: Mapping[str, Any]
     layout: Layout
+    prior_precision: Array
     joint: Joint
     tails: float = np.inf
     what: Literal["friction", "cut"] = "friction"
     nuisance: tuple[str, ...] = NUISANCE
     shared: StrokeMoments | None = field(default=None, repr=False, compare=False)
-    prior_precision: Array | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave basis and moments out of a pickle: they are made again sooner than sent."""
@@ -135,9 +135,7 @@ class FrictionExperiment:
             likelihood=Likelihood(residuals, normal, self.tails),
             starts=self._starts(measured),
             prior_mean=layout.mean,
-            prior_precision=(
-                np.diag(1 / layout.sd**2) if self.prior_precision is None else self.prior_precision
-            ),
+            prior_precision=self.prior_precision,
             blocks=self.strokes,
             reduced=reduced,
             search=search if reduced else None,
@@ -236,8 +234,8 @@ def design(
         key["cogging_periods_per_turn"] = cogging
     drive = Drive(bool(cogging), windows.tick_s if windows.held else None, zero_sd)
     layout = friction_layout(law, symmetric, joint, priors.of(joint.kind), adopt, drive)
-    precision = None
+    precision = friction_precision(layout)
     if prior is not None:
-        precision = prior.precision(layout, np.diag(1 / layout.sd**2))
+        precision = prior.precision(layout, precision)
         layout = prior.layout(layout)
-    return FrictionExperiment(windows, strokes, key, layout, joint, prior_precision=precision)
+    return FrictionExperiment(windows, strokes, key, layout, precision, joint)

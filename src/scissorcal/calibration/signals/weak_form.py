@@ -13,7 +13,6 @@ from scissorcal.calibration.signals.segments import (
     no_piece,
     pieces_of,
     sheets_of,
-    stretches,
 )
 from scissorcal.calibration.signals.window_length import (
     HALF_AT,
@@ -24,7 +23,6 @@ from scissorcal.calibration.signals.window_length import (
     second_derivative,
     spline,
     widened,
-    with_turns,
 )
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
@@ -41,9 +39,6 @@ RATE_BAND = 2.0
 HELD = 1 / 6
 """Weight of a neighbouring sample in a mean over two ticks of a signal with corners at its samples,
 as a held drive has."""
-TURN_S = 5e-3
-STICK_SLIP_S = 0.5
-SWIFT = 8.0
 LOADED = 0.1
 """A load counts from this share of the drive's standard deviation; below it is noise."""
 
@@ -97,12 +92,6 @@ class Windows:
         )
 
     @property
-    def without_turns(self) -> Mask:
-        """Which windows (n,) hold no sample of rest and none of a turn."""
-        turns = _turns(self.rate, self.bins.rate_floor).astype(np.float64)
-        return np.asarray(self.average(turns) == 0.0)
-
-    @property
     def bears_load(self) -> bool:
         """Whether the passive end bears a load that a friction law can depend on."""
         if self.load is None:
@@ -141,8 +130,7 @@ def weigh(
 
     ``bins.moving`` is false for windows that hold a rest or a turn: a sample where the sign of the
     rate is not certain, or changes. When a turn was is known to a fraction of the low-pass only,
-    and friction jumps there by twice its level. With a coarse encoder quick turns count all the
-    same (:func:`~.window_length.with_turns`). ``usable`` has a mask of samples for each
+    and friction jumps there by twice its level. ``usable`` has a mask of samples for each
     recording; windows that touch others are left out of ``moving`` too. Raises InputError where no
     piece is long enough.
     """
@@ -164,8 +152,6 @@ def weigh(
             "The recordings have different sampling rates; fit those of one rate together."
         )
     asked = knots.pop()
-    # Turns are judged by the cutoff alone, so that other windows see the same data.
-    motions = with_turns(motions, knot_samples(cutoff_Hz, motions[0].rate_Hz))
     knot = asked if window_Hz else longer_knot(motions, asked)
     strokes = np.cumsum([0, *(len(recording.strokes) for recording in recordings)]).tolist()
     pieces: list[Windows] = []
@@ -219,9 +205,8 @@ def _motion(recording: Recording, piece: tuple[int, int], cutoff_Hz: float, usab
     opening = low_pass(position, band_Hz, rate_Hz)
     rate = np.gradient(opening) * rate_Hz
     floor = rate_floor(position, band_Hz, rate_Hz)
-    turns = _turns(rate, floor or np.inf) | ~usable
-    rests = _rests(rate, floor or np.inf, 1.0 / rate_Hz) | ~usable
-    return Motion(position, opening, rate, floor, turns, rests, rate_Hz)
+    turns = _turns(rate, floor or np.inf)
+    return Motion(position, opening, rate, floor, turns, ~usable, rate_Hz)
 
 
 def _weigh_piece(
@@ -283,26 +268,3 @@ def _turns(rate: Array, floor: float) -> Mask:
     uncertain = np.abs(rate) <= floor
     uncertain[1:] |= rate[1:] * rate[:-1] <= 0.0
     return np.asarray(uncertain)
-
-
-def _rests(rate: Array, floor: float, tick_s: float) -> Mask:
-    """Samples (m,) where the joint may have rested: the rate's sign is not certain.
-
-    A turn is no rest: a reversal within ``TURN_S``, or a touch of zero between two moves
-    if it is swift (within three such times the rate is ``SWIFT`` times the uncertain one) and
-    stands alone. Touches that follow each other within ``STICK_SLIP_S`` are sticking and slipping.
-    """
-    certain = np.abs(rate) > floor
-    low, high = stretches(~certain)
-    apart = round(3 * TURN_S / tick_s)
-    before, after = np.maximum(low - apart, 0), np.minimum(high - 1 + apart, len(rate) - 1)
-    turns = ((high - low) * tick_s <= TURN_S) & (low > 0) & (high < len(rate))
-    onward = turns & (rate[np.maximum(low - 1, 0)] * rate[np.minimum(high, len(rate) - 1)] > 0)
-    swift = np.minimum(np.abs(rate[before]), np.abs(rate[after])) > SWIFT * floor
-    gaps = np.diff(low[onward], prepend=-np.inf, append=np.inf) * tick_s
-    alone = np.ones(len(low), dtype=bool)
-    alone[onward] = np.minimum(gaps[:-1], gaps[1:]) > STICK_SLIP_S
-    rests = ~certain
-    for k in np.flatnonzero(turns & (~onward | (swift & alone))):
-        rests[low[k] : high[k]] = False
-    return rests

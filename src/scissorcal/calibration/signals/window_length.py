@@ -1,13 +1,13 @@
 """Length of the windows: by the cutoff, or longer for a coarse encoder."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.filtering import BIN_S
-from scissorcal.calibration.signals.segments import edge_samples
+from scissorcal.calibration.signals.segments import edge_samples, stretches
 from scissorcal.recording.resolution import resolution_of
 
 Array = NDArray[np.float64]
@@ -21,9 +21,9 @@ ENCODER_SHARE = 2.5e-3
 low by the same share."""
 LONGEST_S = 0.1
 """Windows are not lengthened beyond this."""
+TURN_S = 5e-3
 LEAST_LEFT = 0.5
-"""Lengthened windows leave at least this share of those that hold no rest."""
-MUCH_LONGER = 2.0
+"""Lengthened windows leave at least this share of those that hold no rest and no turn."""
 SMOOTH = 1 / 12
 """Weight of a neighbouring sample in a mean over two ticks of a smooth signal
 (Numerov 1924, doi:10.1093/mnras/84.8.592)."""
@@ -34,16 +34,16 @@ class Motion:
     """One piece of a recording without a gap, before it is weighed; arrays (m,) by sample.
 
     ``position`` is as measured, ``opening`` and ``rate`` are low-passed, ``floor`` is the speed
-    below which the rate's sign is noise, ``invalid`` marks samples of rest, of any turn, and those
-    that a sensor invalidated; ``resting`` the same without quick turns.
+    below which the rate's sign is noise. ``turning`` marks samples of rest and of turns, ``faulty``
+    those that a sensor invalidated.
     """
 
     position: Array
     opening: Array
     rate: Array
     floor: float
-    invalid: Mask
-    resting: Mask
+    turning: Mask
+    faulty: Mask
     rate_Hz: float
 
     def places(self, length: int) -> Integers:
@@ -52,20 +52,22 @@ class Motion:
         return np.arange(edge, len(self.position) - edge - length, width)
 
     def moving(self, first: Integers, length: int) -> Mask:
-        """Which windows from ``first`` (n,) on hold no invalid sample."""
-        invalid = np.concatenate([[0], np.cumsum(self.invalid)])
-        return np.asarray(invalid[first + length] == invalid[first])
+        """Which windows from ``first`` (n,) on hold no turn, no rest and no faulty sample."""
+        return np.asarray(_held(self.turning | self.faulty, first, length) == 0)
+
+    def not_resting(self, first: Integers, length: int) -> Mask:
+        """Which windows hold no rest and no faulty sample; a quick turn is no rest."""
+        low, high = stretches(self.turning)
+        rests = np.zeros(len(self.turning), dtype=bool)
+        for a, b in zip(low, high, strict=True):
+            rests[a:b] = b - a > TURN_S * self.rate_Hz
+        return np.asarray(_held(rests | self.faulty, first, length) == 0)
 
 
-def with_turns(pieces: list[Motion], shortest: int) -> list[Motion]:
-    """Pieces whose quick turns count, where windows of ``MUCH_LONGER`` knots need them.
-
-    A window with a turn is invalid, as friction jumps there at an uncertain time. But long windows,
-    for a coarse encoder, would leave hardly any data near a turn, and only those identify how
-    friction builds up.
-    """
-    turning = [replace(piece, invalid=piece.resting) for piece in pieces]
-    return turning if longer_knot(turning, shortest) >= MUCH_LONGER * shortest else pieces
+def _held(marks: Mask, first: Integers, length: int) -> Integers:
+    """How many marked samples each window holds."""
+    total = np.concatenate([[0], np.cumsum(marks)])
+    return np.asarray(total[first + length] - total[first])
 
 
 def knot_samples(cutoff_Hz: float, rate_Hz: float) -> int:
@@ -84,8 +86,8 @@ def longer_knot(pieces: list[Motion], shortest: int) -> int:
     6 q^2 / (12 k^5 tick^4) at a knot distance of k ticks, while that of the motion hardly depends
     on k. What is regressed on has errors then, and its coefficient, the inertia, is too low by
     their share (Fuller 1987, Measurement Error Models, section 1.1). The least k is taken at
-    which the share is at most ``ENCODER_SHARE``; where none is, or too few windows without a rest
-    would be left, the longest that is allowed.
+    which the share is at most ``ENCODER_SHARE`` over all motion, turns among it; where none is, or
+    too few windows without a turn would be left, the longest that is allowed.
     """
     steps = [resolution_of(piece.position) for piece in pieces]
     if not pieces or not np.all(np.isfinite(steps)):
@@ -105,16 +107,16 @@ def longer_knot(pieces: list[Motion], shortest: int) -> int:
 
 
 def _acceleration(pieces: list[Motion], steps: list[float], knot: int) -> tuple[float, float, int]:
-    """Sums of squares over windows without a rest: acceleration, its error; and their number."""
+    """Sums of squares over motion: acceleration, its error; and windows without a turn."""
     square = error = 0.0
     count = 0
     for piece, step in zip(pieces, steps, strict=True):
         twice = second_derivative(knot, piece.rate_Hz)
         first = piece.places(len(twice))
-        first = first[piece.moving(first, len(twice))]
+        count += int(piece.moving(first, len(twice)).sum())
+        first = first[piece.not_resting(first, len(twice))]
         if len(first) == 0:
             continue
-        count += len(first)
         square += float(
             np.sum((sliding_window_view(piece.position, len(twice))[first] @ twice) ** 2)
         )

@@ -37,12 +37,13 @@ class Material:
     exact, the latter carries the noise of an acceleration. Where blades rest, friction acts
     along their mean creep: tremor of the smoothed position is noise, whose friction would add up.
     ``direction`` (n - 1,) is how dry friction acts between samples, from -1 (closing) to 1, less
-    where it has not built up.
+    where it has not built up. ``reversal_rad`` is the way after a turn over which it is not known.
     """
 
     work: Array
     torque: Array
     direction: Array
+    reversal_rad: float = 0.0
 
 
 def material_of(
@@ -50,6 +51,7 @@ def material_of(
     friction: FrictionLaw,
     offset: float,
     cogging: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    reversal_rad: float = 0.0,
 ) -> Material:
     """Work and torque of the material along a motion.
 
@@ -57,6 +59,7 @@ def material_of(
     material's mean torque over the path is the difference of W over that of the opening,
     independent of acceleration and speed. ``cogging`` is
     (cosine, sine, periods per turn) of a motor torque that is not in the measured drive.
+    ``reversal_rad`` is passed on.
     """
     path = motion.opening
     step = np.diff(path)
@@ -74,7 +77,7 @@ def material_of(
         work = work - (cosine * np.sin(number * path) - sine * np.cos(number * path)) / number
     torque = motion.inertia * np.gradient(motion.rate) / motion.tick_s - motion.drive
     torque[:-1] += law + offset
-    return Material(np.asarray(work), np.asarray(torque), np.asarray(direction))
+    return Material(np.asarray(work), np.asarray(torque), np.asarray(direction), reversal_rad)
 
 
 def _turning_rate(motion: PathMotion, step: Array) -> Array:
