@@ -79,9 +79,9 @@ def test_load_dependent_friction_of_a_cut_is_a_warning_without_a_failure(tmp_pat
     )
     summary, package = built(tmp_path, friction_fit(), cut)
     (told,) = package.manifest.provenance.cut.left_out
-    lost = 0.11 * package.manifest.bound.scene_torque_Nm
+    too_much = 0.22 / 1.11 * package.manifest.bound.scene_torque_Nm
     assert "grows with the cut's torque, by 0.09 (sd 0.01) of it" in told
-    assert f"up to {lost:.2g} N m" in told
+    assert f"up to {too_much:.2g} N m too much" in told
     assert told in summary.warnings
     assert told in package.warnings
     assert not [v for v in summary.verdicts if v.check == "failed fits" and v.status == "fail"]

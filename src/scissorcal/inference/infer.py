@@ -222,10 +222,13 @@ class _Run:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
             rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // self.count - 2)
             if rounds > 0:
-                sampled = sample_by_mixture(
+                mixed = sample_by_mixture(
                     target, sampled, self.proposal, self.count, self.rng, rounds, many
                 )
-                said += f", {sampled.k_hat:.2f} with an adapted mixture"
+                said += f", {mixed.k_hat:.2f} with an adapted mixture"
+                # A proposal that saw all regions and passed is not refused for a better one's sake.
+                passed = sampled.trusted and mixed.k_hat < sampled.k_hat
+                sampled = replace(mixed, limit=sampled.limit) if passed else mixed
         if sampled.trusted or not escalate:
             return self._weighed(sampled, said)
         left = budget - (self.counter.calls - first)

@@ -16,6 +16,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.identity import bytes_digest
 from scissorcal.package.archive import member_of, write_archive
+from scissorcal.package.by_load import as_closing
 from scissorcal.package.compile import scene_ranges
 from scissorcal.package.drawn_plate import piece_records
 from scissorcal.package.exact import FitDraws, central_model
@@ -115,6 +116,8 @@ def build_package(
     cut, friction = _wanted(recipe, friction, cut)
     if not allow_failed:
         _refuse_failed_fits(path, cut, friction, plate)
+    if friction is not None:
+        cut = as_closing(cut)
     picked = pick_draws(cut, friction, rng)
     simplified = simplest_model(recipe, cut, friction, picked, tolerance=tolerance)
     compiled = simplified.tables[-1]
@@ -287,7 +290,8 @@ def _with_left_out(
     They are of the fits as they stand: a simpler law that lacks load or presliding does not end
     them. Where friction as a whole is left out, what is said of it stands with the cut.
     """
-    said = cut_left_out(cut, bound.scene_torque_Nm, bound.allowed_share)
+    rendered = friction is not None
+    said = cut_left_out(cut, bound.scene_torque_Nm, bound.allowed_share, rendered=rendered)
     of_friction: tuple[str, ...] = ()
     if friction is not None:
         fitted = central_model(FitDraws.centre(cut), FitDraws.centre(friction)).friction

@@ -13,6 +13,7 @@ from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.curvature import cubic_curvature, level_curvature
 from scissorcal.model.friction import angle_factor, angle_slope, friction_level
 from scissorcal.model.terms import Role
+from scissorcal.package.by_load import share_of
 from scissorcal.package.tables import Function
 from scissorcal.recipe.schema import Recipe
 
@@ -120,19 +121,30 @@ def left_out(law: FrictionLaw, scene_torque: float) -> tuple[str, ...]:
     return tuple(said)
 
 
-def cut_left_out(cut: FitResult, scene_torque: float, allowed: float) -> tuple[str, ...]:
+def cut_left_out(
+    cut: FitResult, scene_torque: float, allowed: float, *, rendered: bool
+) -> tuple[str, ...]:
     """Sentences on what of a cut's law the tables leave out, and what that costs in torque.
 
     Friction that grows with the cut's torque is the rig's, so the fit keeps it apart from the
-    material. ``scene_torque`` (N m) is the largest that the scene renders; a share that is
-    certainly below ``allowed``, what the tables may be off by, is not reported.
+    material; ``rendered`` says that the package has it with the material's torque
+    (:mod:`~scissorcal.package.by_load`). ``scene_torque`` (N m) is the largest that the scene
+    renders; a share that is certainly below ``allowed``, what the tables may be off by, is not
+    reported.
     """
-    share = next((p for p in cut.nuisance if p.name == "load_share"), None)
+    share = share_of(cut)
     if share is None:
         return ()
     most = abs(share.mean) + 2.0 * share.sd
     if most < allowed:
         return ()
+    if rendered:
+        return (
+            "fit.cut, load_share: friction of the pivot that grows with the cut's torque, by "
+            f"{share.mean:.2g} (sd {share.sd:.1g}) of it, is rendered with the material's torque, "
+            "as closing blades feel it. Opening blades, over cracks at rest, feel up to "
+            f"{2.0 * most / (1.0 + most) * scene_torque:.2g} N m too much.",
+        )
     return (
         f"fit.cut, load_share: up to {most * scene_torque:.2g} N m at the scene's "
         f"{scene_torque:.2g} N m are not rendered: friction of the pivot that grows with the cut's "

@@ -120,13 +120,13 @@ def test_friction_with_an_offset_parameter_has_no_zero_error():
     assert checks(friction=friction_fit())[0]["torque zero"].value == 0.0
 
 
-def test_a_fitted_load_share_counts_with_twice_its_sd():
+def test_a_fitted_load_share_leaves_no_error_while_closing():
     recipe = paper(load_share="fit")
     share = FittedParameter("load_share", "1", 0.05, 0.01, 0.03, 0.05, 0.07, 0.1)
     fit = replace(cut_fit(recipe), nuisance=(share,))
     verdict = checks(recipe, fit)[0]["friction by load"]
-    assert verdict.value == pytest.approx(0.07)
-    assert "loaded sweeps" in verdict.why
+    assert (verdict.status, verdict.value) == ("pass", 0.0)
+    assert "0.05 (sd 0.01)" in verdict.why
     auto = paper(load_share="auto")
     laws = ("power response", "power response, load-dependent friction")
     both = replace(cut_fit(auto), rungs=tuple({"name": law} for law in laws))

@@ -230,9 +230,10 @@ def _load(
     if share is not None:
         said = (
             f"the pivot's load-dependent friction is {share.mean:.2g} (sd {share.sd:.1g}) of the "
-            "cut's torque, and it is not rendered."
+            "cut's torque. A package that renders friction renders it with the material's torque, "
+            "as closing blades feel it."
         )
-        return (abs(share.mean) + SURE * share.sd) * mean, said, cure
+        return 0.0, said, ""
     if any(parameter.name == "load_share" for parameter in friction.parameters):
         return 0.0, "loaded sweeps were recorded, and the friction fit includes it.", ""
     if any(LOADED in str(row["name"]) for row in fit.rungs):

@@ -1,0 +1,62 @@
+"""Friction that grows with the cut's torque, rendered with the material as closing blades feel it.
+
+A package's friction is that of an empty joint. The pivot's share mu of the cut's torque stands with
+the material: closing blades feel (1 + mu) times its torque, which is what a capture measures best,
+however it is divided between the two. A crack starts where force and energy are in the same ratio,
+so both grow by the same factor and every crack stays where it is. Opening blades feel (1 - mu)
+times the material's torque; that part is stated, not rendered.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration import FitResult
+from scissorcal.calibration.result import FittedParameter
+
+Array = NDArray[np.float64]
+
+GROWING = ("response_force", "fracture_energy")
+SHARE = "load_share"
+
+
+def share_of(cut: FitResult) -> FittedParameter | None:
+    """The share of the cut's torque that friction adds, None where the law has none."""
+    return next((p for p in cut.nuisance if p.name == SHARE), None)
+
+
+def as_closing(cut: FitResult) -> FitResult:
+    """The fit with friction by load in force and energy, draw by draw; itself where there is none.
+
+    The MAP point has no share of its own in a fit, so it is scaled to the posterior's mean of what
+    running costs (of the force where nothing is cut).
+    """
+    if share_of(cut) is None or cut.nuisance_draws is None:
+        return cut
+    names = [p.name for p in cut.parameters]
+    place = [p.name for p in cut.nuisance].index(SHARE)
+    growth = 1.0 + np.asarray(cut.nuisance_draws[:, place], dtype=np.float64)
+    columns = [names.index(name) for name in GROWING if name in names]
+    draws, point = np.array(cut.draws, dtype=np.float64), np.array(cut.map_point, dtype=np.float64)
+    cost = _cost(names, point[None, :])[0]
+    point[columns] *= float(np.mean(growth * _cost(names, draws))) / cost
+    draws[:, columns] *= growth[:, None]
+    parameters = tuple(
+        _described(p, draws[:, i]) if i in columns else p for i, p in enumerate(cut.parameters)
+    )
+    return replace(cut, parameters=parameters, draws=draws, map_point=point)
+
+
+def _cost(names: list[str], rows: Array) -> Array:
+    """Mean energy of a running crack (rows,), or the response's force where nothing is cut."""
+    if "fracture_energy" not in names:
+        return rows[:, names.index("response_force")]
+    kappa = rows[:, names.index("kappa")] if "kappa" in names else 1.0
+    return np.asarray(0.5 * (1.0 + kappa) * rows[:, names.index("fracture_energy")])
+
+
+def _described(parameter: FittedParameter, draws: Array) -> FittedParameter:
+    q05, q50, q95 = (float(value) for value in np.quantile(draws, [0.05, 0.5, 0.95]))
+    mean, sd = float(draws.mean()), float(draws.std(ddof=1))
+    return replace(parameter, mean=mean, sd=sd, q05=q05, q50=q50, q95=q95)
