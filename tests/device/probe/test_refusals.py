@@ -92,6 +92,14 @@ def test_what_can_be_seen_at_rest_moves_nothing(fault: str) -> None:
     assert any(verdict.status == "fail" for verdict in error.result.verdicts)
 
 
+def test_a_sequence_that_leaps_is_no_deaf_watchdog() -> None:
+    """It leaps while commands are withheld, which is no time in which the device should brake."""
+    error, device = refused(FAULTS["sequence leaps"])
+    assert "contradicted its sequence numbers in 8 of the last 20 states" in str(error)
+    assert "brake" not in str(error)
+    assert device.largest_torque == 0.0
+
+
 @pytest.mark.parametrize("fault", MOVED)
 def test_signs_and_scales_are_refused_by_small_motions(fault: str) -> None:
     error, device = refused(FAULTS[fault])

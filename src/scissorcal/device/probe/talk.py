@@ -28,6 +28,9 @@ Done = TypeVar("Done")
 RATE_OVER_S = 4e-3
 """Rates are taken over four ticks of 1 kHz: a step of 2 pi / 20,000 then is 0.08 rad/s."""
 U32 = 2**32
+STAMPS, STAMPS_WRONG = 20, 8
+"""Wrong intervals of the last ones that stop a rig, as the core's watch counts them (sc_stamp.c has
+the false-alarm rate)."""
 
 HEARD = np.dtype(
     [
@@ -147,7 +150,7 @@ class Talk(AbstractContextManager["Talk"]):
             while True:
                 state = self._next_state()
                 answer = stage.send(state)
-                if self.pushing or (answer is not None and answer.enable):
+                if self.pushing or answer is None or answer.enable:
                     self._check(state)
                 if answer is not None and answer.enable:
                     self._guard(state, free)
@@ -349,11 +352,17 @@ class Talk(AbstractContextManager["Talk"]):
                 f"its opening is {state.opening:.3g} rad, beyond the stops that it states "
                 f"({low:.3g} to {high:.3g}); home the encoder, or correct its scale."
             )
-        recent = self._rows[-STUCK_FRAMES:]
-        if len(recent) == STUCK_FRAMES and recent[0][1] == recent[-1][1]:
-            return f"its clock (device_us) stood still for {STUCK_FRAMES} frames; restart it."
+        recent = self._rows[-1 - STAMPS_WRONG :]
+        if len(recent) > STAMPS_WRONG and recent[0][1] == recent[-1][1]:
+            return f"its clock (device_us) stood still for {STAMPS_WRONG} frames; restart it."
         if self._restarted:
             return "its sequence began again: it restarted. Check its supply."
+        wrong = contradictions(self.heard(-1 - STAMPS), self.identity.tick_us)
+        if wrong >= STAMPS_WRONG:
+            return (
+                f"its clock (device_us) contradicted its sequence numbers in {wrong} of the last "
+                f"{STAMPS} states, so one of them leaps; correct it in the firmware."
+            )
         if len(recent) > 1:
             leap = abs(recent[-1][2] - recent[-2][2])
             passed_s = (recent[-1][0] - recent[-2][0]) * self.tick_s
@@ -373,6 +382,13 @@ class Talk(AbstractContextManager["Talk"]):
         if time_s <= 0.0:
             return 0.0, 0.0
         return abs(now[2] - then[2]) / time_s, abs(now[3] - then[3]) / time_s
+
+
+def contradictions(heard: NDArray[np.void], tick_us: float) -> int:
+    """In how many intervals clock and sequence differ by more than a factor of two (sc_stamp.c)."""
+    by_ticks = tick_us * np.diff(heard["sequence"])
+    stated = np.diff(heard["device_us"])
+    return int(np.count_nonzero((2 * stated < by_ticks) | (stated > 2 * by_ticks)))
 
 
 def _clipped(value: float, limit: float) -> float:
