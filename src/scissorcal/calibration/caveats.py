@@ -89,8 +89,8 @@ def _long_windows_words(fit: FitResult) -> str:
     times = float(fit.diagnostics["window_lengthening"])
     return (
         f"The windows are {times:.2g} times longer because the encoder is coarse: on 20 simulated "
-        "days with such windows, the 90 % intervals contained the inertia 17 times, the Stribeck "
-        "level 10 and its speed 13 times. Use a finer encoder."
+        "days with such windows, the 90 % intervals contained the inertia 10 times, which was 2 % "
+        "low. Use a finer encoder."
     )
 
 
@@ -115,7 +115,7 @@ def _spline_words(fit: FitResult) -> str:
 
 _ROWS = (
     _Row(_coarse, (*RESPONSE, "fracture_energy", "toughness", "kappa"), _coarse_words),
-    _Row(_long_windows, ("stribeck", "stribeck_rate", "presliding_*"), _long_windows_words),
+    _Row(_long_windows, ("inertia",), _long_windows_words),
     _Row(_no_line, ("kappa", "fracture_energy", "toughness"), _no_line_words),
     _Row(
         lambda fit: fit.structure.get("response") == "spline",

@@ -1,6 +1,8 @@
 """What a cut's fit takes from the fit of friction: levels, inertia, cogging, noise."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +67,7 @@ class KnownFriction:
         )
         stroke = float(friction.diagnostics.get("stroke_offset_sd_Nm", floor))
         return cls(
-            law=FrictionLaw.of_fit(means, centre),
+            law=FrictionLaw.of_fit(_with_presliding(means, friction.diagnostics), centre),
             offset=float(means.get("offset", 0.0)),
             inertia=float(means["inertia"]),
             cogging=(cogging[0], cogging[1], per_turn if any(cogging) else 0.0),
@@ -73,7 +75,7 @@ class KnownFriction:
             closing_sd=closing,
             opening_sd=opening,
             stroke_sd=max(floor, stroke),
-            fine_rad=float(friction.diagnostics.get("fine_presliding_rad", 0.0)),
+            fine_rad=float(friction.diagnostics.get("presliding_fine_rad", 0.0)),
         )
 
     def with_zero(self, own: DriveZero | None, before: DriveZero | None) -> "KnownFriction":
@@ -93,20 +95,16 @@ class KnownFriction:
 
     def material(self, motion: PathMotion) -> Material:
         """Work and torque of the material along a motion, friction and cogging taken off."""
-        return material_of(motion, self.law, self.offset, self.cogging, self.reversal_rad)
+        return material_of(motion, self.law, self.offset, self.cogging, self.fine_rad)
 
-    @property
-    def reversal_rad(self) -> float:
-        """The way after a turn until what the law lets jump has come within its sd.
 
-        Dahl's friction reverses by 2 F e^(-x / length) less than all; F is the level without the
-        part for which the law has a length of its own.
-        """
-        share = float(np.asarray(self.law["presliding_share"]))
-        rates = np.array([-USUAL_RATE, USUAL_RATE])
-        level = np.abs(friction_torque(self.law, self.law.angle_center, rates)).max()
-        left = 2.0 * (1.0 - share) * float(level) / max(self.closing_sd, self.opening_sd)
-        return self.fine_rad * max(float(np.log(max(left, 1.0))), 0.0)
+def _with_presliding(values: dict[str, Array], seen: Mapping[str, Any]) -> dict[str, Array]:
+    """A law without presliding with what the rig's probe saw of it, as far as it did."""
+    share, length = (seen.get(f"presliding_slow_{part}") for part in ("share", "rad"))
+    if "presliding_share" in values or share is None or length is None:
+        return values
+    found = {"presliding_share": float(share), "presliding_length": float(length)}
+    return {**values, **{name: np.asarray(value) for name, value in found.items()}}
 
 
 def _middle(friction: FitResult, centre: float) -> dict[str, Array]:

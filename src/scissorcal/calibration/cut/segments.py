@@ -41,8 +41,8 @@ RUNNING_FROM = 1.6
 FREE_SHARE = 0.4
 """Path without contact in a piece over its contact's length: it identifies the offset."""
 TURN_SHARE, STANDING_SHARE = 0.03, 0.25
-"""Shares of the contact's length that are left out after a turn: always, and at most where the
-blades rest or friction has not reversed yet, since it may have either sign there."""
+"""Shares of the contact's length that are left out after a turn: always, and where the blades
+rest, since friction may have either sign there."""
 LEAST_TORQUE_SDS = 5.0
 LEAST_RANGE_RAD = 1e-3
 COUNTS_A_TOOTH = 10.0
@@ -229,8 +229,7 @@ class _Builder:
         length = float(opening[free[0]] - opening[0])
         if length < LEAST_RANGE_RAD:
             return
-        reversal = self.materials[run.motion].reversal_rad
-        begin = _left_for_good(opening, motion.standing[span], length, reversal)
+        begin = _left_for_good(opening, motion.standing[span], length)
         end = int(free[0])
         while end < len(opening) - 1 and opening[end] < opening[free[0]] + FREE_SHARE * length:
             end += 1
@@ -239,7 +238,7 @@ class _Builder:
     def _place_at_turn(self, run: Run) -> float | None:
         """The crack's place by the unloading alone, at the guessed response."""
         motion, geometry = self.motions[run.motion], self.geometry
-        work, reversal = self.materials[run.motion].work, self.materials[run.motion].reversal_rad
+        work = self.materials[run.motion].work
         opening, low = motion.opening, run.low
         turn, advance = float(opening[low]), float(motion.advance[low])
         least = LEAST_TORQUE_SDS * float(np.hypot(self.noise.white_Nm, self.noise.slow_Nm))
@@ -255,7 +254,7 @@ class _Builder:
             depth, lever = geometry.depth_and_lever(geometry.edge, np.asarray(turn), contact)
             length = geometry.moving_blades * max(float(depth), 1e-6) / float(lever)
             span = slice(low, run.high + 1)
-            begin = low + _left_for_good(opening[span], motion.standing[span], length, reversal)
+            begin = low + _left_for_good(opening[span], motion.standing[span], length)
             ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, 3e-4))
             ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
             if len(ends) < 4:
@@ -320,17 +319,15 @@ class _Builder:
             )
 
 
-def _left_for_good(opening: Array, standing: Mask, length: float, reversal: float) -> int:
+def _left_for_good(opening: Array, standing: Mask, length: float) -> int:
     """First sample from which blades that turned at the first one stay away from it.
 
     ``length`` (rad) is that of the contact; blades that rest within its first quarter are
-    still at the turn, as are those that friction has not followed over ``reversal`` (rad) yet.
+    still at the turn.
     """
     stop = int(np.argmax(opening > opening[0] + length)) or None
     away = opening[:stop] - opening[0]
-    most = STANDING_SHARE * length
-    always = max(TURN_SHARE * length, min(reversal, most))
-    there = (away < always) | (standing[:stop] & (away < most))
+    there = (away < TURN_SHARE * length) | (standing[:stop] & (away < STANDING_SHARE * length))
     last = np.flatnonzero(there)
     return int(last[-1]) + 1 if len(last) else 0
 

@@ -62,8 +62,9 @@ DRAFT_LAWS = {
 }
 """What draft effort fits to a joint where nothing says otherwise."""
 
-FINE = "presliding_rad"
-"""The shorter of the two lengths over which a probe sees friction build up."""
+PRESLIDING = ("presliding_fine_rad", "presliding_slow_rad", "presliding_slow_share")
+"""Facts of a probe on how friction builds up after a turn, which a fit of cuts takes where windows
+without turns do not show it."""
 
 OUTLIERS = 4.0
 """Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
@@ -263,11 +264,12 @@ def _diagnostics(
     point = chosen.optimum.point
     noise = sample_noise(law, point, idle_noise(recordings))
     probes = [probe for one in recordings if (probe := probe_of(one.device)) is not None]
+    seen = probes[-1].facts if probes else {}
     residuals = chosen.candidate.likelihood.residuals(point)
     return {
         "window_lengthening": law.windows.lengthening,
         "jackknife_sd": jackknife(law, point, NUISANCE),
-        "fine_presliding_rad": max((p.facts.get(FINE, 0.0) for p in probes), default=0.0),
+        **{name: seen[name] for name in PRESLIDING if name in seen},
         **(between.diagnostics() if between else {}),
         **noise_diagnostics(noise),
         "stroke_offset_sd_Nm": stroke_offsets(residuals, law.strokes, law.windows, noise),

@@ -331,7 +331,11 @@ def _of_swings(swung: Swung) -> dict[str, object]:
             **(fall if told else {}),
             "coulomb_opening_Nm": joint.opening,
             "coulomb_closing_Nm": joint.closing,
-            "presliding_rad": joint.fine,
+            "presliding_fine_rad": min(joint.fine, joint.slow),
+            "presliding_slow_rad": max(joint.fine, joint.slow),
+            "presliding_slow_share": (
+                joint.slow_share if joint.slow >= joint.fine else 1.0 - joint.slow_share
+            ),
             "carrying_Nm": joint.carrying,
             "log_inertia_sd": fit.sd("log_inertia"),
             "misfit": fit.misfit,

@@ -4,6 +4,7 @@ from scissorcal.calibration.cut.path.motion import PathMotion, path_motion, turn
 from scissorcal.calibration.cut.path.work import (
     Material,
     advance_line,
+    built_up,
     kinetic_variance,
     material_of,
     mean_advance,
@@ -17,6 +18,7 @@ __all__ = [
     "Material",
     "PathMotion",
     "advance_line",
+    "built_up",
     "kinetic_variance",
     "material_of",
     "mean_advance",

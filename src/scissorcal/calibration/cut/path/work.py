@@ -1,7 +1,7 @@
 """Work of the material between openings, and its covariance."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,13 +37,12 @@ class Material:
     exact, the latter carries the noise of an acceleration. Where blades rest, friction acts
     along their mean creep: tremor of the smoothed position is noise, whose friction would add up.
     ``direction`` (n - 1,) is how dry friction acts between samples, from -1 (closing) to 1, less
-    where it has not built up. ``reversal_rad`` is the way after a turn over which it is not known.
+    where it has not built up.
     """
 
     work: Array
     torque: Array
     direction: Array
-    reversal_rad: float = 0.0
 
 
 def material_of(
@@ -51,7 +50,7 @@ def material_of(
     friction: FrictionLaw,
     offset: float,
     cogging: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    reversal_rad: float = 0.0,
+    fine_rad: float = 0.0,
 ) -> Material:
     """Work and torque of the material along a motion.
 
@@ -59,17 +58,15 @@ def material_of(
     material's mean torque over the path is the difference of W over that of the opening,
     independent of acceleration and speed. ``cogging`` is
     (cosine, sine, periods per turn) of a motor torque that is not in the measured drive.
-    ``reversal_rad`` is passed on.
+    ``fine_rad`` is the length over which dry friction builds up where the law lets it jump, if any.
     """
     path = motion.opening
     step = np.diff(path)
     middle = 0.5 * (path[1:] + path[:-1])
-    state, direction = None, np.sign(step)
-    if np.any(friction["presliding_share"]):
-        built = presliding_state(path, float(friction["presliding_length"]))
-        state = 0.5 * (built[1:] + built[:-1])
-        direction = direction + float(friction["presliding_share"]) * (state - direction)
-    law = friction_torque(friction, middle, _turning_rate(motion, step), 0.0, state)
+    rate = _turning_rate(motion, step)
+    direction = built_up(path, np.sign(rate), friction, fine_rad)
+    whole = replace(friction, values={**friction.values, "presliding_share": np.asarray(1.0)})
+    law = friction_torque(whole, middle, rate, 0.0, direction)
     gone = (law + offset - motion.drive[:-1]) * step
     work = np.concatenate([[0.0], np.cumsum(gone)]) + 0.5 * motion.inertia * motion.rate**2
     cosine, sine, number = cogging
@@ -77,7 +74,25 @@ def material_of(
         work = work - (cosine * np.sin(number * path) - sine * np.cos(number * path)) / number
     torque = motion.inertia * np.gradient(motion.rate) / motion.tick_s - motion.drive
     torque[:-1] += law + offset
-    return Material(np.asarray(work), np.asarray(torque), np.asarray(direction), reversal_rad)
+    return Material(np.asarray(work), np.asarray(torque), np.asarray(direction))
+
+
+def built_up(path: Array, sense: Array, friction: FrictionLaw, fine_rad: float) -> Array:
+    """How dry friction acts between samples (n - 1,), from -1 to 1.
+
+    The law's share builds up over its length, the rest over ``fine_rad``; without that it has the
+    ``sense`` of the motion (n - 1,).
+    """
+
+    def between(length: float) -> Array:
+        built = presliding_state(path, length)
+        return np.asarray(0.5 * (built[1:] + built[:-1]))
+
+    found = between(fine_rad) if fine_rad > 0.0 else sense
+    share = float(np.asarray(friction["presliding_share"]))
+    if share > 0.0:
+        found = found + share * (between(float(friction["presliding_length"])) - found)
+    return np.asarray(found)
 
 
 def _turning_rate(motion: PathMotion, step: Array) -> Array:

@@ -1,15 +1,15 @@
 """The drive torque that a rig with known parameters would have measured along a motion."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.cut.path import built_up
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.weak_form import HELD
 from scissorcal.calibration.signals.window_length import SMOOTH
 from scissorcal.calibration.verify.simulation.motion import SmoothPiece
-from scissorcal.kernel import presliding_path
 from scissorcal.model import FrictionLaw, friction_torque
 
 Array = NDArray[np.float64]
@@ -23,7 +23,8 @@ class DriveTruth:
     sine, periods per turn) of what it gives besides. ``load_share`` of the material's torque is
     added to friction. ``closing_offset`` and ``opening_offset`` (N m) are added to the
     material's torque by direction, ``stroke_sd`` (N m) is what single strokes differ by.
-    ``delay_s`` is the delay of the torque measurement, ``noise`` that of each sample.
+    ``delay_s`` is the delay of the torque measurement, ``noise`` that of each sample, ``fine_rad``
+    the length over which friction builds up where its law lets it jump.
     """
 
     inertia: float
@@ -36,6 +37,7 @@ class DriveTruth:
     opening_offset: float = 0.0
     stroke_sd: float = 0.0
     delay_s: float = 0.0
+    fine_rad: float = 0.0
 
 
 def measured_drive(
@@ -56,13 +58,11 @@ def measured_drive(
     step = np.diff(path)
     middle = 0.5 * (path[1:] + path[:-1])
     sense = np.minimum(np.abs(step) / (tick_s * piece.rest_rate), 1.0)
-    direction, state = np.sign(step), None
     law = truth.friction
-    if np.any(law["presliding_share"]):
-        state = _built(path, float(law["presliding_length"]))
-        direction = direction + float(law["presliding_share"]) * (state - direction)
+    direction = built_up(path, np.sign(step), law, truth.fine_rad)
     load = 0.5 * (piece.load[1:] + piece.load[:-1])
-    dry = sense * friction_torque(law, middle, step / tick_s, load, state)
+    whole = replace(law, values={**law.values, "presliding_share": np.asarray(1.0)})
+    dry = sense * friction_torque(whole, middle, step / tick_s, load, direction)
     cosine, sine, number = truth.cogging
     drive = dry + truth.offset
     drive += cosine * np.cos(number * middle) + sine * np.sin(number * middle)
@@ -102,11 +102,6 @@ def _nodes(around: Array, neighbour: float) -> Array:
     band[1] = 1.0 - 2.0 * neighbour
     band[1, [0, -1]] = 1.0 - neighbour
     return np.asarray(solveh_banded(band, around))
-
-
-def _built(path: Array, length: float) -> Array:
-    state = presliding_path(path, length)
-    return np.asarray(0.5 * (state[1:] + state[:-1]))
 
 
 def _by_stroke(piece: SmoothPiece, sd: float, rng: np.random.Generator) -> Array:

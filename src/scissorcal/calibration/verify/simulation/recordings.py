@@ -79,6 +79,7 @@ def cut_truth(
         drive=DriveTruth(
             inertia=known.inertia,
             friction=known.law,
+            fine_rad=known.fine_rad,
             noise=noise,
             offset=known.offset,
             cogging=(-cosine, -sine, number),
