@@ -162,14 +162,20 @@ def swings_of(
     return tuple(parts[place] for place in sorted(ranked[:most]))
 
 
-def travel_of(values: Array, torque: float, seconds: float) -> tuple[float, float]:
-    """Largest way (rad) and rate (rad/s) of one push of ``torque`` for ``seconds`` from rest."""
+def travel_of(
+    values: Array, effort: float, seconds: float, hold: float = 0.0
+) -> tuple[float, float]:
+    """Largest way (rad) and rate (rad/s) of a push of ``hold + effort`` for ``seconds`` from rest.
+
+    ``hold`` acts before and after, as in `push`.
+    """
     joint = joint_of(values)
+    joint = replace(joint, carrying=joint.carrying + hold)
     times = np.arange(0.0, seconds + COAST_S, TRAVEL_STEP_S)
     rests = np.full(len(times), np.nan)
     rests[0] = 0.0
     switches = np.array([0.0, seconds])
-    places = follow_joint(joint, times, rests, switches, np.array([torque, 0.0]), STEP_S)
+    places = follow_joint(joint, times, rests, switches, np.array([effort, 0.0]), STEP_S)
     rates = np.diff(places) / TRAVEL_STEP_S
     return float(np.abs(places).max()), float(np.abs(rates).max())
 

@@ -69,7 +69,7 @@ def swings(
             if pairs == MOST_PAIRS or known(fit, strongest):
                 break
         for sign in (1, -1):
-            effort, seconds = _planned(talk, axis, fit, sign, prior.breakaway_Nm, strongest)
+            effort, seconds = _planned(talk, axis, fit, sign, prior.breakaway_Nm, strongest, hold)
             one = push(talk, axis, effort, seconds, hold=hold, way=_most_way(axis), rate=MOST_RATE)
             pushes.append(one)
             if not one.disturbed:
@@ -136,7 +136,13 @@ def _most_way(axis: Axis) -> float:
 
 
 def _planned(
-    talk: Talk, axis: Axis, fit: JointFit, sign: int, breakaway: float, strongest: float
+    talk: Talk,
+    axis: Axis,
+    fit: JointFit,
+    sign: int,
+    breakaway: float,
+    strongest: float,
+    hold: float,
 ) -> tuple[float, float]:
     """Torque and time of the next swing: the safe one that goes farthest towards the aim.
 
@@ -153,9 +159,10 @@ def _planned(
         effort = factor * max(breakaway, needed / BEYOND)
         seconds = LONGEST_S
         while effort <= axis.effort and seconds > 0.5 * talk.tick_s:
-            way, rate = travel_of(lightest, sign * effort, seconds)
+            way, rate = travel_of(lightest, sign * effort, seconds, hold)
             if rate <= rate_limit and way <= way_limit:
-                reached = min(travel_of(fit.values, sign * effort, seconds)[0] / aim, 1.0)
+                way, _ = travel_of(fit.values, sign * effort, seconds, hold)
+                reached = min(way / aim, 1.0)
                 safe.append((effort >= needed and strongest < needed, reached, effort, seconds))
                 break
             seconds *= 0.6
