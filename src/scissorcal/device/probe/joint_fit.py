@@ -68,13 +68,14 @@ class JointFit:
     """Posterior of the joint, close to normal in ``values`` (`NAMES`) with ``covariance``.
 
     ``misfit`` is the mean square of the residuals in units of their errors. ``strange`` names
-    values that lie STRANGE_SDS prior standard deviations out or at a bound.
+    values that lie STRANGE_SDS prior standard deviations out or at a bound. ``stop`` is the prior's.
     """
 
     values: Array
     covariance: Array
     misfit: float
     strange: tuple[str, ...]
+    stop: int = 0
 
     def sd(self, name: str) -> float:
         """Standard deviation of a value, as `NAMES` has it."""
@@ -88,7 +89,7 @@ class JointFit:
     @property
     def joint(self) -> Joint:
         """The joint at the mean."""
-        return joint_of(self.values)
+        return joint_of(self.values, self.stop)
 
     @property
     def posterior(self) -> Posterior:
@@ -149,7 +150,7 @@ def fit_joint(
     others = [x for x, cost in found if cost < best[1] + 3.0 * max(fit.misfit, 1.0)]
     spread = np.array([x - fit.values for x in others])
     widened = fit.covariance + spread.T @ spread / max(len(others), 1)
-    return JointFit(fit.values, widened, fit.misfit, fit.strange)
+    return replace(fit, covariance=widened)
 
 
 def swings_of(
@@ -163,13 +164,13 @@ def swings_of(
 
 
 def travel_of(
-    values: Array, effort: float, seconds: float, hold: float = 0.0
+    values: Array, effort: float, seconds: float, hold: float = 0.0, stop: int = 0
 ) -> tuple[float, float]:
     """Largest way (rad) and rate (rad/s) of a push of ``hold + effort`` for ``seconds`` from rest.
 
     ``hold`` acts before and after, as in `push`.
     """
-    joint = joint_of(values)
+    joint = joint_of(values, stop)
     joint = replace(joint, carrying=joint.carrying + hold)
     times = np.arange(0.0, seconds + COAST_S, TRAVEL_STEP_S)
     rests = np.full(len(times), np.nan)
@@ -196,7 +197,7 @@ class _Problem:
         self._rests[0] = _rest_of(pushes[0])
         turn = float(np.mean(self._places))
         self._turn = turn
-        self._pushes, self._noise = pushes, noise_rad
+        self._pushes, self._noise, self._stop = pushes, noise_rad, prior.stop
         self._plain_sd: Array | None = None
         self._friction_sd = FRICTION_SD
         self._sd = np.concatenate([_errors_of(push, noise_rad) for push in pushes])
@@ -314,13 +315,13 @@ class _Problem:
         )
         plain = self._sd if self._plain_sd is None else self._plain_sd
         stated = float(np.mean((rest * self._sd / plain) ** 2))
-        return JointFit(x, inflated * np.outer(scale, scale), stated, strange)
+        return JointFit(x, inflated * np.outer(scale, scale), stated, strange, self._stop)
 
     def _places_of(self, several: Array) -> Array:
         """Places (k, samples) of vectors (k, names) whose delay is that of the first."""
         inside = np.clip(several, LOW, HIGH)
         at = self._at + inside[0, NAMES.index("delay")]
-        joints = joints_of(inside, self._turn)
+        joints = joints_of(inside, self._turn, self._stop)
         places = follow_joints(joints, self._times, self._rests, at, self._torques, STEP_S)
         return np.nan_to_num(np.clip(places, -RUNAWAY_RAD, RUNAWAY_RAD), nan=RUNAWAY_RAD)
 

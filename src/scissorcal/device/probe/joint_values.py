@@ -35,11 +35,15 @@ class Push:
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known before: the delay (s) as flags show it, and the torque that first moved."""
+    """What is known before: the delay (s) as flags show it, and the torque that first moved.
+
+    ``stop``: 1 (-1) where something carries the blades to their closed (open) stop, 0 else.
+    """
 
     delay_s: float
     delay_sd_s: float
     breakaway_Nm: float
+    stop: int = 0
 
 
 NAMES = (
@@ -57,6 +61,7 @@ NAMES = (
     "carrying_slope",
     "delay",
     "log_lag",
+    "log_stop",
 )
 WORDS = {
     "log_inertia": "an inertia (kg m^2)",
@@ -66,20 +71,20 @@ WORDS = {
 """Values whose strangeness ends a probe, as people call them."""
 LOW = np.array(
     [math.log(1e-6), math.log(1e-5), -0.8, math.log(1e-6), -7.0, math.log(5e-3), math.log(2e-5),
-     math.log(2e-5), -6.0, math.log(1e-7), -0.5, -3.0, -0.01, math.log(1e-5)]
+     math.log(2e-5), -6.0, math.log(1e-7), -0.5, -3.0, -0.01, math.log(1e-5), math.log(1e-1)]
 )  # fmt: skip
 HIGH = np.array(
     [math.log(0.1), math.log(1.0), 0.8, math.log(1.0), 0.5, math.log(3.0), math.log(0.2),
-     math.log(0.4), 6.0, math.log(1.0), 0.5, 3.0, 0.2, math.log(0.03)]
+     math.log(0.4), 6.0, math.log(1.0), 0.5, 3.0, 0.2, math.log(0.03), math.log(1e5)]
 )  # fmt: skip
 
 
-def joint_of(values: Array) -> Joint:
+def joint_of(values: Array, stop: int = 0) -> Joint:
     """The joint of a vector of `NAMES`."""
-    return Joint(*(float(value) for value in joints_of(values[None, :], 0.0)[0]))
+    return Joint(*(float(value) for value in joints_of(values[None, :], 0.0, stop)[0]))
 
 
-def joints_of(values: Array, turn: float) -> Array:
+def joints_of(values: Array, turn: float, stop: int) -> Array:
     """Joints (k, fields of `Joint`) of vectors of `NAMES` (k, names), in `Joint`'s order."""
     x = dict(zip(NAMES, values.T, strict=True))
     coulomb = np.exp(x["log_coulomb"])
@@ -98,6 +103,8 @@ def joints_of(values: Array, turn: float) -> Array:
         "carrying_slope": x["carrying_slope"],
         "turn": np.full(len(values), turn),
         "motor_lag": np.exp(x["log_lag"]),
+        "stop": np.full(len(values), float(stop)),
+        "stop_stiffness": np.exp(x["log_stop"]),
     }
     return np.column_stack([columns[entry.name] for entry in fields(Joint)])
 
@@ -106,13 +113,16 @@ def prior_of(prior: Prior) -> tuple[Array, Array]:
     """Means and sds of `NAMES`, wide but for the delay.
 
     Scissors and what is built like them: 5e-5 to 3e-3 kg m^2; what first moves the blades may be
-    breakaway, or a tenth of it where they yield far; presliding of 0.1 to 30 mrad.
+    breakaway, or a tenth of it where they yield far; presliding of 0.1 to 30 mrad. Off a stop what
+    carries the blades and their friction make up breakaway together; a stop of rubber or of steel.
     """
-    mean = [math.log(4e-4), math.log(1.3 * prior.breakaway_Nm), 0.0, math.log(2e-3),
+    on_stop = prior.stop != 0
+    friction, carrying = (0.3, -0.5 * prior.stop) if on_stop else (1.3, 0.0)
+    mean = [math.log(4e-4), math.log(friction * prior.breakaway_Nm), 0.0, math.log(2e-3),
             math.log(0.15), math.log(0.1), math.log(1e-3), math.log(6e-3), -1.0, math.log(3e-3),
-            0.0, 0.0, prior.delay_s, math.log(8e-4)]  # fmt: skip
+            carrying * prior.breakaway_Nm, 0.0, prior.delay_s, math.log(8e-4), math.log(50.0)]  # fmt: skip
     sd = [1.5, 1.2, 0.15, 1.0, 1.0, 0.7, 1.3, 1.3, 1.5, 1.5, 0.3 * prior.breakaway_Nm + 2e-3,
-          0.03, prior.delay_sd_s, 1.0]  # fmt: skip
+          0.03, prior.delay_sd_s, 1.0, 1.5]  # fmt: skip
     return np.array(mean), np.array(sd)
 
 
@@ -120,13 +130,13 @@ def starts_of(pushes: Sequence[Push], prior: Prior) -> list[Array]:
     """Light, middle and heavy blades; all, a third or a tenth of the friction moved them.
 
     What moves the blades may only yield, so friction is anything above; its presliding follows
-    from it and from how far the pushes went that returned.
+    from it and from how far the pushes went that returned. Off a stop it is anything below.
     """
     mean, _ = prior_of(prior)
     stiffness = _stiffness(pushes, prior)
     found = []
     for log_inertia in (math.log(1e-4), math.log(4e-4), math.log(1.6e-3)):
-        for factor in (1.0, 3.0, 10.0):
+        for factor in (0.1, 0.3, 1.0) if prior.stop else (1.0, 3.0, 10.0):
             start = mean.copy()
             coulomb = factor * prior.breakaway_Nm
             start[NAMES.index("log_inertia")] = log_inertia

@@ -83,7 +83,7 @@ def judge_rest(found: Idle) -> Outcome:
 
 def judge_search(found: Search, axis: Axis, words: Words, *, hand: bool) -> Outcome:
     """Whether the axis moved both ways; ``hand``: a pass by hand has shown the encoder alive."""
-    if found.pushed is not None and found.pulled is not None:
+    if found.stop or len(found.movers) == 2:
         return Outcome(())
     check = f"{words.name} move"
     if found.bounded_at is not None:
@@ -116,8 +116,6 @@ def judge_sense(
     found: Search, sensed: Sense, words: Words, motor_sign: int, *, hand: bool
 ) -> Outcome:
     """Which way the axis goes when it is pushed."""
-    assert found.pushed is not None
-    assert found.pulled is not None
     check = f"{words.name} direction"
     share = 0.5 + 0.5 * sensed.votes / max(sensed.pairs, 1)
     if sensed.direction == "not determined":
@@ -128,11 +126,16 @@ def judge_sense(
             "the blades, and probe again."
         )
         return _open(check, why, share)
-    up, down = found.pushed.effort, -found.pulled.effort
+    ends = (f"{words.scale * abs(one.effort):.3g}" for one in found.movers)
     good = (
         f"Positive {words.effort} {words.plus}, negative {words.effort} {words.minus} the "
-        f"{words.name}, from {words.scale * up:.3g} and {words.scale * down:.3g} {words.unit} on."
+        f"{words.name}, from {' and '.join(ends)} {words.unit} on."
     )
+    if found.stop:
+        good += (
+            f" They lie on their {'closed' if found.stop > 0 else 'open'} stop, where gravity or "
+            "a spring carries them, and were pushed off it."
+        )
     remedy = words.reversed_alone if hand and words.reversed_alone else words.reversed
     bad = f"Positive {words.effort} {words.minus} the {words.name}: "
     bad += remedy.format(sign=-motor_sign) + "."

@@ -242,9 +242,7 @@ def _by_hand(
     assert confirm is not None
     passed = hand_pass(talk, confirm)
     finding.add(judge_hand_pass(passed, identity), facts=_of_hand(passed, identity))
-    fell = let_go(talk, confirm, f"{request_of(recipe, identity)} {then}".strip())
-    if fell is not None and passed.alive:
-        finding.take(Outcome((fell,), fell.why))
+    let_go(talk, confirm, f"{request_of(recipe, identity)} {then}".strip())
     return passed.alive
 
 
@@ -292,6 +290,7 @@ def _push(
         (lag_ticks - 1.0 + FLAG_TO_DELAY_TICKS) * talk.tick_s,
         DELAY_SD_TICKS * talk.tick_s,
         found.effort,
+        found.stop,
     )
     step = observed_step(talk.heard()["opening"])
     noise = math.hypot(quiet.jitter_rad, identity.opening_resolution / math.sqrt(12.0))
