@@ -120,7 +120,8 @@ def prior_of(prior: Prior) -> tuple[Array, Array]:
     friction, carrying = (0.3, -0.5 * prior.stop) if on_stop else (1.3, 0.0)
     mean = [math.log(4e-4), math.log(friction * prior.breakaway_Nm), 0.0, math.log(2e-3),
             math.log(0.15), math.log(0.1), math.log(1e-3), math.log(6e-3), -1.0, math.log(3e-3),
-            carrying * prior.breakaway_Nm, 0.0, prior.delay_s, math.log(8e-4), math.log(50.0)]  # fmt: skip
+            carrying * prior.breakaway_Nm, 0.0, prior.delay_s, math.log(8e-4),
+            math.log(50.0)]  # fmt: skip
     sd = [1.5, 1.2, 0.15, 1.0, 1.0, 0.7, 1.3, 1.3, 1.5, 1.5, 0.3 * prior.breakaway_Nm + 2e-3,
           0.03, prior.delay_sd_s, 1.0, 1.5]  # fmt: skip
     return np.array(mean), np.array(sd)

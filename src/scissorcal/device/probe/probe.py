@@ -11,6 +11,7 @@ from scissorcal.device.probe.clipping import clipping
 from scissorcal.device.probe.hand_pass import (
     HandPass,
     by_virtual_hand,
+    fallen,
     hand_pass,
     judge_hand_pass,
     let_go,
@@ -277,6 +278,9 @@ def _push(
     identity = talk.identity
     axis = axis_of(talk, "opening", quiet.jitter_rad, identity.opening_resolution)
     found = search(talk, axis, alive=hand)
+    fell = fallen(float(talk.heard(talk.mark() - 1)["opening"][0]), identity)
+    if fell is not None and hand and not found.stop:
+        finding.take(Outcome((fell,), fell.why))
     finding.take(judge_search(found, axis, BLADES, hand=hand))
     sensed = sense(talk, axis, found)
     finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand=hand))

@@ -8,6 +8,7 @@ tells the direction where a threshold of motion could not.
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from scissorcal.device.probe.hand_pass import stop_near
 from scissorcal.device.probe.pushes import Axis, Pushed, push
 from scissorcal.device.probe.talk import Talk
 
@@ -35,8 +36,6 @@ LEAST_MASS = 0.05
 ROOM = 4.0
 """In units of the way that means motion: nearer to a stop a push is not told from the stop."""
 ROOM_PUSHES = 40
-STOP_RAD = 0.05
-"""As near to a stop as its place is known (`hand_pass.ZERO_RAD`)."""
 
 
 @dataclass(frozen=True)
@@ -196,6 +195,5 @@ def _stop_of(talk: Talk, axis: Axis, found: Search) -> int:
     heard = talk.heard()["opening"]
     begun, ended = float(heard[one.begin]), float(heard[one.end - 1])
     stop = 1 if one.went > 0.0 else -1
-    identity = talk.identity
-    near = abs(begun - (identity.opening_min if stop > 0 else identity.opening_max)) <= STOP_RAD
+    near = stop_near(begun, talk.identity) == stop
     return stop if near and abs(ended - begun) <= 0.5 * axis.moved else 0
