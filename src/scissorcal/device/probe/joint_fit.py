@@ -59,8 +59,8 @@ LEFT_OUT_S = 2e-4
 SHAPE_RAD = 1e-5
 """The same of the shortest way that yields (0.1 mrad), which all pushes have."""
 STOP_SHAPE_RAD = 5e-5
-"""The same of a stop, how it gives and damps: a quarter of the 0.2 mrad by which 10 mN m press blades
-into rubber of 50 N m/rad."""
+"""The same of a stop, how it gives and damps: a quarter of the 0.2 mrad by which 10 mN m press
+blades into rubber of 50 N m/rad."""
 MOST_SAMPLES, LONGEST_S = 120, 0.3
 STRANGE_SDS = 4.0
 RUNAWAY_RAD = 1e3
