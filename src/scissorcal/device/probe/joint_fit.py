@@ -315,7 +315,7 @@ class _Problem:
         sandwich = inverse @ meat @ inverse
         repeated = 2.0 * correlation_time(rest)
         inflated = inverse * max(misfit * repeated, 1.0)
-        scale = np.sqrt(np.maximum(1.0, np.diag(sandwich) / np.diag(inflated)))
+        scale = np.sqrt(np.maximum(1.0, np.diag(sandwich) / np.maximum(np.diag(inflated), 1e-30)))
         out = np.abs(x - self._mean) / self._prior_sd > STRANGE_SDS
         out |= (x <= LOW) | (x >= HIGH)  # as `_climbed` clips them
         strange = tuple(
