@@ -3,9 +3,11 @@
 Thousands by `python -m tests.random_rigs --healthy 1000 --wrong 200`.
 """
 
+from dataclasses import replace
+
 import pytest
 
-from .rigs import falls, healthy, wrong
+from .rigs import RigParameters, falls, healthy, wrong
 from .trial import Trial, trial_of
 
 NAMED_BY_HAND = {
@@ -67,6 +69,26 @@ def test_lost_commands_are_named_at_zero_torque() -> None:
     trial = trial_of(wrong("5 % lost", STILL))
     assert "single commands did not arrive" in trial.said
     assert trial.largest_rate < 1e-3  # what has just been let go of settles
+
+
+LOOSE = RigParameters(coulomb_opening=2e-3, coulomb_closing=2e-3, gravity=-0.012, seed=1)
+"""Blades that fall to their closed stop."""
+
+
+def test_blades_that_fall_are_probed_off_their_stop() -> None:
+    trial = trial_of(LOOSE)
+    assert trial.outcome == "right"
+    assert abs(trial.z) < 4.0
+    assert trial.largest_rate <= 1.5
+
+
+def test_a_reversed_motor_is_named_off_a_stop() -> None:
+    assert "the motor is reversed" in trial_of(replace(LOOSE, motor_sign=-1.0)).said
+
+
+def test_blades_that_nothing_takes_off_their_stop_accuse_nobody() -> None:
+    trial = trial_of(replace(LOOSE, motor_gain=0.0))
+    assert "Not determined: the blades stand at their closed stop" in trial.said
 
 
 def test_a_person_who_opens_where_asked_to_close_is_asked_again() -> None:
