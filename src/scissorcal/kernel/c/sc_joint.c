@@ -99,13 +99,16 @@ static void take_step(columns *c, size_t joints, double command, double dt)
     }
 }
 
-/* What friction of a joint that something carries has built up before anything is known of it. */
+/* What friction of a joint that something carries has built up before anything is known of it.
+ * Blades on a stop have rebounded from it: each small way out and back takes built by
+ * -2 * built * way / length, so that their friction bears nothing and the stop all. */
 static void hold(columns *c, const sc_joint *joint, size_t joints)
 {
     for (size_t j = 0; j < joints; j++) {
         const double carrying = joint[j].carrying;
         const double level = carrying > 0.0 ? joint[j].opening : joint[j].closing;
-        const double built = carrying / fmax(level + joint[j].rise, 1e-12);
+        const double held = carrying / fmax(level + joint[j].rise, 1e-12);
+        const double built = joint[j].stop == 0.0 ? held : 0.0;
         c->fine[j] = c->slow[j] = fmax(-0.999, fmin(0.999, built));
     }
 }
@@ -116,8 +119,8 @@ static void lay(columns *c, size_t joints)
     for (size_t j = 0; j < joints; j++) {
         const double built = c->fine[j] + c->share[j] * (c->slow[j] - c->fine[j]);
         const double level = (built > 0.0 ? c->opening[j] : c->closing[j]) + c->rise[j];
-        const double torque = c->carrying[j] + c->slope[j] * (c->place[j] - c->turn[j]) - level * built;
-        const double load = fmax(0.0, -c->stop[j] * torque);
+        const double carried = c->carrying[j] + c->slope[j] * (c->place[j] - c->turn[j]);
+        const double load = fmax(0.0, c->stop[j] * (level * built - carried));
         c->wall[j] = c->place[j] + c->stop[j] * load / fmax(c->stiffness[j], 1e-9);
     }
 }

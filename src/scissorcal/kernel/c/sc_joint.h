@@ -28,8 +28,10 @@ enum { SC_JOINTS = 16 };
  * joint j are places[j * count] and on. The motor's command changes to `torques[k]` at
  * `switches[k]` (s, ascending), and is 0 before. At the first time and wherever `rests[i]` is
  * finite the joint stands there: it is put to that place at rest, with what its friction has built
- * up, and on its stop, if it has one, as deep as what carries it presses. Steps are at most `step` (s) and short enough for the stiffest presliding of the first joint;
- * all take the same, so that places differ by the joints alone. */
+ * up, and on its stop, if it has one, as deep as what carries it presses. Before the first time
+ * friction has built up what carries the joint, but nothing on a stop. Steps are at most `step` (s)
+ * and short enough for the stiffest presliding of the first joint; all take the same, so that
+ * places differ by the joints alone. */
 void sc_joint_follow(const sc_joint *joint, size_t joints, const double *times, const double *rests,
                      size_t count, const double *switches, const double *torques, size_t commands,
                      double step, double *places);
