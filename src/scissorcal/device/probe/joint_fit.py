@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scissorcal.device.probe.idle import correlation_time
 from scissorcal.device.probe.joint_values import (
     HIGH,
+    LATE_S,
     LOW,
     NAMES,
     WORDS,
@@ -316,8 +317,11 @@ class _Problem:
         repeated = 2.0 * correlation_time(rest)
         inflated = inverse * max(misfit * repeated, 1.0)
         scale = np.sqrt(np.maximum(1.0, np.diag(sandwich) / np.maximum(np.diag(inflated), 1e-30)))
+        delay, lag = NAMES.index("delay"), NAMES.index("log_lag")
         out = np.abs(x - self._mean) / self._prior_sd > STRANGE_SDS
+        out[delay] = False  # it is told with the lag, and judged with it
         out |= (x <= LOW) | (x >= HIGH)  # as `_climbed` clips them
+        out[lag] = x[lag] > math.log(LATE_S)  # many motors have none that shows
         strange = tuple(
             f"{WORDS[name]} of {math.exp(value) if name.startswith('log') else value:.2g}"
             for name, value, wrong in zip(NAMES, x, out, strict=True)

@@ -67,8 +67,13 @@ WORDS = {
     "log_inertia": "an inertia (kg m^2)",
     "log_coulomb": "a dry friction (N m)",
     "carrying": "a torque (N m) that carries the blades",
+    "delay": "a delay (s)",
+    "log_lag": "a lag of the motor (s)",
 }
-"""Values whose strangeness ends a probe, as people call them."""
+"""Values whose strangeness ends a probe, as people call them. Lag and delay count: a lag that lasts
+as long as the pushes takes their motion in place of the inertia."""
+LATE_S = 6e-3
+"""What motor and driver may add to the delay that flags show: 3 ms of lag, and 3 of filters."""
 LOW = np.array(
     [math.log(1e-6), math.log(1e-5), -0.8, math.log(1e-6), -7.0, math.log(5e-3), math.log(2e-5),
      math.log(2e-5), -6.0, math.log(1e-7), -0.5, -3.0, -0.01, math.log(1e-5), math.log(1e-1)]

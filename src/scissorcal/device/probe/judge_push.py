@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass
 
 from scissorcal.device.probe.idle import REST_RAD, Idle
+from scissorcal.device.probe.joint_values import LATE_S
 from scissorcal.device.probe.pushes import Axis
 from scissorcal.device.probe.search import LEAST_INERTIA, Search, Sense
 from scissorcal.device.probe.swings import Swung
@@ -23,8 +24,6 @@ MOST_LOG_SPREAD = math.log(1e3)
 WIDEST_SD = 0.3
 """Of ln inertia: gains that hold at both ends of its interval of 90 % then lose half of their
 margin, which is what a gain margin of 2 allows."""
-LATE_S = 6e-3
-"""What motor and driver may add to the delay that flags show: 3 ms of lag, and 3 of filters."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +162,8 @@ def judge_joint(swung: Swung, axis: Axis, tick_s: float, lag_ticks: float) -> Ou
         what = ", ".join(fit.strange) or f"a delay of {1e3 * late:.3g} ms"
         why = (
             f"Not determined: the pushes fit only with {what}, which no such rig has. Check that "
-            "nothing touches the blades and that the motor's supply stands, and probe again."
+            "nothing touches the blades and that the motor's supply stands, balance blades that "
+            "creep by their weight, and probe again."
         )
         return _open(check, why, sd)
     if not sd <= WIDEST_SD:
