@@ -67,7 +67,8 @@ STRANGE_SDS = 4.0
 RUNAWAY_RAD = 1e3
 """A joint on a falling slope may run away in a trial of the search: so far and no farther."""
 COAST_S, TRAVEL_STEP_S = 0.15, 1e-3
-FIRST_EVALUATIONS, EVALUATIONS, KEPT = 8, 60, 2
+FIRST_EVALUATIONS, EVALUATIONS, KEPT, KEPT_STOP = 8, 60, 2, 4
+"""Off a stop twice as many modes are kept: pushes of 5 mrad leave two or three there."""
 
 
 @dataclass(frozen=True)
@@ -146,17 +147,17 @@ def fit_joint(
     problem = _Problem(pushes, prior, noise_rad)
     starts = starts_of(pushes, prior) if start is None else [start]
     if start is not None and modes:
-        starts += perturbed(start)
+        starts += perturbed(start, prior.stop)
     found = problem.best_of(starts)
     best = min(found, key=lambda one: one[1])
     if problem.rescale(best[0]):
         found = [problem.solved(best[0])]
         if modes:
-            found += problem.best_of(perturbed(found[0][0]))
+            found += problem.best_of(perturbed(found[0][0], prior.stop))
     best = min(found, key=lambda one: one[1])
     problem.vary(best[0])
     fit = problem.posterior(best[0])
-    others = [x for x, cost in found if cost < best[1] + 3.0 * max(fit.misfit, 1.0)]
+    others = [x for x, cost in found if cost < best[1] + 3.0 * problem.repeated]
     spread = np.array([x - fit.values for x in others])
     widened = fit.covariance + spread.T @ spread / max(len(others), 1)
     return replace(fit, covariance=widened)
@@ -214,6 +215,7 @@ class _Problem:
         self._effects = np.zeros((len(self._sd), 2))
         self._shrunk: Array | None = None
         self._evidence = 0.0
+        self.repeated = 1.0  # how many times over a posterior counts what residuals tell
         self._mean, self._prior_sd = prior_of(prior)
 
     def rescale(self, x: Array) -> bool:
@@ -259,7 +261,7 @@ class _Problem:
         self._shrunk, self._evidence = None, 0.0
         begun = [self._climbed(start, FIRST_EVALUATIONS) for start in starts]
         begun.sort(key=lambda one: one[1])
-        return [self.solved(x) for x, _ in begun[:KEPT]]
+        return [self.solved(x) for x, _ in begun[: KEPT_STOP if self._stop else KEPT]]
 
     def solved(self, start: Array) -> tuple[Array, float]:
         """Values at a mode and minus the log of its posterior, nearly, up to a constant.
@@ -314,8 +316,8 @@ class _Problem:
         count = len(gradients)
         meat = gradients.T @ gradients * count / max(count - 1, 1) + precision
         sandwich = inverse @ meat @ inverse
-        repeated = 2.0 * correlation_time(rest)
-        inflated = inverse * max(misfit * repeated, 1.0)
+        self.repeated = max(misfit * 2.0 * correlation_time(rest), 1.0)
+        inflated = inverse * self.repeated
         scale = np.sqrt(np.maximum(1.0, np.diag(sandwich) / np.maximum(np.diag(inflated), 1e-30)))
         delay, lag = NAMES.index("delay"), NAMES.index("log_lag")
         out = np.abs(x - self._mean) / self._prior_sd > STRANGE_SDS

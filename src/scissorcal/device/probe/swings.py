@@ -62,10 +62,10 @@ def swings(
     pushes = list(before)
     least = TELLING * prior.breakaway_Nm
     strongest = max(abs(one.effort) for one in pushes)
-    fit = _fitted(talk, pushes, least, prior, noise_rad)
+    fit = _fitted(talk, axis, pushes, least, prior, noise_rad)
     for pairs in range(MOST_PAIRS + 1):
         if pairs == MOST_PAIRS or (pairs >= LEAST_PAIRS and known(fit, strongest)):
-            fit = _fitted(talk, pushes, least, prior, noise_rad, fit.values, modes=True)
+            fit = _fitted(talk, axis, pushes, least, prior, noise_rad, fit.values, modes=True)
             if pairs == MOST_PAIRS or known(fit, strongest):
                 break
         for sign in (prior.stop, prior.stop) if prior.stop else (1, -1):
@@ -74,15 +74,16 @@ def swings(
             pushes.append(one)
             if not one.disturbed:
                 strongest = max(strongest, abs(effort))
-        fit = _fitted(talk, pushes, least, prior, noise_rad, fit.values)
+        fit = _fitted(talk, axis, pushes, least, prior, noise_rad, fit.values)
     shown = swings_of(
-        pushes_of(talk, pushes, least, prior.stop), prior, noise_rad, fit.values, SHOWN
+        pushes_of(talk, pushes, least, prior.stop, axis.seen), prior, noise_rad, fit.values, SHOWN
     )
     return Swung(tuple(pushes), fit, strongest, shown)
 
 
 def _fitted(
     talk: Talk,
+    axis: Axis,
     pushes: list[Pushed],
     least: float,
     prior: Prior,
@@ -95,7 +96,7 @@ def _fitted(
 
     Where the mode that was followed so far does not explain the pushes, it is sought anew.
     """
-    some = pushes_of(talk, pushes, least, prior.stop)
+    some = pushes_of(talk, pushes, least, prior.stop, axis.seen)
     with talk.paused():
         fit = fit_joint(some, prior, noise_rad, start=start, modes=modes)
         if fit.misfit <= EXPLAINED and not fit.strange:
@@ -112,7 +113,7 @@ def known(fit: JointFit, strongest: float) -> bool:
 
 
 def pushes_of(
-    talk: Talk, pushed: list[Pushed] | tuple[Pushed, ...], least: float, stop: int
+    talk: Talk, pushed: list[Pushed] | tuple[Pushed, ...], least: float, stop: int, seen: float
 ) -> list[Push]:
     """What was heard of each push of ``least`` and more that nothing disturbed, for the fit.
 
@@ -126,18 +127,21 @@ def pushes_of(
     ]
     stood = [True, *(one.rested or not known for one, known in zip(pushed, kept, strict=True))]
     return [
-        _push_of(_off_stop(whole[one.begin : one.end], stop), talk.tick_s, rested)
+        _push_of(_off_stop(whole[one.begin : one.end], stop, seen), talk.tick_s, rested)
         for one, rested, known in zip(pushed, stood[:-1], kept, strict=True)
         if known
     ]
 
 
-def _off_stop(heard: np.ndarray, stop: int) -> np.ndarray:
-    """What was heard until the blades were back on the stop where they began."""
+def _off_stop(heard: np.ndarray, stop: int, seen: float) -> np.ndarray:
+    """What was heard until the blades were back on the stop where they began; all where they did
+    not leave it by ``seen``, which tells what does not take them off it."""
     off = stop * (heard["opening"] - heard["opening"][0])
+    if off.max() < seen:
+        return heard
     back = off <= 0.0
     back[: int(np.argmax(off)) + 1] = False
-    return heard[: int(np.argmax(back)) + 1] if stop and back.any() else heard
+    return heard[: int(np.argmax(back)) + 1] if back.any() else heard
 
 
 def _push_of(heard: np.ndarray, tick_s: float, rested: bool) -> Push:
