@@ -91,6 +91,25 @@ def test_blades_that_nothing_takes_off_their_stop_accuse_nobody() -> None:
     assert "Not determined: the blades stand at their closed stop" in trial.said
 
 
+CREEPING, BOUNCING = 61_001, 61_026
+"""Blades that creep under gravity: a fit with a delay below zero and a lag at its bound claimed
+-38 %. Blades that stand on a stop after a rebound: one of several modes claimed -73 %."""
+
+
+@pytest.mark.parametrize("seed", [CREEPING, BOUNCING])
+def test_inertia_far_off_has_no_narrow_interval(seed: int) -> None:
+    trial = trial_of(healthy(seed))
+    assert trial.outcome == "not determined" or abs(trial.z) < 3.0
+
+
+def test_a_hand_that_holds_the_blades_at_a_stop_feels_no_swing() -> None:
+    """It presses with 0.12 N m: no push takes the blades off the stop, and nothing is claimed."""
+    trial = trial_of(healthy(STILL), clings=True)
+    assert "Not determined: the blades stand at their open stop" in trial.said
+    assert "somebody holds them" in trial.said
+    assert trial.largest_rate <= 0.3
+
+
 def test_a_person_who_opens_where_asked_to_close_is_asked_again() -> None:
     trial = trial_of(healthy(STILL), swaps=True)
     assert is_fair(trial)

@@ -96,8 +96,9 @@ def fallen(place: float, identity: Identity) -> Verdict | None:
     name, stop = ("closed", identity.opening_min) if near > 0 else ("open", identity.opening_max)
     why = (
         f"Not determined: the blades stand at their {name} stop although they were to be left half "
-        "open, and no push took them clearly off it: gravity or a spring carries them there, or "
-        "nobody moved them. Balance them or leave them half open, and probe again."
+        "open, and no push took them clearly off it: gravity or a spring carries them there, "
+        "somebody holds them, or nobody moved them. Balance them or leave them half open, let go, "
+        "and probe again."
     )
     return not_evaluated(SENSORS, "left half open", why, FELL_RAD, abs(place - stop))
 
