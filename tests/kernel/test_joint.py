@@ -61,6 +61,27 @@ def test_a_joint_that_is_carried_begins_at_rest() -> None:
     assert np.abs(places(joint, 0.0)).max() < 1e-5
 
 
+CARRIED = replace(FREE, carrying=-0.01, stop=1.0, stop_stiffness=50.0)
+
+
+def test_a_stop_bears_what_carries_the_blades() -> None:
+    """A torque below the load lifts them in the stop, by torque over stiffness, not off it."""
+    assert np.abs(places(CARRIED, 0.0)).max() < 1e-9
+    assert places(CARRIED, 0.005, np.linspace(0.0, 2.0, 201))[-1] == pytest.approx(1e-4, rel=1e-3)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_blades_are_thrown_off_their_stop_and_fall_back(side: float) -> None:
+    """A stiff stop: up for 20 ms, down by what carries them, as far again, and back."""
+    joint = replace(CARRIED, carrying=-0.01 * side, stop=side, stop_stiffness=5e3)
+    rests = np.full(len(TIMES), np.nan)
+    rests[0] = 0.0
+    torques = np.array([0.02 * side, 0.0])
+    found = side * follow_joint(joint, TIMES, rests, np.array([0.0, 0.02]), torques, STEP_S)
+    assert found.max() == pytest.approx(0.01 * 0.02**2 / 3e-4, rel=0.03)
+    assert np.abs(found[-20:]).max() < 0.1 * found.max()
+
+
 def test_joints_together_go_as_each_alone() -> None:
     """Those that need no shorter steps than the first: the same operations, to the last bits."""
     first = replace(FREE, opening=0.02, closing=0.018, rise=2e-3, bristle=0.05, viscous=2e-3)
@@ -91,7 +112,7 @@ def test_what_is_no_set_of_joints_is_refused() -> None:
     row = np.array([astuple(FREE)])
     with pytest.raises(ValueError, match="at most 16 joints"):
         follow_joints(np.repeat(row, 17, axis=0), *ends)
-    with pytest.raises(ValueError, match="has 14 values"):
+    with pytest.raises(ValueError, match="has 16 values"):
         follow_joints(row[:, 1:], *ends)
     with pytest.raises(ValueError, match="each time a rest"):
         follow_joints(row, TIMES, TIMES[1:], np.zeros(1), np.zeros(1), 1e-3)

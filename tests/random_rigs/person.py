@@ -8,10 +8,13 @@ PLACES = {"close the blades": 0.0, "open the blades": 1.0, "half open": 0.5}
 
 class Person:
     """A confirm callback. ``follows`` False does nothing; ``swaps`` opens at first where asked to
-    close, and does it right when asked again."""
+    close, and does it right when asked again; ``clings`` holds the blades at their open stop where
+    asked to leave them half open."""
 
-    def __init__(self, link: RigLink, *, follows: bool = True, swaps: bool = False) -> None:
-        self._link, self._follows, self._swaps = link, follows, swaps
+    def __init__(
+        self, link: RigLink, *, follows: bool = True, swaps: bool = False, clings: bool = False
+    ) -> None:
+        self._link, self._follows, self._swaps, self._clings = link, follows, swaps, clings
         self.heard: list[str] = []
 
     def __call__(self, request: str) -> None:
@@ -20,7 +23,7 @@ class Person:
         asked = [share for words, share in PLACES.items() if words in said]
         if not asked or not self._follows:
             return
-        share = asked[-1]
+        share = 1.0 if self._clings and asked[-1] == 0.5 else asked[-1]
         if self._swaps and share != 0.5:
             share = 1.0 - share
             self._swaps = share == 1.0

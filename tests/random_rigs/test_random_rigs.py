@@ -3,9 +3,11 @@
 Thousands by `python -m tests.random_rigs --healthy 1000 --wrong 200`.
 """
 
+from dataclasses import replace
+
 import pytest
 
-from .rigs import falls, healthy, wrong
+from .rigs import RigParameters, falls, healthy, wrong
 from .trial import Trial, trial_of
 
 NAMED_BY_HAND = {
@@ -67,6 +69,45 @@ def test_lost_commands_are_named_at_zero_torque() -> None:
     trial = trial_of(wrong("5 % lost", STILL))
     assert "single commands did not arrive" in trial.said
     assert trial.largest_rate < 1e-3  # what has just been let go of settles
+
+
+LOOSE = RigParameters(coulomb_opening=2e-3, coulomb_closing=2e-3, gravity=-0.012, seed=1)
+"""Blades that fall to their closed stop."""
+
+
+def test_blades_that_fall_are_probed_off_their_stop() -> None:
+    trial = trial_of(LOOSE)
+    assert trial.outcome == "right"
+    assert abs(trial.z) < 4.0
+    assert trial.largest_rate <= 1.5
+
+
+def test_a_reversed_motor_is_named_off_a_stop() -> None:
+    assert "the motor is reversed" in trial_of(replace(LOOSE, motor_sign=-1.0)).said
+
+
+def test_blades_that_nothing_takes_off_their_stop_accuse_nobody() -> None:
+    trial = trial_of(replace(LOOSE, motor_gain=0.0))
+    assert "Not determined: the blades stand at their closed stop" in trial.said
+
+
+CREEPING, BOUNCING = 61_001, 61_026
+"""Blades that creep under gravity: a fit with a delay below zero and a lag at its bound claimed
+-38 %. Blades that stand on a stop after a rebound: one of several modes claimed -73 %."""
+
+
+@pytest.mark.parametrize("seed", [CREEPING, BOUNCING])
+def test_inertia_far_off_has_no_narrow_interval(seed: int) -> None:
+    trial = trial_of(healthy(seed))
+    assert trial.outcome == "not determined" or abs(trial.z) < 3.0
+
+
+def test_a_hand_that_holds_the_blades_at_a_stop_feels_no_swing() -> None:
+    """It presses with 0.12 N m: no push takes the blades off the stop, and nothing is claimed."""
+    trial = trial_of(healthy(STILL), clings=True)
+    assert "Not determined: the blades stand at their open stop" in trial.said
+    assert "somebody holds them" in trial.said
+    assert trial.largest_rate <= 0.3
 
 
 def test_a_person_who_opens_where_asked_to_close_is_asked_again() -> None:

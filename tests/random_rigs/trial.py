@@ -38,15 +38,16 @@ class Trial:
         return abs(self.z) <= NORMAL_90
 
 
-def trial_of(rig: RigParameters, *, follows: bool = True, swaps: bool = False) -> Trial:
+def trial_of(
+    rig: RigParameters, *, follows: bool = True, swaps: bool = False, clings: bool = False
+) -> Trial:
     """Probe a rig with a person beside it."""
     said, result = "", None
     link = None
     try:
         link = RigLink(rig)
-        result = probe(
-            link, builtin_recipe("paper-80gsm"), confirm=Person(link, follows=follows, swaps=swaps)
-        )
+        person = Person(link, follows=follows, swaps=swaps, clings=clings)
+        result = probe(link, builtin_recipe("paper-80gsm"), confirm=person)
     except ProbeRefusedError as refused:
         said = str(refused)
     except DeviceError as refused:

@@ -16,6 +16,8 @@ class Joint:
 
     Units are SI and radians; ``rise`` is what dry friction is more at rest than in motion, which
     falls by exp(-(rate / rise_rate)^2); ``carrying`` (N m) moves the blades without a motor.
+    ``stop`` is 1 (-1) for blades that rest on a stop and leave it only to larger (smaller) places,
+    and ``stop_stiffness`` (N m/rad) how it gives.
     """
 
     inertia: float
@@ -32,6 +34,8 @@ class Joint:
     carrying_slope: float
     turn: float
     motor_lag: float
+    stop: float = 0.0
+    stop_stiffness: float = 50.0
 
 
 def follow_joint(

@@ -20,6 +20,10 @@ CLOSE = (
 )
 OPEN = "Now open the blades by hand to their stop, hold them there, and confirm."
 AGAIN = "The reading of the opening {what}. Once more, with nothing between the blades: "
+STOOD = (
+    "The blades stand at a stop. Leave them half open once more; where they fall back by "
+    "themselves, let them lie there and keep clear. "
+)
 SENSORS, CHECK, ZERO = "probe.sensors", "count scale", "opening zero"
 LISTEN_S = 0.1
 DEAD_STEPS = 5.0
@@ -71,19 +75,32 @@ def hand_pass(talk: Talk, confirm: Confirm) -> HandPass:
     return found
 
 
-def let_go(talk: Talk, confirm: Confirm, request: str) -> Verdict | None:
-    """Ask a person to leave the blades half open; a verdict where they then stand at a stop."""
-    place = _held(talk, confirm, request)
-    identity = talk.identity
-    for name, stop in (("closed", identity.opening_min), ("open", identity.opening_max)):
-        if abs(place - stop) <= FELL_RAD:
-            why = (
-                f"Not determined: the blades stand at their {name} stop although they were to be "
-                "left half open: gravity or a spring carries them there, or nobody moved them. "
-                "Balance them or leave them half open, and probe again."
-            )
-            return not_evaluated(SENSORS, "left half open", why, FELL_RAD, abs(place - stop))
-    return None
+def let_go(talk: Talk, confirm: Confirm, request: str) -> None:
+    """Ask a person to leave the blades half open and let go; twice where they stand at a stop."""
+    if stop_near(_held(talk, confirm, request), talk.identity):
+        _held(talk, confirm, STOOD + request)
+
+
+def stop_near(place: float, identity: Identity) -> int:
+    """1 where the blades are as near to their closed stop as it is known, -1 the open, else 0."""
+    if abs(place - identity.opening_min) <= FELL_RAD:
+        return 1
+    return -1 if abs(place - identity.opening_max) <= FELL_RAD else 0
+
+
+def fallen(place: float, identity: Identity) -> Verdict | None:
+    """A verdict where blades that were left half open stand at a stop."""
+    near = stop_near(place, identity)
+    if not near:
+        return None
+    name, stop = ("closed", identity.opening_min) if near > 0 else ("open", identity.opening_max)
+    why = (
+        f"Not determined: the blades stand at their {name} stop although they were to be left half "
+        "open, and no push took them clearly off it: gravity or a spring carries them there, "
+        "somebody holds them, or nobody moved them. Balance them or leave them half open, let go, "
+        "and probe again."
+    )
+    return not_evaluated(SENSORS, "left half open", why, FELL_RAD, abs(place - stop))
 
 
 def virtual_hand(talk: Talk) -> bool:

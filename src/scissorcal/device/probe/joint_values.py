@@ -35,11 +35,15 @@ class Push:
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known before: the delay (s) as flags show it, and the torque that first moved."""
+    """What is known before: the delay (s) as flags show it, and the torque that first moved.
+
+    ``stop``: 1 (-1) where something carries the blades to their closed (open) stop, 0 else.
+    """
 
     delay_s: float
     delay_sd_s: float
     breakaway_Nm: float
+    stop: int = 0
 
 
 NAMES = (
@@ -57,29 +61,35 @@ NAMES = (
     "carrying_slope",
     "delay",
     "log_lag",
+    "log_stop",
 )
 WORDS = {
     "log_inertia": "an inertia (kg m^2)",
     "log_coulomb": "a dry friction (N m)",
     "carrying": "a torque (N m) that carries the blades",
+    "delay": "a delay (s)",
+    "log_lag": "a lag of the motor (s)",
 }
-"""Values whose strangeness ends a probe, as people call them."""
+"""Values whose strangeness ends a probe, as people call them. Lag and delay count: a lag that lasts
+as long as the pushes takes their motion in place of the inertia."""
+LATE_S = 6e-3
+"""What motor and driver may add to the delay that flags show: 3 ms of lag, and 3 of filters."""
 LOW = np.array(
     [math.log(1e-6), math.log(1e-5), -0.8, math.log(1e-6), -7.0, math.log(5e-3), math.log(2e-5),
-     math.log(2e-5), -6.0, math.log(1e-7), -0.5, -3.0, -0.01, math.log(1e-5)]
+     math.log(2e-5), -6.0, math.log(1e-7), -0.5, -3.0, -0.01, math.log(1e-5), math.log(1e-1)]
 )  # fmt: skip
 HIGH = np.array(
     [math.log(0.1), math.log(1.0), 0.8, math.log(1.0), 0.5, math.log(3.0), math.log(0.2),
-     math.log(0.4), 6.0, math.log(1.0), 0.5, 3.0, 0.2, math.log(0.03)]
+     math.log(0.4), 6.0, math.log(1.0), 0.5, 3.0, 0.2, math.log(0.03), math.log(1e5)]
 )  # fmt: skip
 
 
-def joint_of(values: Array) -> Joint:
+def joint_of(values: Array, stop: int = 0) -> Joint:
     """The joint of a vector of `NAMES`."""
-    return Joint(*(float(value) for value in joints_of(values[None, :], 0.0)[0]))
+    return Joint(*(float(value) for value in joints_of(values[None, :], 0.0, stop)[0]))
 
 
-def joints_of(values: Array, turn: float) -> Array:
+def joints_of(values: Array, turn: float, stop: int) -> Array:
     """Joints (k, fields of `Joint`) of vectors of `NAMES` (k, names), in `Joint`'s order."""
     x = dict(zip(NAMES, values.T, strict=True))
     coulomb = np.exp(x["log_coulomb"])
@@ -98,6 +108,8 @@ def joints_of(values: Array, turn: float) -> Array:
         "carrying_slope": x["carrying_slope"],
         "turn": np.full(len(values), turn),
         "motor_lag": np.exp(x["log_lag"]),
+        "stop": np.full(len(values), float(stop)),
+        "stop_stiffness": np.exp(x["log_stop"]),
     }
     return np.column_stack([columns[entry.name] for entry in fields(Joint)])
 
@@ -106,13 +118,21 @@ def prior_of(prior: Prior) -> tuple[Array, Array]:
     """Means and sds of `NAMES`, wide but for the delay.
 
     Scissors and what is built like them: 5e-5 to 3e-3 kg m^2; what first moves the blades may be
-    breakaway, or a tenth of it where they yield far; presliding of 0.1 to 30 mrad.
+    breakaway, or a tenth of it where they yield far; presliding of 0.1 to 30 mrad. Off a stop what
+    carries the blades and their friction make up breakaway together; a stop of rubber, into which a
+    hand presses them by a few mrad, or of steel.
+    What presses them on it changes by no more than itself over a radian: a weight at a lever,
+    or a spring that is stretched over their range.
     """
-    mean = [math.log(4e-4), math.log(1.3 * prior.breakaway_Nm), 0.0, math.log(2e-3),
+    on_stop = prior.stop != 0
+    slope_sd = prior.breakaway_Nm if on_stop else 0.03
+    friction, carrying = (0.3, -0.5 * prior.stop) if on_stop else (1.3, 0.0)
+    mean = [math.log(4e-4), math.log(friction * prior.breakaway_Nm), 0.0, math.log(2e-3),
             math.log(0.15), math.log(0.1), math.log(1e-3), math.log(6e-3), -1.0, math.log(3e-3),
-            0.0, 0.0, prior.delay_s, math.log(8e-4)]  # fmt: skip
+            carrying * prior.breakaway_Nm, 0.0, prior.delay_s, math.log(8e-4),
+            math.log(150.0)]  # fmt: skip
     sd = [1.5, 1.2, 0.15, 1.0, 1.0, 0.7, 1.3, 1.3, 1.5, 1.5, 0.3 * prior.breakaway_Nm + 2e-3,
-          0.03, prior.delay_sd_s, 1.0]  # fmt: skip
+          slope_sd, prior.delay_sd_s, 1.0, 1.2]  # fmt: skip
     return np.array(mean), np.array(sd)
 
 
@@ -120,9 +140,18 @@ def starts_of(pushes: Sequence[Push], prior: Prior) -> list[Array]:
     """Light, middle and heavy blades; all, a third or a tenth of the friction moved them.
 
     What moves the blades may only yield, so friction is anything above; its presliding follows
-    from it and from how far the pushes went that returned.
+    from it and from how far the pushes went that returned. Off a stop it is anything below, and
+    the stop alone gives way to the weakest pushes, so that presliding may be short or long.
     """
     mean, _ = prior_of(prior)
+    if prior.stop:
+        return [
+            _moved(mean, {"log_inertia": inertia, "log_coulomb": friction, "log_fine": length,
+                          "log_slow": length})
+            for inertia in (-1.4, 0.0, 1.4)
+            for friction in (-1.0, 0.8)
+            for length in (-1.5, 1.5)
+        ]  # fmt: skip
     stiffness = _stiffness(pushes, prior)
     found = []
     for log_inertia in (math.log(1e-4), math.log(4e-4), math.log(1.6e-3)):
@@ -148,19 +177,29 @@ def _stiffness(pushes: Sequence[Push], prior: Prior) -> float:
     return min(float(np.median(found)), stiffest) if found else stiffest
 
 
-def perturbed(values: Array) -> list[Array]:
+def perturbed(values: Array, stop: int) -> list[Array]:
     """Starts from which another mode would be found: what pushes confuse, moved apart."""
-    found = []
-    for moves in (
+    moves: tuple[dict[str, float], ...] = (
         {"log_inertia": 0.5, "delay": -1.5e-3},
         {"log_inertia": -0.5, "delay": 1.5e-3},
         {"log_fine": 1.5},
         {"log_lag": -0.7, "log_bristle": -1.0},
         {"log_lag": 0.7, "delay": -7e-4},
         {"log_inertia": 0.1, "log_lag": -0.5, "log_bristle": -3.0},
-    ):
-        start = values.copy()
-        for name, by in moves.items():
-            start[NAMES.index(name)] += by
-        found.append(start)
+    )
+    if stop:
+        moves += (
+            {"log_inertia": 1.0},
+            {"log_inertia": -1.0},
+            {"log_stop": 1.5},
+            {"log_fine": -2.0},
+        )
+    return [_moved(values, by) for by in moves]
+
+
+def _moved(values: Array, by: dict[str, float]) -> Array:
+    """A copy in which some values are larger ``by`` so much."""
+    found = values.copy()
+    for name, more in by.items():
+        found[NAMES.index(name)] += more
     return found

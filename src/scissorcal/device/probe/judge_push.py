@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass
 
 from scissorcal.device.probe.idle import REST_RAD, Idle
+from scissorcal.device.probe.joint_values import LATE_S
 from scissorcal.device.probe.pushes import Axis
 from scissorcal.device.probe.search import LEAST_INERTIA, Search, Sense
 from scissorcal.device.probe.swings import Swung
@@ -23,8 +24,6 @@ MOST_LOG_SPREAD = math.log(1e3)
 WIDEST_SD = 0.3
 """Of ln inertia: gains that hold at both ends of its interval of 90 % then lose half of their
 margin, which is what a gain margin of 2 allows."""
-LATE_S = 6e-3
-"""What motor and driver may add to the delay that flags show: 3 ms of lag, and 3 of filters."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def judge_rest(found: Idle) -> Outcome:
 
 def judge_search(found: Search, axis: Axis, words: Words, *, hand: bool) -> Outcome:
     """Whether the axis moved both ways; ``hand``: a pass by hand has shown the encoder alive."""
-    if found.pushed is not None and found.pulled is not None:
+    if found.stop or len(found.movers) == 2:
         return Outcome(())
     check = f"{words.name} move"
     if found.bounded_at is not None:
@@ -116,8 +115,6 @@ def judge_sense(
     found: Search, sensed: Sense, words: Words, motor_sign: int, *, hand: bool
 ) -> Outcome:
     """Which way the axis goes when it is pushed."""
-    assert found.pushed is not None
-    assert found.pulled is not None
     check = f"{words.name} direction"
     share = 0.5 + 0.5 * sensed.votes / max(sensed.pairs, 1)
     if sensed.direction == "not determined":
@@ -128,11 +125,16 @@ def judge_sense(
             "the blades, and probe again."
         )
         return _open(check, why, share)
-    up, down = found.pushed.effort, -found.pulled.effort
+    ends = (f"{words.scale * abs(one.effort):.3g}" for one in found.movers)
     good = (
         f"Positive {words.effort} {words.plus}, negative {words.effort} {words.minus} the "
-        f"{words.name}, from {words.scale * up:.3g} and {words.scale * down:.3g} {words.unit} on."
+        f"{words.name}, from {' and '.join(ends)} {words.unit} on."
     )
+    if found.stop:
+        good += (
+            f" They lie on their {'closed' if found.stop > 0 else 'open'} stop, where gravity or "
+            "a spring carries them, and were pushed off it."
+        )
     remedy = words.reversed_alone if hand and words.reversed_alone else words.reversed
     bad = f"Positive {words.effort} {words.minus} the {words.name}: "
     bad += remedy.format(sign=-motor_sign) + "."
@@ -160,7 +162,8 @@ def judge_joint(swung: Swung, axis: Axis, tick_s: float, lag_ticks: float) -> Ou
         what = ", ".join(fit.strange) or f"a delay of {1e3 * late:.3g} ms"
         why = (
             f"Not determined: the pushes fit only with {what}, which no such rig has. Check that "
-            "nothing touches the blades and that the motor's supply stands, and probe again."
+            "nothing touches the blades and that the motor's supply stands, balance blades that "
+            "creep by their weight, and probe again."
         )
         return _open(check, why, sd)
     if not sd <= WIDEST_SD:

@@ -11,6 +11,7 @@ from scissorcal.device.probe.clipping import clipping
 from scissorcal.device.probe.hand_pass import (
     HandPass,
     by_virtual_hand,
+    fallen,
     hand_pass,
     judge_hand_pass,
     let_go,
@@ -242,9 +243,7 @@ def _by_hand(
     assert confirm is not None
     passed = hand_pass(talk, confirm)
     finding.add(judge_hand_pass(passed, identity), facts=_of_hand(passed, identity))
-    fell = let_go(talk, confirm, f"{request_of(recipe, identity)} {then}".strip())
-    if fell is not None and passed.alive:
-        finding.take(Outcome((fell,), fell.why))
+    let_go(talk, confirm, f"{request_of(recipe, identity)} {then}".strip())
     return passed.alive
 
 
@@ -279,6 +278,9 @@ def _push(
     identity = talk.identity
     axis = axis_of(talk, "opening", quiet.jitter_rad, identity.opening_resolution)
     found = search(talk, axis, alive=hand)
+    fell = fallen(float(talk.heard(talk.mark() - 1)["opening"][0]), identity)
+    if fell is not None and hand and not found.stop:
+        finding.take(Outcome((fell,), fell.why))
     finding.take(judge_search(found, axis, BLADES, hand=hand))
     sensed = sense(talk, axis, found)
     finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand=hand))
@@ -292,6 +294,7 @@ def _push(
         (lag_ticks - 1.0 + FLAG_TO_DELAY_TICKS) * talk.tick_s,
         DELAY_SD_TICKS * talk.tick_s,
         found.effort,
+        found.stop,
     )
     step = observed_step(talk.heard()["opening"])
     noise = math.hypot(quiet.jitter_rad, identity.opening_resolution / math.sqrt(12.0))

@@ -5,9 +5,10 @@ A passive joint at rest moves with the effort, whether it slides or only yields;
 tells the direction where a threshold of motion could not.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
+from scissorcal.device.probe.hand_pass import stop_near
 from scissorcal.device.probe.pushes import Axis, Pushed, push
 from scissorcal.device.probe.talk import Talk
 
@@ -42,12 +43,14 @@ class Search:
     """What moved the axis each way (None where nothing did), and why the search ended without.
 
     ``bounded_at`` is the effort beyond which blades behind a dead encoder could get too fast.
+    ``stop`` is 1 (-1) where the blades lie on their closed (open) stop and fell back to it.
     """
 
     pushed: Pushed | None
     pulled: Pushed | None
     pushes: tuple[Pushed, ...]
     bounded_at: float | None = None
+    stop: int = 0
 
     @property
     def hold(self) -> float:
@@ -59,10 +62,14 @@ class Search:
 
     @property
     def effort(self) -> float:
-        """Half the distance of the efforts that moved it."""
-        assert self.pushed is not None
-        assert self.pulled is not None
-        return 0.5 * (self.pushed.effort - self.pulled.effort)
+        """Half the distance of the efforts that moved it; off a stop, that which did."""
+        efforts = [abs(one.effort) for one in self.movers]
+        return sum(efforts) / len(efforts)
+
+    @property
+    def movers(self) -> list[Pushed]:
+        """The pushes that moved it, the positive one first."""
+        return [one for one in (self.pushed, self.pulled) if one is not None]
 
 
 @dataclass(frozen=True)
@@ -106,15 +113,17 @@ def search(talk: Talk, axis: Axis, *, alive: bool) -> Search:
                         pushes += _make_room(talk, axis, one)
         if found[1] is not None and found[-1] is not None:
             break
+        moved = Search(found[1], found[-1], tuple(pushes))
+        stop = _stop_of(talk, axis, moved)
+        if stop:
+            return replace(moved, stop=stop)
         effort *= GROWTH
     return Search(found[1], found[-1], tuple(pushes))
 
 
 def sense(talk: Talk, axis: Axis, found: Search) -> Sense:
     """Push in pairs about ``found.hold`` and count which way the axis goes."""
-    assert found.pushed is not None
-    assert found.pulled is not None
-    seconds = max(found.pushed.seconds, found.pulled.seconds)
+    seconds = max(one.seconds for one in found.movers)
     hold, effort = found.hold, found.effort
     votes, factor = 0, PAIRS[0]
     pushes: list[Pushed] = []
@@ -130,7 +139,7 @@ def sense(talk: Talk, axis: Axis, found: Search) -> Sense:
         apart = pair[0].went - pair[1].went
         if not any(one.disturbed for one in pair) and abs(apart) >= axis.seen:
             votes += 1 if apart > 0.0 else -1
-    against = found.pushed.went < 0.0 and found.pulled.went > 0.0
+    against = all(one.effort * one.went < 0.0 for one in found.movers)
     direction: Direction = "not determined"
     if votes >= VOTES and not against:
         direction = "right"
@@ -171,4 +180,20 @@ def _make_room(talk: Talk, axis: Axis, moved: Pushed) -> list[Pushed]:
         if left >= ROOM * axis.moved:
             break
         made.append(push(talk, axis, moved.effort, moved.seconds, way=2.0 * axis.moved))
+        there = float(talk.heard(talk.mark() - 1)[axis.name][0])
+        if abs(there - here) <= axis.rest:
+            break  # something carries it back, as it will the next time
     return made
+
+
+def _stop_of(talk: Talk, axis: Axis, found: Search) -> int:
+    """Which stop the blades lie on: all efforts were tried both ways, one alone moved them, and
+    they fell back near to a stop."""
+    if axis.name != "opening" or len(found.movers) != 1:
+        return 0
+    one = found.movers[0]
+    heard = talk.heard()["opening"]
+    begun, ended = float(heard[one.begin]), float(heard[one.end - 1])
+    stop = 1 if one.went > 0.0 else -1
+    near = stop_near(begun, talk.identity) == stop
+    return stop if near and abs(ended - begun) <= 0.5 * axis.moved else 0

@@ -62,25 +62,28 @@ def swings(
     pushes = list(before)
     least = TELLING * prior.breakaway_Nm
     strongest = max(abs(one.effort) for one in pushes)
-    fit = _fitted(talk, pushes, least, prior, noise_rad)
+    fit = _fitted(talk, axis, pushes, least, prior, noise_rad)
     for pairs in range(MOST_PAIRS + 1):
         if pairs == MOST_PAIRS or (pairs >= LEAST_PAIRS and known(fit, strongest)):
-            fit = _fitted(talk, pushes, least, prior, noise_rad, fit.values, modes=True)
+            fit = _fitted(talk, axis, pushes, least, prior, noise_rad, fit.values, modes=True)
             if pairs == MOST_PAIRS or known(fit, strongest):
                 break
-        for sign in (1, -1):
-            effort, seconds = _planned(talk, axis, fit, sign, prior.breakaway_Nm, strongest)
+        for sign in (prior.stop, prior.stop) if prior.stop else (1, -1):
+            effort, seconds = _planned(talk, axis, fit, sign, prior.breakaway_Nm, strongest, hold)
             one = push(talk, axis, effort, seconds, hold=hold, way=_most_way(axis), rate=MOST_RATE)
             pushes.append(one)
             if not one.disturbed:
                 strongest = max(strongest, abs(effort))
-        fit = _fitted(talk, pushes, least, prior, noise_rad, fit.values)
-    shown = swings_of(pushes_of(talk, pushes, least), prior, noise_rad, fit.values, SHOWN)
+        fit = _fitted(talk, axis, pushes, least, prior, noise_rad, fit.values)
+    shown = swings_of(
+        pushes_of(talk, pushes, least, prior.stop, axis.seen), prior, noise_rad, fit.values, SHOWN
+    )
     return Swung(tuple(pushes), fit, strongest, shown)
 
 
 def _fitted(
     talk: Talk,
+    axis: Axis,
     pushes: list[Pushed],
     least: float,
     prior: Prior,
@@ -93,7 +96,7 @@ def _fitted(
 
     Where the mode that was followed so far does not explain the pushes, it is sought anew.
     """
-    some = pushes_of(talk, pushes, least)
+    some = pushes_of(talk, pushes, least, prior.stop, axis.seen)
     with talk.paused():
         fit = fit_joint(some, prior, noise_rad, start=start, modes=modes)
         if fit.misfit <= EXPLAINED and not fit.strange:
@@ -109,16 +112,36 @@ def known(fit: JointFit, strongest: float) -> bool:
     )
 
 
-def pushes_of(talk: Talk, pushed: list[Pushed] | tuple[Pushed, ...], least: float) -> list[Push]:
-    """What was heard of each push of ``least`` and more that nothing disturbed, for the fit."""
+def pushes_of(
+    talk: Talk, pushed: list[Pushed] | tuple[Pushed, ...], least: float, stop: int, seen: float
+) -> list[Push]:
+    """What was heard of each push of ``least`` and more that nothing disturbed, for the fit.
+
+    Of blades on a stop, what they do off it: pushes that press them on it, and how they rebound
+    from it, tell of the stop alone.
+    """
     whole = talk.heard()
-    kept = [not one.disturbed and abs(one.effort) >= least for one in pushed]
+    kept = [
+        not one.disturbed and abs(one.effort) >= least and stop * one.effort >= 0.0
+        for one in pushed
+    ]
     stood = [True, *(one.rested or not known for one, known in zip(pushed, kept, strict=True))]
     return [
-        _push_of(whole[one.begin : one.end], talk.tick_s, rested)
+        _push_of(_off_stop(whole[one.begin : one.end], stop, seen), talk.tick_s, rested)
         for one, rested, known in zip(pushed, stood[:-1], kept, strict=True)
         if known
     ]
+
+
+def _off_stop(heard: np.ndarray, stop: int, seen: float) -> np.ndarray:
+    """What was heard until the blades were back on the stop where they began; all where they did
+    not leave it by ``seen``, which tells what does not take them off it."""
+    off = stop * (heard["opening"] - heard["opening"][0])
+    if off.max() < seen:
+        return heard
+    back = off <= 0.0
+    back[: int(np.argmax(off)) + 1] = False
+    return heard[: int(np.argmax(back)) + 1] if back.any() else heard
 
 
 def _push_of(heard: np.ndarray, tick_s: float, rested: bool) -> Push:
@@ -136,7 +159,13 @@ def _most_way(axis: Axis) -> float:
 
 
 def _planned(
-    talk: Talk, axis: Axis, fit: JointFit, sign: int, breakaway: float, strongest: float
+    talk: Talk,
+    axis: Axis,
+    fit: JointFit,
+    sign: int,
+    breakaway: float,
+    strongest: float,
+    hold: float,
 ) -> tuple[float, float]:
     """Torque and time of the next swing: the safe one that goes farthest towards the aim.
 
@@ -153,9 +182,10 @@ def _planned(
         effort = factor * max(breakaway, needed / BEYOND)
         seconds = LONGEST_S
         while effort <= axis.effort and seconds > 0.5 * talk.tick_s:
-            way, rate = travel_of(lightest, sign * effort, seconds)
+            way, rate = travel_of(lightest, sign * effort, seconds, hold, fit.stop)
             if rate <= rate_limit and way <= way_limit:
-                reached = min(travel_of(fit.values, sign * effort, seconds)[0] / aim, 1.0)
+                way, _ = travel_of(fit.values, sign * effort, seconds, hold, fit.stop)
+                reached = min(way / aim, 1.0)
                 safe.append((effort >= needed and strongest < needed, reached, effort, seconds))
                 break
             seconds *= 0.6

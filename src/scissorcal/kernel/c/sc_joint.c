@@ -7,6 +7,9 @@
 static const double PHASE = 0.6;
 static const double SHORTEST_STEP = 5e-5;
 
+/* Of critical: rubber and blades that are pressed on it. */
+static const double STOP_DAMPING = 0.3;
+
 /* What the steps take, a column for each joint, so that compilers do several at once. */
 typedef struct {
     double place[SC_JOINTS], rate[SC_JOINTS], motor[SC_JOINTS];
@@ -16,6 +19,7 @@ typedef struct {
     double per_fine[SC_JOINTS], per_slow[SC_JOINTS], share[SC_JOINTS];
     double carrying[SC_JOINTS], slope[SC_JOINTS], turn[SC_JOINTS];
     double follow[SC_JOINTS], missing[SC_JOINTS];
+    double stop[SC_JOINTS], wall[SC_JOINTS], stiffness[SC_JOINTS], cushion[SC_JOINTS];
 } columns;
 
 /* exp(-x) for x >= 0: right to x^4 / 24 where x is small, and falling to 0 for all x. */
@@ -33,8 +37,9 @@ static double longest_step(const sc_joint *joint, double most)
     return fmax(fmin(step, most), SHORTEST_STEP);
 }
 
-static void set_up(columns *c, const sc_joint *joint, size_t joints)
+static void set_up(columns *c, const sc_joint *joint, size_t joints, double longest)
 {
+    const double square = longest * longest;
     for (size_t j = 0; j < joints; j++) {
         c->place[j] = c->rate[j] = c->motor[j] = c->fine[j] = c->slow[j] = 0.0;
         c->opening[j] = joint[j].opening;
@@ -50,6 +55,10 @@ static void set_up(columns *c, const sc_joint *joint, size_t joints)
         c->carrying[j] = joint[j].carrying;
         c->slope[j] = joint[j].carrying_slope;
         c->turn[j] = joint[j].turn;
+        c->stop[j] = joint[j].stop;
+        c->wall[j] = 0.0;
+        c->stiffness[j] = fmin(joint[j].stop_stiffness, PHASE * PHASE * joint[j].inertia / square);
+        c->cushion[j] = 2.0 * STOP_DAMPING * sqrt(c->stiffness[j] * joint[j].inertia);
     }
 }
 
@@ -73,10 +82,13 @@ static void take_step(columns *c, size_t joints, double command, double dt)
         const double built = fine + c->share[j] * (slow - fine);
         const double level = built > 0.0 ? c->opening[j] : c->closing[j];
         const double over = rate * c->per_rate[j];
+        const double deep = c->stop[j] * (c->wall[j] - c->place[j]);
+        const double pressed = deep > 0.0 ? c->stop[j] * c->stiffness[j] * deep : 0.0;
         const double torque = acting + c->carrying[j] + c->slope[j] * (c->place[j] - c->turn[j]) -
-                              (level + c->rise[j] * decay(over * over)) * built;
+                              (level + c->rise[j] * decay(over * over)) * built + pressed;
         const double yields = 1.0 - (rate < 0.0 ? -fine : fine);
-        const double damping = c->viscous[j] + c->bristle[j] * yields;
+        const double damping = c->viscous[j] + c->bristle[j] * yields +
+                               (deep > 0.0 ? c->cushion[j] : 0.0);
         const double by = dt * c->per_inertia[j];
         const double next = (rate + by * torque) / (1.0 + by * damping);
         const double size = dt * fabs(next), sign = next < 0.0 ? -1.0 : 1.0;
@@ -87,14 +99,29 @@ static void take_step(columns *c, size_t joints, double command, double dt)
     }
 }
 
-/* What friction of a joint that something carries has built up before anything is known of it. */
+/* What friction of a joint that something carries has built up before anything is known of it.
+ * Blades on a stop have rebounded from it: each small way out and back takes built by
+ * -2 * built * way / length, so that their friction bears nothing and the stop all. */
 static void hold(columns *c, const sc_joint *joint, size_t joints)
 {
     for (size_t j = 0; j < joints; j++) {
         const double carrying = joint[j].carrying;
         const double level = carrying > 0.0 ? joint[j].opening : joint[j].closing;
-        const double built = carrying / fmax(level + joint[j].rise, 1e-12);
+        const double held = carrying / fmax(level + joint[j].rise, 1e-12);
+        const double built = joint[j].stop == 0.0 ? held : 0.0;
         c->fine[j] = c->slow[j] = fmax(-0.999, fmin(0.999, built));
+    }
+}
+
+/* Puts the stops of joints at rest to where they bear what friction does not. */
+static void lay(columns *c, size_t joints)
+{
+    for (size_t j = 0; j < joints; j++) {
+        const double built = c->fine[j] + c->share[j] * (c->slow[j] - c->fine[j]);
+        const double level = (built > 0.0 ? c->opening[j] : c->closing[j]) + c->rise[j];
+        const double carried = c->carrying[j] + c->slope[j] * (c->place[j] - c->turn[j]);
+        const double load = fmax(0.0, c->stop[j] * (level * built - carried));
+        c->wall[j] = c->place[j] + c->stop[j] * load / fmax(c->stiffness[j], 1e-9);
     }
 }
 
@@ -109,7 +136,7 @@ void sc_joint_follow(const sc_joint *joint, size_t joints, const double *times, 
         return;
     const double longest = longest_step(joint, step);
     double now = times[0];
-    set_up(&c, joint, joints);
+    set_up(&c, joint, joints, longest);
     for (size_t i = 0; i < count; i++) {
         while (now < times[i]) {
             double until = times[i];
@@ -134,6 +161,7 @@ void sc_joint_follow(const sc_joint *joint, size_t joints, const double *times, 
                 c.place[j] = isfinite(rests[i]) ? rests[i] : c.place[j];
                 c.rate[j] = 0.0;
             }
+            lay(&c, joints);
         }
         for (size_t j = 0; j < joints; j++)
             places[j * count + i] = c.place[j];
