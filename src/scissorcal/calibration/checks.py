@@ -141,7 +141,7 @@ def _null(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdic
     """Directions that data leave to the prior; those with nuisance parameters in them may be.
 
     What is reported of a law's parameter then still has the width that the nuisance gives it. What
-    only concerns friction near rest has a check of its own.
+    only concerns friction near rest is judged by *near rest*.
     """
 
     def names(direction: str) -> set[str]:

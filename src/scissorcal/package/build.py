@@ -16,7 +16,6 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.identity import bytes_digest
 from scissorcal.package.archive import member_of, write_archive
-from scissorcal.package.by_load import as_closing
 from scissorcal.package.compile import scene_ranges
 from scissorcal.package.drawn_plate import piece_records
 from scissorcal.package.exact import FitDraws, central_model
@@ -108,6 +107,7 @@ def build_package(
     the package reports it (docs/decisions/109-packages-from-failed-fits.md).
     """
     # the report imports this module to read packages; only a build needs what follows
+    from scissorcal.package.by_load import as_closing
     from scissorcal.package.check import check_package
     from scissorcal.package.reach import data_reach
     from scissorcal.package.simplest.model import simplest_model

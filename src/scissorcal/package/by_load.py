@@ -14,28 +14,23 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration import FitResult
 from scissorcal.calibration.result import FittedParameter
+from scissorcal.package.friction_tables import LOAD_SHARE, share_of
 
 Array = NDArray[np.float64]
 
 GROWING = ("response_force", "fracture_energy")
-SHARE = "load_share"
-
-
-def share_of(cut: FitResult) -> FittedParameter | None:
-    """The share of the cut's torque that friction adds, None where the law has none."""
-    return next((p for p in cut.nuisance if p.name == SHARE), None)
 
 
 def as_closing(cut: FitResult) -> FitResult:
     """The fit with friction by load in force and energy, draw by draw; itself where there is none.
 
-    The MAP point has no share of its own in a fit, so it is scaled to the posterior's mean of what
+    A fit keeps no share at its MAP point, so that is scaled to the posterior's mean of what
     running costs (of the force where nothing is cut).
     """
     if share_of(cut) is None or cut.nuisance_draws is None:
         return cut
     names = [p.name for p in cut.parameters]
-    place = [p.name for p in cut.nuisance].index(SHARE)
+    place = [p.name for p in cut.nuisance].index(LOAD_SHARE)
     growth = 1.0 + np.asarray(cut.nuisance_draws[:, place], dtype=np.float64)
     columns = [names.index(name) for name in GROWING if name in names]
     draws, point = np.array(cut.draws, dtype=np.float64), np.array(cut.map_point, dtype=np.float64)

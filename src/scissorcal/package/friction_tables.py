@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration import FitResult
+from scissorcal.calibration.result import FittedParameter
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.curvature import cubic_curvature, level_curvature
 from scissorcal.model.friction import angle_factor, angle_slope, friction_level
 from scissorcal.model.terms import Role
-from scissorcal.package.by_load import share_of
 from scissorcal.package.tables import Function
 from scissorcal.recipe.schema import Recipe
 
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 PLACES = 201
 
+LOAD_SHARE = "load_share"
 SIGNS = {"friction_opening": 1.0, "friction_closing": -1.0}
 """Direction of motion of each table of levels."""
 
@@ -119,6 +120,11 @@ def left_out(law: FrictionLaw, scene_torque: float) -> tuple[str, ...]:
             f"right after one, {2 * sudden * dry / math.e:.2g} N m {length:.2g} rad later."
         )
     return tuple(said)
+
+
+def share_of(cut: FitResult) -> FittedParameter | None:
+    """The share of the cut's torque that friction adds, None where the law has none."""
+    return next((p for p in cut.nuisance if p.name == LOAD_SHARE), None)
 
 
 def cut_left_out(

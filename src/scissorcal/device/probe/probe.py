@@ -61,8 +61,9 @@ FLAG_TO_DELAY_TICKS, DELAY_SD_TICKS = 0.25, 0.6
 """A flag shows at the end of the tick in which a torque began; where in the tick it was measured
 and began is the device's affair."""
 TOLD_SD = 0.25
-"""Of the logarithms of the Stribeck level and rate: beyond 50 % at 90 % they are the prior's, and a
-capture judges slow sweeps by a bound instead."""
+"""Of the logarithms of Stribeck's level and rate, of presliding's lengths, and of the odds of its
+share: beyond 50 % at 90 % they are the prior's and no facts. A capture then judges slow sweeps by a
+bound, and a fit of cuts lets friction jump at turns."""
 GAIN_HOLD_S, HELD_SHARE = 0.1, 0.6
 """How long an effort is held for its gain, and its share of the one that moved the blades."""
 SLEDGE_FORCE_SHARE = 0.2
@@ -321,8 +322,14 @@ def _of_swings(swung: Swung) -> dict[str, object]:
     """Estimates and facts of the joint."""
     fit = swung.fit
     joint = fit.joint
-    fall = {"stribeck_Nm": joint.rise, "stribeck_rate_rad_per_s": joint.rise_rate}
-    told = max(fit.sd("log_rise_share"), fit.sd("log_rise_rate")) <= TOLD_SD
+    fall, slow = ("log_rise_share", "log_rise_rate"), ("log_slow", "slow_logit")
+    told = {
+        "stribeck_Nm": (joint.rise, fall),
+        "stribeck_rate_rad_per_s": (joint.rise_rate, fall),
+        "presliding_fine_rad": (joint.fine, ("log_fine",)),
+        "presliding_slow_rad": (joint.slow, slow),
+        "presliding_slow_share": (joint.slow_share, slow),
+    }
     return {
         "inertia_kg_m2": fit.inertia,
         "coulomb_Nm": fit.coulomb,
@@ -331,14 +338,13 @@ def _of_swings(swung: Swung) -> dict[str, object]:
         "posterior": fit.posterior,
         "swings": swung.shown,
         "facts": {
-            **(fall if told else {}),
+            **{
+                name: value
+                for name, (value, by) in told.items()
+                if max(fit.sd(one) for one in by) <= TOLD_SD
+            },
             "coulomb_opening_Nm": joint.opening,
             "coulomb_closing_Nm": joint.closing,
-            "presliding_fine_rad": min(joint.fine, joint.slow),
-            "presliding_slow_rad": max(joint.fine, joint.slow),
-            "presliding_slow_share": (
-                joint.slow_share if joint.slow >= joint.fine else 1.0 - joint.slow_share
-            ),
             "carrying_Nm": joint.carrying,
             "log_inertia_sd": fit.sd("log_inertia"),
             "misfit": fit.misfit,
