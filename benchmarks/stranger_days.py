@@ -248,7 +248,8 @@ def one_day(program: Path, module: Any, seed: int, keep: Path | None) -> Row:
                     break
         finally:
             slips = rig.close()
-        packed = ended == "a package"
+        packed = any((folder / "day" / "package").glob("*.zip"))
+        ended = ended if packed or ended != "a package" else "package build"
         rms, inside = (None, None) if not packed else against_truth(folder / "day", truth)
     return Row(
         seed,
