@@ -65,7 +65,7 @@ def test_every_law_has_parameters_with_units_and_proper_priors(law, kind):
     assert units["coulomb_pos"] == joint.effort_unit
     assert units["inertia"] == ("kg m^2" if kind == "rotary" else "kg")
     delay = layout.parameters[layout.names.index("delay")]
-    assert (delay.mean, delay.sd) == pytest.approx((1e-4, 1.5e-4))
+    assert (delay.mean, delay.sd) == pytest.approx((5e-4, 1e-3))
     if "presliding" in law:
         assert layout.parameters[layout.names.index("presliding_share")].transform == LOGIT
 
