@@ -68,17 +68,12 @@ class Layout:
         rows = []
         natural = self.columns(u_draws)
         for index, parameter in enumerate(self.parameters):
-            u, x = u_draws[:, index], natural[:, index]
-            q05, q50, q95 = np.quantile(x, [0.05, 0.5, 0.95])
+            u = u_draws[:, index]
             rows.append(
                 FittedParameter(
                     name=parameter.name,
                     unit=parameter.unit,
-                    mean=float(x.mean()),
-                    sd=float(x.std(ddof=1)),
-                    q05=float(q05),
-                    q50=float(q50),
-                    q95=float(q95),
+                    **FittedParameter.summary_of(natural[:, index]),
                     identifiability=float(min(u.std(ddof=1) / parameter.sd, 1.0)),
                     meaning=parameter.meaning,
                     believed=parameter.believed,

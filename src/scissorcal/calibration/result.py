@@ -103,6 +103,13 @@ class FittedParameter:
     meaning: str = ""
     believed: bool = False
 
+    @staticmethod
+    def summary_of(draws: Array) -> dict[str, Any]:
+        """The fields that posterior draws (n,) in the parameter's unit give."""
+        q05, q50, q95 = (float(value) for value in np.quantile(draws, [0.05, 0.5, 0.95]))
+        mean, sd = float(draws.mean()), float(draws.std(ddof=1))
+        return {"mean": mean, "sd": sd, "q05": q05, "q50": q50, "q95": q95}
+
     def as_dict(self) -> dict[str, Any]:
         """Give the parameter as the plain object that ``--json`` prints."""
         return {

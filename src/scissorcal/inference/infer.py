@@ -226,7 +226,7 @@ class _Run:
                     target, sampled, self.proposal, self.count, self.rng, rounds, many
                 )
                 said += f", {mixed.k_hat:.2f} with an adapted mixture"
-                # A proposal that saw all regions and passed is not refused for a better one's sake.
+                # Weights that passed are not refused by the stricter limit of a better proposal.
                 passed = sampled.trusted and mixed.k_hat < sampled.k_hat
                 sampled = replace(mixed, limit=sampled.limit) if passed else mixed
         if sampled.trusted or not escalate:

@@ -38,7 +38,8 @@ def as_closing(cut: FitResult) -> FitResult:
     point[columns] *= float(np.mean(growth * _cost(names, draws))) / cost
     draws[:, columns] *= growth[:, None]
     parameters = tuple(
-        _described(p, draws[:, i]) if i in columns else p for i, p in enumerate(cut.parameters)
+        replace(p, **FittedParameter.summary_of(draws[:, i])) if i in columns else p
+        for i, p in enumerate(cut.parameters)
     )
     return replace(cut, parameters=parameters, draws=draws, map_point=point)
 
@@ -49,9 +50,3 @@ def _cost(names: list[str], rows: Array) -> Array:
         return rows[:, names.index("response_force")]
     kappa = rows[:, names.index("kappa")] if "kappa" in names else 1.0
     return np.asarray(0.5 * (1.0 + kappa) * rows[:, names.index("fracture_energy")])
-
-
-def _described(parameter: FittedParameter, draws: Array) -> FittedParameter:
-    q05, q50, q95 = (float(value) for value in np.quantile(draws, [0.05, 0.5, 0.95]))
-    mean, sd = float(draws.mean()), float(draws.std(ddof=1))
-    return replace(parameter, mean=mean, sd=sd, q05=q05, q50=q50, q95=q95)

@@ -4,6 +4,7 @@ from scissorcal.calibration.cut.path.motion import PathMotion, path_motion, turn
 from scissorcal.calibration.cut.path.work import (
     Material,
     advance_line,
+    built_friction,
     built_up,
     kinetic_variance,
     material_of,
@@ -18,6 +19,7 @@ __all__ = [
     "Material",
     "PathMotion",
     "advance_line",
+    "built_friction",
     "built_up",
     "kinetic_variance",
     "material_of",

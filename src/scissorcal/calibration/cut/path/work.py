@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.calibration.cut.path.motion import PathMotion
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
@@ -65,8 +65,7 @@ def material_of(
     middle = 0.5 * (path[1:] + path[:-1])
     rate = _turning_rate(motion, step)
     direction = built_up(path, np.sign(rate), friction, fine_rad)
-    whole = replace(friction, values={**friction.values, "presliding_share": np.asarray(1.0)})
-    law = friction_torque(whole, middle, rate, 0.0, direction)
+    law = built_friction(friction, middle, rate, 0.0, direction)
     gone = (law + offset - motion.drive[:-1]) * step
     work = np.concatenate([[0.0], np.cumsum(gone)]) + 0.5 * motion.inertia * motion.rate**2
     cosine, sine, number = cogging
@@ -93,6 +92,14 @@ def built_up(path: Array, sense: Array, friction: FrictionLaw, fine_rad: float) 
     if share > 0.0:
         found = found + share * (between(float(friction["presliding_length"])) - found)
     return np.asarray(found)
+
+
+def built_friction(
+    friction: FrictionLaw, opening: Array, rate: Array, load: ArrayLike, direction: Array
+) -> Array:
+    """Friction (n - 1,) whose dry part acts by ``direction`` (n - 1,), as `built_up` gives it."""
+    whole = replace(friction, values={**friction.values, "presliding_share": np.asarray(1.0)})
+    return friction_torque(whole, opening, rate, load, direction)
 
 
 def _turning_rate(motion: PathMotion, step: Array) -> Array:

@@ -1,16 +1,16 @@
 """The drive torque that a rig with known parameters would have measured along a motion."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.path import built_up
+from scissorcal.calibration.cut.path import built_friction, built_up
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.weak_form import HELD
 from scissorcal.calibration.signals.window_length import SMOOTH
 from scissorcal.calibration.verify.simulation.motion import SmoothPiece
-from scissorcal.model import FrictionLaw, friction_torque
+from scissorcal.model import FrictionLaw
 
 Array = NDArray[np.float64]
 
@@ -61,8 +61,7 @@ def measured_drive(
     law = truth.friction
     direction = built_up(path, np.sign(step), law, truth.fine_rad)
     load = 0.5 * (piece.load[1:] + piece.load[:-1])
-    whole = replace(law, values={**law.values, "presliding_share": np.asarray(1.0)})
-    dry = sense * friction_torque(whole, middle, step / tick_s, load, direction)
+    dry = sense * built_friction(law, middle, step / tick_s, load, direction)
     cosine, sine, number = truth.cogging
     drive = dry + truth.offset
     drive += cosine * np.cos(number * middle) + sine * np.sin(number * middle)
