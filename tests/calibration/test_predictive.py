@@ -19,8 +19,8 @@ from tests.calibration.truth import (
     make_recording,
     sweep,
 )
+from tests.with_arviz import arviz
 
-arviz: Any = pytest.importorskip("arviz")
 matplotlib: Any = pytest.importorskip("matplotlib")
 matplotlib.use("Agg")
 

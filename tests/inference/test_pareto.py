@@ -1,15 +1,10 @@
 """Pareto smoothing against ArviZ's, which is not imported by fits because that takes seconds."""
 
-import warnings
-
 import numpy as np
 import pytest
 
 from scissorcal.inference.pareto import smooth_weights
-
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore", FutureWarning)
-    import arviz
+from tests.with_arviz import arviz
 
 
 @pytest.mark.parametrize("count", [60, 256, 4000])

@@ -1,15 +1,10 @@
 """R-hat of the thorough effort is the rank-normalised one of ArviZ."""
 
-import warnings
-
 import numpy as np
 import pytest
 
 from scissorcal.inference.thorough import rank_r_hat
-
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore", FutureWarning)
-    arviz = pytest.importorskip("arviz")
+from tests.with_arviz import arviz
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.5])
