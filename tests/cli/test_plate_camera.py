@@ -87,7 +87,7 @@ def test_taps_of_a_plate_that_may_not_be_carried_are_refused(
     ("error", "words"),
     [
         (DeviceError("The camera 0 was unplugged."), "The camera 0 was unplugged."),
-        (None, "There is no pose of the plate after 10 s"),
+        pytest.param(None, "There is no pose of the plate after 10 s", marks=pytest.mark.slow),
     ],
 )
 def test_without_a_first_pose_the_camera_says_why(

@@ -68,6 +68,7 @@ def swept(folder: Path, recipe: Recipe, gains_of: str) -> Recording:
     return read_recording(folder / f"{gains_of}.mcap")
 
 
+@pytest.mark.slow
 def test_the_slowest_usable_sweeps_slide_where_slower_ones_stick(tmp_path: Path) -> None:
     recipe = changed("paper-80gsm", capture__friction=SHORT)
     stuck, slid = (swept(tmp_path, recipe, kind) for kind in (AS_STROKES, "friction"))
@@ -115,7 +116,7 @@ def second_rig(seed: int) -> tuple[Rig, Recipe, Probed]:
     return rig, recipe, probed
 
 
-@pytest.mark.parametrize("seed", [401, 402])
+@pytest.mark.parametrize("seed", [401, pytest.param(402, marks=pytest.mark.slow)])
 def test_the_second_rig_slides_as_the_greatest_fall_says(seed: int) -> None:
     rig, recipe, probed = second_rig(seed)
     friction = rig.mechanism.friction

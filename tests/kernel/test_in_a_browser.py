@@ -52,6 +52,7 @@ def harness(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return page
 
 
+@pytest.mark.slow
 def test_a_million_steps_in_a_browser_are_the_native_ones(harness: Path) -> None:
     each = -(-STEPS // len(MODELS))
     felt = 0

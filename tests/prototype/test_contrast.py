@@ -76,7 +76,7 @@ CONTRASTS = """() => {
 }"""
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", [pytest.param("light", marks=pytest.mark.slow), "dark"])
 def test_every_text_has_the_contrast_that_reading_needs(
     browser: Browser, scene: Scene, tmp_path: Path, scheme: str
 ) -> None:

@@ -208,6 +208,7 @@ def test_two_pages_of_one_server_follow_the_same_rig(browser: Browser, tmp_path:
             until(pages[1], "recent.recording.includes('render-2')")
 
 
+@pytest.mark.slow
 def test_a_page_too_many_waits_until_another_one_is_closed(
     browser: Browser, tmp_path: Path
 ) -> None:

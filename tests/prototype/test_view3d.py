@@ -161,6 +161,7 @@ def test_it_takes_the_colours_of_the_theme(bed: Bed) -> None:
     assert differ(light, picture(bed)) == 0
 
 
+@pytest.mark.slow
 def test_it_is_disposed_of_and_made_again(bed: Bed) -> None:
     """Browsers keep sixteen contexts alive: more views than that, one after the other."""
     for _ in range(17):

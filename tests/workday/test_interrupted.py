@@ -20,11 +20,10 @@ def day(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def names() -> list[object]:
-    """Every command that writes; those of a second or more are slow."""
-    quick = ("recording exclude",)
-    every = ("capture", "device probe", "fit", "fit restore", "report", "report sign")
-    every = (*every, "package build", "render")
-    return [*quick, *(pytest.param(name, marks=pytest.mark.slow) for name in every)]
+    """Every command that writes."""
+    every = ("recording exclude", "capture", "device probe", "fit", "fit restore", "report")
+    every = (*every, "report sign", "package build", "render")
+    return [pytest.param(name, marks=pytest.mark.slow) for name in every]
 
 
 @pytest.mark.parametrize("name", names())

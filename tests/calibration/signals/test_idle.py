@@ -3,21 +3,28 @@
 import numpy as np
 import pytest
 
-from scissorcal.calibration.signals.idle import idle_noise, idle_zero
+from scissorcal.calibration.signals.idle import idle_noise, idle_periods, idle_zero
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 
 ZERO, NOISE = 4e-4, 1e-3
 
 
-def recording(idle_s: float = 1.5, command: float = 0.02, creep: float = 0.0) -> Recording:
-    """Two seconds of motion, then motors off at 0.01 rad."""
+def recording(
+    idle_s: float = 1.5,
+    command: float = 0.02,
+    creep: float = 0.0,
+    settling: float = 0.0,
+    step: float = 5e-5,
+) -> Recording:
+    """Two seconds of motion, then motors off at 0.01 rad, to which they settle within 0.1 s."""
     rng = np.random.default_rng(5)
     moving, still = 2000, round(1000 * idle_s)
     samples = np.zeros(moving + still, SAMPLE_DTYPE)
     samples["device_time_us"] = 1000 * np.arange(len(samples))
     samples["opening"][:moving] = 0.5 + 0.3 * np.sin(np.arange(moving) / 200)
     samples["opening"][moving:] = 0.01 + creep * np.arange(still)
-    samples["opening"] = np.round(samples["opening"] / 5e-5) * 5e-5
+    samples["opening"][moving:] += settling * np.exp(-np.arange(still) / 20.0)
+    samples["opening"] = np.round(samples["opening"] / step) * step
     samples["torque_command"][:moving] = command
     samples["motor_torque"] = ZERO + NOISE * rng.standard_normal(len(samples))
     samples["motor_torque"][:moving] += command
@@ -31,6 +38,16 @@ def test_an_idle_second_gives_the_drives_zero():
     assert drive.sd == pytest.approx(NOISE / np.sqrt(1500), rel=0.5)
     assert drive.seconds == pytest.approx(1.5)
     assert idle_noise((recording(),)) == pytest.approx(NOISE, rel=0.1)
+
+
+@pytest.mark.parametrize("step", [1e-6, 5e-5, 8e-4], ids=lambda step: f"steps of {step:g} rad")
+def test_blades_that_settle_are_at_rest_behind_any_encoder(step):
+    """A zero moved by 1 N m while they still move (5 mrad to go) is not in it."""
+    moved = recording(settling=5e-3, step=step)
+    moved.samples["motor_torque"][2000:2010] += 1.0
+    (period,) = idle_periods(moved)
+    assert 1.4 < period.seconds < 1.5
+    assert abs(period.drive - ZERO) < 3 * period.drive_sd
 
 
 @pytest.mark.parametrize(

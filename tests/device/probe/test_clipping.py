@@ -4,7 +4,9 @@ from typing import Any
 
 import pytest
 
-from scissorcal.device.probe.probe import ProbeRefusedError, probe
+from scissorcal.device.probe.clipping import clipping
+from scissorcal.device.probe.probe import ProbeRefusedError, bounds_of, probe
+from scissorcal.device.probe.result import Estimate
 from scissorcal.device.probe.talk import StalledError, Talk
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, ConfigKey, decode
@@ -13,18 +15,21 @@ from scissorcal.verdicts import Verdict
 from tests.strange_device import Faults, Person, StrangeDevice, VirtualPort, wire
 
 RECIPE = builtin_recipe("paper-80gsm")
+INERTIA = 3e-3
 LATE_S = (0.0, 0.0005, 0.001, 0.0015)
 """Each way: 0 to 3 ms together; what falls between two ticks waits for the next."""
 
 
 def heavy(late_s: float = 0.0, *, clips: bool = True) -> Faults:
     """Blades that one tick at the limit cannot bring above the bounds."""
-    return Faults(inertia=3e-3, clips=clips, delay_to_host_s=late_s, delay_to_device_s=late_s)
+    return Faults(inertia=INERTIA, clips=clips, delay_to_host_s=late_s, delay_to_device_s=late_s)
 
 
 def clipping_of(link: VirtualPort) -> Verdict:
-    found = probe(link, RECIPE, confirm=Person(link.device))
-    return next(verdict for verdict in found.verdicts if verdict.check == "clipping")
+    """The last stage of a probe, after the ones before found the inertia to 5 %."""
+    with Talk(link, bounds_of(RECIPE, link.identity), RECIPE.rig.motor_sign) as talk:
+        inertia = Estimate(INERTIA, 0.05 * INERTIA)
+        return clipping(talk, inertia, RECIPE.rig.line.brake_after_ms)
 
 
 @pytest.mark.parametrize("late_s", LATE_S)
@@ -35,10 +40,18 @@ def test_a_heavy_device_that_clips_passes(late_s: float) -> None:
 
 
 @pytest.mark.parametrize("late_s", LATE_S)
-def test_a_heavy_device_that_does_not_clip_is_refused(late_s: float) -> None:
+def test_a_heavy_device_that_does_not_clip_fails(late_s: float) -> None:
     device = StrangeDevice(heavy(late_s, clips=False), seed=1)
+    verdict = clipping_of(VirtualPort(device))
+    assert verdict.status == "fail"
+    assert "must clip what exceeds its limit" in verdict.why
+    assert device.largest_rate < RECIPE.rig.probe.largest_rate_rad_per_s
+
+
+def test_a_probe_refuses_a_device_that_does_not_clip() -> None:
+    device = StrangeDevice(heavy(clips=False), seed=1)
     with pytest.raises(ProbeRefusedError, match="must clip what exceeds its limit"):
-        clipping_of(VirtualPort(device))
+        probe(VirtualPort(device), RECIPE, confirm=Person(device))
     assert device.largest_rate < RECIPE.rig.probe.largest_rate_rad_per_s
 
 

@@ -46,10 +46,10 @@ def test_zeros_lie_in_their_intervals() -> None:
 @pytest.mark.parametrize(
     ("inertia", "dry", "lag", "late"),
     [
-        (1.5e-4, 0.006, 0.0005, 0.0),
-        (6e-4, 0.012, 0.002, 0.0005),
+        pytest.param(1.5e-4, 0.006, 0.0005, 0.0, marks=pytest.mark.slow),
+        pytest.param(6e-4, 0.012, 0.002, 0.0005, marks=pytest.mark.slow),
         (2.5e-3, 0.02, 0.001, 0.0025),
-        (6e-4, 0.005, 0.0005, 0.0015),
+        pytest.param(6e-4, 0.005, 0.0005, 0.0015, marks=pytest.mark.slow),
     ],
 )
 def test_inertia_friction_and_delay_are_recovered(
@@ -67,9 +67,14 @@ def test_inertia_friction_and_delay_are_recovered(
     assert result.facts["largest_rate_rad_per_s"] < RECIPE.rig.probe.largest_rate_rad_per_s
 
 
-def test_the_virtual_rig_is_recovered_although_its_friction_follows_another_law() -> None:
-    rng = np.random.default_rng(5)
-    for _ in range(3):
+@pytest.mark.parametrize(
+    ("seed", "rigs"), [(8, 1), pytest.param(5, 3, marks=pytest.mark.slow)], ids=["one", "three"]
+)
+def test_the_virtual_rig_is_recovered_although_its_friction_follows_another_law(
+    seed: int, rigs: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    for _ in range(rigs):
         specimen = varied(load_specimen("office-paper"), rng)
         result = probe(LockstepLink(specimen, rng), RECIPE)
         mechanism = specimen.mechanism
@@ -82,7 +87,7 @@ def test_the_virtual_rig_is_recovered_although_its_friction_follows_another_law(
         assert holds(result.torque_gain, 1.0)
 
 
-@pytest.mark.parametrize("fault", ["500 Hz", "2 kHz"])
+@pytest.mark.parametrize("fault", ["500 Hz", pytest.param("2 kHz", marks=pytest.mark.slow)])
 def test_other_rates_are_probed_alike(fault: str) -> None:
     result = found(FAULTS[fault], seed=3)
     assert holds(result.inertia_kg_m2, 6e-4)

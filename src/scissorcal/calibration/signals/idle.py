@@ -14,7 +14,10 @@ Array = NDArray[np.float64]
 IDLE_S = 1.0
 """Least duration of an idle period."""
 STILL_STEPS = 2.0
-"""Steps of the encoder by which an opening at rest may differ."""
+STILL = {"rotary": 2e-3, "linear": 2e-4}
+"""An opening at rest differs by steps of the encoder, or by rad (m, the same 0.1 m from a pivot):
+over a second that is a twenty-fifth of the slowest stroke's rate. Blades that settle on what yields
+before they slide, or an encoder of fine steps that jitters, are at rest."""
 BLOCKS_PER_S = 10.0
 """The standard error of a mean is that of blocks so short, which slow noise leaves independent."""
 
@@ -88,8 +91,9 @@ def idle_periods(recording: Recording) -> tuple[IdlePeriod, ...]:
 def idle_spans(recording: Recording) -> list[slice]:
     """Samples of idle periods: no command, blades at rest and no stroke for ``IDLE_S``.
 
-    Where no stroke has a command, nothing shows when motors were off, or a hand moves the handles
-    and may hold them at rest: there are none.
+    A period begins when the blades have come to where they rest at its end. Where no stroke has a
+    command, nothing shows when motors were off, or a hand moves the handles and may hold them at
+    rest: there are none.
     """
     if not is_driven(recording):
         return []
@@ -97,14 +101,16 @@ def idle_spans(recording: Recording) -> list[slice]:
     command = np.asarray(samples["torque_command"], dtype=np.float64)
     opening = np.asarray(samples["opening"], dtype=np.float64)
     still = resolution_of(opening)
-    still = STILL_STEPS * still if np.isfinite(still) else 0.0
+    still = max(STILL_STEPS * still if np.isfinite(still) else 0.0, STILL[recording.joint.kind])
     quiet = (command == 0.0) & (np.asarray(samples["stroke"]) < 0)
     tick, found = _tick(recording), []
     for first, last in pieces_of(recording):
         for low, high in zip(*stretches(quiet[first:last]), strict=True):
-            part = slice(first + int(low), first + int(high))
-            if (high - low) * tick >= IDLE_S and np.ptp(opening[part]) <= still:
-                found.append(part)
+            begin, end = first + int(low), first + int(high)
+            away = np.flatnonzero(np.abs(opening[begin:end] - opening[end - 1]) > still)
+            begin += int(away[-1]) + 1 if len(away) else 0
+            if (end - begin) * tick >= IDLE_S:
+                found.append(slice(begin, end))
     return found
 
 

@@ -77,7 +77,8 @@ class JointFit:
 
     ``misfit`` is the mean square of the residuals in units of their errors. ``strange`` names
     values that lie STRANGE_SDS prior standard deviations out or at a bound. ``stop`` is that of
-    the prior.
+    the prior, ``way`` (rad) the longest that a push went: friction that builds up over more of it
+    was not seen.
     """
 
     values: Array
@@ -85,6 +86,7 @@ class JointFit:
     misfit: float
     strange: tuple[str, ...]
     stop: int = 0
+    way: float = math.inf
 
     def sd(self, name: str) -> float:
         """Standard deviation of a value, as `NAMES` has it."""
@@ -113,7 +115,21 @@ class JointFit:
 
     @property
     def coulomb(self) -> Estimate:
-        return _of_log(self.value("log_coulomb"), math.hypot(self.sd("log_coulomb"), LEFT_OUT))
+        """What friction the longest push met: of the law's, the share that builds up within it."""
+        names = ("log_coulomb", "log_slow", "slow_logit")
+        at = [NAMES.index(name) for name in names]
+        share, left = self.joint.slow_share, 1.0 - self.built_up
+        by_slow = -left * self.way / self.joint.slow if left > 0.0 else 0.0
+        gradient = np.array([1.0, by_slow / self.built_up, -left * (1.0 - share) / self.built_up])
+        variance = float(gradient @ self.covariance[np.ix_(at, at)] @ gradient)
+        mean = self.value("log_coulomb") + math.log(self.built_up)
+        return _of_log(mean, math.hypot(math.sqrt(max(variance, 0.0)), LEFT_OUT))
+
+    @property
+    def built_up(self) -> float:
+        """Share of the law's friction that acts at the end of the longest push."""
+        joint = self.joint
+        return 1.0 - joint.slow_share * math.exp(-self.way / joint.slow)
 
     @property
     def viscous(self) -> Estimate:
@@ -208,6 +224,7 @@ class _Problem:
         turn = float(np.mean(self._places))
         self._turn = turn
         self._pushes, self._noise, self._stop = pushes, noise_rad, prior.stop
+        self._way = max(float(np.ptp(push.places)) for push in pushes)
         self._plain_sd: Array | None = None
         self._friction_sd = FRICTION_SD
         self._sd = np.concatenate([_errors_of(push, noise_rad, prior.stop) for push in pushes])
@@ -331,7 +348,8 @@ class _Problem:
         )
         plain = self._sd if self._plain_sd is None else self._plain_sd
         stated = float(np.mean((rest * self._sd / plain) ** 2))
-        return JointFit(x, inflated * np.outer(scale, scale), stated, strange, self._stop)
+        covariance = inflated * np.outer(scale, scale)
+        return JointFit(x, covariance, stated, strange, self._stop, self._way)
 
     def _places_of(self, several: Array) -> Array:
         """Places (k, samples) of vectors (k, names) whose delay is that of the first."""

@@ -298,6 +298,8 @@ def _push(
         found.stop,
     )
     step = observed_step(talk.heard()["opening"])
+    facts = {"encoder_step_rad": step}
+    finding.add([judge_step(step, identity.opening_resolution)], facts=facts)
     noise = math.hypot(quiet.jitter_rad, identity.opening_resolution / math.sqrt(12.0))
     swung = swings(talk, axis, (*found.pushes, *sensed.pushes, *held), prior, noise, found.hold)
     zero = finding.result.torque_zero_Nm
@@ -310,11 +312,10 @@ def _push(
         "breakaway_Nm": found.effort,
         "breakaway_opening_Nm": abs(found.pushed.effort) if found.pushed else math.nan,
         "breakaway_closing_Nm": abs(found.pulled.effort) if found.pulled else math.nan,
-        "encoder_step_rad": step,
         "measured_torque_lag_s": answered.lag_s,
     }
-    verdicts = [judge_follow(answered), judge_step(step, identity.opening_resolution)]
-    finding.add(verdicts, torque_gain=_finite(answered.gain), facts=facts)
+    gain = _finite(answered.gain)
+    finding.add([judge_follow(answered)], torque_gain=gain, facts=facts)
     finding.take(judge_joint(swung, axis, talk.tick_s, lag_ticks), **_of_swings(swung))
 
 
@@ -324,7 +325,7 @@ def _of_swings(swung: Swung) -> dict[str, object]:
     joint = fit.joint
     fall, slow = ("log_rise_share", "log_rise_rate"), ("log_slow", "slow_logit")
     told = {
-        "stribeck_Nm": (joint.rise, fall),
+        "stribeck_Nm": (fit.built_up * joint.rise, fall),
         "stribeck_rate_rad_per_s": (joint.rise_rate, fall),
         "presliding_fine_rad": (joint.fine, ("log_fine",)),
         "presliding_slow_rad": (joint.slow, slow),
@@ -343,8 +344,8 @@ def _of_swings(swung: Swung) -> dict[str, object]:
                 for name, (value, by) in told.items()
                 if max(fit.sd(one) for one in by) <= TOLD_SD
             },
-            "coulomb_opening_Nm": joint.opening,
-            "coulomb_closing_Nm": joint.closing,
+            "coulomb_opening_Nm": fit.built_up * joint.opening,
+            "coulomb_closing_Nm": fit.built_up * joint.closing,
             "carrying_Nm": joint.carrying,
             "log_inertia_sd": fit.sd("log_inertia"),
             "misfit": fit.misfit,
