@@ -107,6 +107,7 @@ def build_package(
     the package reports it (docs/decisions/109-packages-from-failed-fits.md).
     """
     # the report imports this module to read packages; only a build needs what follows
+    from scissorcal.calibration.friction.typical import at_typical
     from scissorcal.package.by_load import as_closing
     from scissorcal.package.check import check_package
     from scissorcal.package.reach import data_reach
@@ -117,7 +118,7 @@ def build_package(
     if not allow_failed:
         _refuse_failed_fits(path, cut, friction, plate)
     if friction is not None:
-        cut = as_closing(cut)
+        cut, friction = as_closing(cut), at_typical(friction)
     picked = pick_draws(cut, friction, rng)
     simplified = simplest_model(recipe, cut, friction, picked, tolerance=tolerance)
     compiled = simplified.tables[-1]

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.path import path_motion
 from scissorcal.model import friction_torque
 from scissorcal.recipe.priors import CutPriors
+from tests.calibration.cut.path.made import record
+from tests.calibration.truth import sweep
 from tests.package.fits import friction_fit
 
 RATE, LEVEL = 0.1, 0.015
@@ -50,6 +53,21 @@ def test_on_a_curved_ridge_the_mode_replaces_the_mean():
     means = {p.name: p.mean for p in fit.parameters}
     bell = means["stribeck"] * np.exp(-((RATE / means["stribeck_rate"]) ** 2))
     assert means["coulomb"] + bell < LEVEL - 1e-3
+
+
+def test_segments_at_rates_that_friction_is_not_known_at_hardly_count():
+    """Friction open at rest and known at 0.3 rad/s: sds of 0.02 rad/s and of 0.3 rad/s."""
+    known = KnownFriction.of(bent(1.0))
+    doubts = []
+    for rate in (0.02, 0.3):
+        made = record(sweep(0.8, 0.3, rate), lambda opening: 0.0 * opening, step_rad=1e-5)
+        (motion,) = path_motion((made.recording,), known.inertia)
+        ends = np.linspace(0, len(motion.opening) - 1, 5).astype(int)
+        covariance = known.material(motion).torque_doubt(motion, ends)
+        assert np.all(np.linalg.eigvalsh(covariance) >= -1e-15)
+        doubts.append(float(np.sqrt(np.diag(covariance).mean())))
+    assert doubts[0] > 1.5e-3
+    assert doubts[1] < 0.1 * doubts[0]
 
 
 def test_the_standard_deviation_is_of_the_posteriors_core():

@@ -49,6 +49,17 @@ def test_rests_lie_where_the_crack_stands(two_strokes):
         assert rest.opening == pytest.approx(LOW, abs=1e-4)
 
 
+def test_the_next_loading_places_a_crack_whose_unloading_the_encoder_hides():
+    """Steps of 0.8 mrad: the torque after the turn alone places it 0.4 mm off."""
+    made = cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), step_rad=8e-4)
+    found = segments_of(made)
+    ends = made.tip[[len(made.tip) // 2 - 1, -1]]
+    assert [rest.seen for rest in found.rests] == [True, False, False]
+    assert found.rests[1].place == pytest.approx(ends[0], abs=5e-6)
+    assert abs(found.rests[2].place - ends[1]) > 1e-4, "no loading follows the last stroke"
+    assert [piece.rest for piece in found.pieces] == [1]
+
+
 def test_mean_torques_are_those_of_the_truth(two_strokes):
     """Means over the path of the true torque, to 0.5 % of the largest."""
     found = segments_of(two_strokes)

@@ -8,23 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.path import (
+    FrictionDraws,
     Material,
     PathMotion,
     material_of,
     torque_noise_of,
 )
+from scissorcal.calibration.friction.typical import friction_and_offset, typical_values
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.zeros import DriveZero
 from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.model import FrictionLaw, friction_torque
+from scissorcal.model import FrictionLaw
 from scissorcal.recipe.priors import CutPriors
 
 Array = NDArray[np.float64]
 
 USUAL_RATE = 0.3
-RATES = np.array([-1.0, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 1.0])
-"""Rates (rad/s) at which two laws of friction are compared."""
+SOME_DRAWS = 48
+"""Draws of friction that a cut looks at: they give a segment's sd to a tenth."""
 WITHIN_SD = (0.1587, 0.8413)
 """Quantiles one standard deviation from the middle of a normal distribution."""
 
@@ -33,13 +35,13 @@ WITHIN_SD = (0.1587, 0.8413)
 class KnownFriction:
     """Friction as fitted to the empty sweeps.
 
-    ``law`` and ``offset`` (N m) are the posterior's mean or its mode, whichever has torques closer
-    to the posterior median: along a curved ridge the mean lies beside it. ``closing_sd`` and
+    ``law`` and ``offset`` (N m) are typical of the posterior (`typical_values`). ``closing_sd`` and
     ``opening_sd`` (N m) are how well friction is known in either direction over all strokes,
     ``stroke_sd`` what single strokes differ by. ``cogging`` is (cosine, sine, periods per turn) of
     what the motor adds to the measured drive. ``fine_rad`` is the length over which the part of dry
     friction builds up that the law lets jump, 0 where no probe found it. ``prior`` takes the
-    recipe's place where a study of simulated data states one.
+    recipe's place where a study of simulated data states one; ``draws`` is what friction may be
+    instead, None where it is known but for those sds.
     """
 
     law: FrictionLaw
@@ -52,22 +54,24 @@ class KnownFriction:
     stroke_sd: float
     fine_rad: float = 0.0
     prior: StatedPrior | None = None
+    draws: FrictionDraws | None = None
 
     @classmethod
     def of(cls, friction: FitResult, priors: CutPriors | None = None) -> "KnownFriction":
         """Take a finished fit of friction, with the recipe's priors of a cut or their defaults."""
         floor = (priors or CutPriors()).friction_sd_floor_Nm
         centre = float(friction.structure["angle_center"])
-        means = _middle(friction, centre)
+        means = typical_values(friction)
         per_turn = float(friction.structure.get("cogging_periods_per_turn", 0.0))
         # The fit gives what the drive has to give beside friction: the motor's own torque, negated.
+        law = FrictionLaw.of_fit(_with_presliding(means, friction.diagnostics), centre)
         cogging = [-float(means.get(f"cogging_{part}", 0.0)) for part in ("cos", "sin")]
         closing, opening = (
             max(floor, _spread(friction, centre, sign * USUAL_RATE)) for sign in (-1, 1)
         )
         stroke = float(friction.diagnostics.get("stroke_offset_sd_Nm", floor))
         return cls(
-            law=FrictionLaw.of_fit(_with_presliding(means, friction.diagnostics), centre),
+            law=law,
             offset=float(means.get("offset", 0.0)),
             inertia=float(means["inertia"]),
             cogging=(cogging[0], cogging[1], per_turn if any(cogging) else 0.0),
@@ -76,6 +80,7 @@ class KnownFriction:
             opening_sd=opening,
             stroke_sd=max(floor, stroke),
             fine_rad=float(friction.diagnostics.get("presliding_fine_rad", 0.0)),
+            draws=_draws(friction, means, law),
         )
 
     def with_zero(self, own: DriveZero | None, before: DriveZero | None) -> "KnownFriction":
@@ -95,7 +100,22 @@ class KnownFriction:
 
     def material(self, motion: PathMotion) -> Material:
         """Work and torque of the material along a motion, friction and cogging taken off."""
-        return material_of(motion, self.law, self.offset, self.cogging, self.fine_rad)
+        return material_of(motion, self.law, self.offset, self.cogging, self.fine_rad, self.draws)
+
+
+def _draws(friction: FitResult, taken: dict[str, Array], law: FrictionLaw) -> FrictionDraws:
+    """Some draws of a posterior beside the values that were taken, evenly out of all."""
+    every = np.unique(np.linspace(0, len(friction.draws) - 1, SOME_DRAWS).astype(int))
+    values = {p.name: friction.column(p.name)[every, None] for p in friction.parameters}
+    known = {name: law.values[name] for name in law.values if name not in values}
+    centre = law.angle_center
+    closing, opening = (
+        friction_and_offset(values, centre, sign * USUAL_RATE)
+        - friction_and_offset(taken, centre, sign * USUAL_RATE)
+        for sign in (-1, 1)
+    )
+    offset = values.get("offset", np.zeros((len(every), 1)))
+    return FrictionDraws(FrictionLaw.of_fit(known | values, centre), offset, closing, opening)
 
 
 def _with_presliding(values: dict[str, Array], seen: Mapping[str, Any]) -> dict[str, Array]:
@@ -107,29 +127,8 @@ def _with_presliding(values: dict[str, Array], seen: Mapping[str, Any]) -> dict[
     return {**values, **{name: np.asarray(value) for name, value in found.items()}}
 
 
-def _middle(friction: FitResult, centre: float) -> dict[str, Array]:
-    """Values by name: means, or the mode where its torques are closer to the median."""
-    means = {p.name: np.asarray(p.mean) for p in (*friction.parameters, *friction.nuisance)}
-    names = [p.name for p in friction.parameters]
-    highest = {**means, **dict(zip(names, np.asarray(friction.map_point), strict=True))}
-    draws = {name: friction.column(name) for name in names}
-    middle = np.median([_level(draws, centre, rate) for rate in RATES], axis=1)
-
-    def away(values: dict[str, Array]) -> float:
-        levels = np.array([float(_level(values, centre, rate)) for rate in RATES])
-        return float(np.abs(levels - middle).max())
-
-    return min((means, highest), key=away)
-
-
 def _spread(friction: FitResult, centre: float, rate: float) -> float:
     """Standard deviation of friction and offset together at one rate, over the posterior's core."""
     draws = {p.name: friction.column(p.name) for p in friction.parameters}
-    low, high = np.quantile(_level(draws, centre, rate), WITHIN_SD)
+    low, high = np.quantile(friction_and_offset(draws, centre, rate), WITHIN_SD)
     return float(0.5 * (high - low))
-
-
-def _level(values: dict[str, Array], centre: float, rate: float) -> Array:
-    """Friction and offset together at one rate, of one set of values or of many draws."""
-    torque = friction_torque(FrictionLaw.of_fit(values, centre), centre, rate)
-    return np.asarray(torque + values.get("offset", np.asarray(0.0)))

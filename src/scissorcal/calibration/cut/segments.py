@@ -5,7 +5,8 @@ enough again, the crack rests: the torque is elastic, and one place of the crack
 unloading and loading. Beyond, the crack runs.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,8 @@ TURN_SHARE, STANDING_SHARE = 0.03, 0.25
 rest, since friction may have either sign there."""
 LEAST_TORQUE_SDS = 5.0
 LEAST_RANGE_RAD = 1e-3
+HALF_WAY = 0.5
+"""Share of the critical indentation at which a loading shows where its crack rests."""
 COUNTS_A_TOOTH = 10.0
 """Encoder steps per tooth from which the motion within a tooth is resolved."""
 SWINGING = 0.5
@@ -57,7 +60,8 @@ class Rest:
     """A crack at rest: ``place`` (m, sheet's frame) is a first estimate.
 
     ``opening`` and ``advance`` are where the blades turned; ``fresh`` marks a sheet that is not
-    cut yet, whose crack is at 0.
+    cut yet, whose crack is at 0. ``seen`` is false where the encoder's steps hid the unloading, so
+    that the next loading has to show the place.
     """
 
     sheet: int
@@ -65,6 +69,7 @@ class Rest:
     place: float
     opening: float = float("nan")
     advance: float = float("nan")
+    seen: bool = True
 
 
 @dataclass(frozen=True)
@@ -187,6 +192,8 @@ class _Builder:
         """Loading of the crack that waits, then what is cut further."""
         motion = self.motions[run.motion]
         span = slice(run.low, run.high + 1)
+        if not self.rests[-1].seen:
+            self.rests[-1] = self._placed_by_loading(run, self.rests[-1])
         opening, contact = motion.opening[span], self.rests[-1].place - motion.advance[span]
         depth, _ = self.geometry.depth_and_lever(self.geometry.edge, opening, contact)
         critical = np.full(len(depth), np.inf)
@@ -219,7 +226,8 @@ class _Builder:
             if found is None:
                 return
             turn = float(motion.opening[run.low]), float(motion.advance[run.low])
-            self.rests.append(Rest(self.sheet, False, found, *turn))
+            place, seen = found
+            self.rests.append(Rest(self.sheet, False, place, *turn, seen))
         span = slice(run.low, run.high + 1)
         opening, contact = motion.opening[span], self.rests[-1].place - motion.advance[span]
         depth, _ = self.geometry.depth_and_lever(self.geometry.edge, opening, contact)
@@ -235,8 +243,35 @@ class _Builder:
             end += 1
         self._piece("unloading", run.motion, run.low + begin, run.low + end, length)
 
-    def _place_at_turn(self, run: Run) -> float | None:
-        """The crack's place by the unloading alone, at the guessed response."""
+    def _placed_by_loading(self, run: Run, rest: Rest) -> Rest:
+        """A rest whose place is that at which the torque passes the one at HALF_WAY to cracking."""
+        motion, geometry = self.motions[run.motion], self.geometry
+        ends = split(motion.opening, run.low, run.high, SHORT_SEGMENT_COUNTS * motion.resolution)
+        if len(ends) < 3:
+            return rest
+        torque, _ = mean_torque(motion, self.materials[run.motion].work, ends)
+        opening = 0.5 * (motion.opening[ends[1:]] + motion.opening[ends[:-1]])
+        advance = 0.5 * (motion.advance[ends[1:]] + motion.advance[ends[:-1]])
+        slope = geometry.slope(opening, rest.place - advance)
+        depth = HALF_WAY * self.guess.critical_depth(slope, geometry.moving_blades)
+        reached = (1.0 + self.guess.load) * self.guess.response.force_at(depth)
+        reached = (
+            reached * geometry.depth_and_lever(geometry.edge, opening, rest.place - advance)[1]
+        )
+        above = np.flatnonzero((torque[1:] >= reached[1:]) & (torque[:-1] < reached[:-1]))
+        if not len(above):
+            return rest
+        at = int(above[0])
+        short = reached[at : at + 2] - torque[at : at + 2]
+        share = float(short[0] / (short[0] - short[1]))
+        place = [
+            float(geometry.place(np.asarray(opening[k]), float(depth[k]))) + float(advance[k])
+            for k in (at, at + 1)
+        ]
+        return replace(rest, place=place[0] + share * (place[1] - place[0]))
+
+    def _place_at_turn(self, run: Run) -> tuple[float, bool] | None:
+        """The crack's place by the unloading alone, at the guessed response; whether it is seen."""
         motion, geometry = self.motions[run.motion], self.geometry
         work = self.materials[run.motion].work
         opening, low = motion.opening, run.low
@@ -255,10 +290,11 @@ class _Builder:
             length = geometry.moving_blades * max(float(depth), 1e-6) / float(lever)
             span = slice(low, run.high + 1)
             begin = low + _left_for_good(opening[span], motion.standing[span], length)
-            ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, 3e-4))
+            least = max(3e-4, SHORT_SEGMENT_COUNTS * motion.resolution)
+            ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, least))
             ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
             if len(ends) < 4:
-                return place
+                return place, False
             seen, _ = mean_torque(motion, work, ends)
             middle = 0.5 * (opening[ends[1:]] + opening[ends[:-1]])
             at = place - 0.5 * (motion.advance[ends[1:]] + motion.advance[ends[:-1]])
@@ -267,7 +303,7 @@ class _Builder:
             place += float(np.clip(step, -2e-4, 2e-4))
             if abs(step) < 1e-7:
                 break
-        return place
+        return place, True
 
     def _piece(self, kind: str, index: int, low: int, high: int, length: float) -> None:
         motion = self.motions[index]
@@ -284,8 +320,20 @@ class _Builder:
         torque, late = mean_torque(motion, material.work, ends)
         covariance = torque_covariance(motion, ends, self.noise, self.offset_sd)
         rest = len(self.rests) - 1
+        covariance += material.torque_doubt(motion, ends)
+        covariance += np.diag(self._by_opening(motion, ends, self.rests[rest].place) ** 2)
         direction = mean_direction(motion, material, ends)
         self.pieces.append(Piece(kind, rest, index, ends, torque, late, direction, covariance))
+
+    def _by_opening(self, motion: PathMotion, ends: Integers, place: float) -> Array:
+        """Error (k,) in N m of the mean torques by that of the opening, one within a segment."""
+        error = np.array([motion.opening_sd[a:b].mean() for a, b in pairwise(ends)])
+        middle = 0.5 * (motion.opening[ends[1:]] + motion.opening[ends[:-1]])
+        contact = place - 0.5 * (motion.advance[ends[1:]] + motion.advance[ends[:-1]])
+        there, back = (
+            self.guess.torque(self.geometry, middle + sign * error, contact)[0] for sign in (1, -1)
+        )
+        return np.asarray(0.5 * (there - back))
 
     def _stretch(self, run: Run, low: int) -> None:
         """Running segments; one with an invalid sample splits a stretch in two."""
@@ -301,6 +349,7 @@ class _Builder:
             _, late = mean_torque(motion, material.work, ends)
             ticks = np.diff(ends).astype(np.float64)
             noise = np.array([self.noise.variance_of_mean(int(n), motion.tick_s) for n in ticks])
+            noise += np.diag(material.torque_doubt(motion, ends)) * (turned / path) ** 2
             unseen = swings_unseen(motion, ends, period)
             self.stretches.append(
                 Stretch(

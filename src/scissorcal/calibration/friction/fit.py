@@ -36,6 +36,7 @@ from scissorcal.calibration.friction.noise import (
     stroke_offsets,
 )
 from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
+from scissorcal.calibration.friction.slow_friction import with_probed
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.idle import idle_noise
@@ -98,6 +99,7 @@ def fit_friction(
     tell = progress or (lambda done, sentence: None)
     refuse_unsound(recordings)
     joint = recordings[0].joint if recordings else Joint()
+    settings = with_probed(settings, recordings)
     sensors = inspect_sensors(recordings)
     cleaned, zero = _cleaned(recordings, settings, simulated=prior is not None)
     steady, broken = steadiness(recordings), interruptions(recordings)
@@ -168,6 +170,7 @@ def friction_experiment(
     ``fit.structure``.
     """
     joint = recordings[0].joint
+    settings = with_probed(settings, recordings)
     cleaned, zero = _cleaned(recordings, settings, simulated=False)
     usable = inspect_sensors(recordings).usable
     every = _slid(steadiness(recordings), cleaned, settings.cutoff_Hz, usable)

@@ -2,6 +2,7 @@
 
 from scissorcal.calibration.cut.path.motion import PathMotion, path_motion, turning_points
 from scissorcal.calibration.cut.path.work import (
+    FrictionDraws,
     Material,
     advance_line,
     built_friction,
@@ -16,6 +17,7 @@ from scissorcal.calibration.cut.path.work import (
 )
 
 __all__ = [
+    "FrictionDraws",
     "Material",
     "PathMotion",
     "advance_line",

@@ -52,8 +52,8 @@ class PathMotion:
     ``torque`` (N m) is what the drive and the acceleration leave unexplained at each sample, from
     unsmoothed positions: rough, but with nothing filtered out. ``usable`` is false where a sensor's
     sample is invalid for longer than BRIDGED_S, ``standing`` true where the blades do not turn.
-    ``rate_sd`` is the error of the rate, ``resolution`` the encoder's step, ``advance_sd`` (m) the
-    error of a place along the cut.
+    ``opening_sd`` and ``rate_sd`` (n,) are the errors of opening and rate, ``resolution`` the
+    encoder's step, ``advance_sd`` (m) the error of a place along the cut.
     """
 
     recording: int
@@ -71,6 +71,7 @@ class PathMotion:
     standing: Mask
     tick_s: float
     inertia: float
+    opening_sd: Array
     rate_sd: Array
     resolution: float
     advance_sd: float
@@ -140,7 +141,8 @@ def _piece(
         standing=_standing(smooth, tick_s, resolution),
         tick_s=tick_s,
         inertia=inertia,
-        rate_sd=_rate_sd(model, walk),
+        opening_sd=_error(model, walk, np.ones(1)),
+        rate_sd=_error(model, walk, RATE_WEIGHTS[::-1] / tick_s),
         resolution=resolution,
         advance_sd=_place_sd(np.asarray(samples["advance"], dtype=np.float64)),
     )
@@ -281,12 +283,13 @@ def _local_walk(model: _Dynamics, least: float) -> Array:
     return walk
 
 
-def _rate_sd(model: _Dynamics, walk: Array, count: int = 401) -> Array:
-    """Error (n,) of the smoothed rate, each as if its walk were that of all neighbours."""
+def _error(model: _Dynamics, walk: Array, of: Array, count: int = 401) -> Array:
+    """Error (n,) of a sum ``of`` smoothed neighbours, as if each had the walk of all of them."""
     from scipy.linalg import solveh_banded
 
     weights = np.zeros(count)
-    weights[count // 2 - 2 : count // 2 + 3] = RATE_WEIGHTS[::-1] / model.tick_s
+    half = len(of) // 2
+    weights[count // 2 - half : count // 2 + half + 1] = of
     low, high = np.log(walk.min()), np.log(walk.max())
     sizes = np.linspace(low, high, WALKS if high > low else 1)
     found = []

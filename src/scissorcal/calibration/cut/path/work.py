@@ -1,7 +1,7 @@
 """Work of the material between openings, and its covariance."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -37,12 +37,35 @@ class Material:
     exact, the latter carries the noise of an acceleration. Where blades rest, friction acts
     along their mean creep: tremor of the smoothed position is noise, whose friction would add up.
     ``direction`` (n - 1,) is how dry friction acts between samples, from -1 (closing) to 1, less
-    where it has not built up.
+    where it has not built up. ``doubt`` (k, n) in J is by how much the work differs with friction
+    as each of k draws has it, beside what it differs by at one rate in either direction.
     """
 
     work: Array
     torque: Array
     direction: Array
+    doubt: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def torque_doubt(self, motion: PathMotion, ends: Integers) -> Array:
+        """Covariance (k, k) of mean torques between samples ``ends`` (k + 1,) by that doubt."""
+        if not len(self.doubt):
+            return np.zeros((len(ends) - 1, len(ends) - 1))
+        off = np.diff(self.doubt[:, ends], axis=1) / np.diff(motion.opening[ends])
+        return np.asarray(off.T @ off / len(off))
+
+
+@dataclass(frozen=True)
+class FrictionDraws:
+    """Friction by k posterior draws: a law with values (k, 1), and the offsets (k, 1).
+
+    ``closing`` and ``opening`` (k, 1) in N m are how far each draw is, at one rate, from the law
+    that is taken off; a fit of a cut has offsets for these.
+    """
+
+    law: FrictionLaw
+    offset: Array
+    closing: Array
+    opening: Array
 
 
 def material_of(
@@ -51,6 +74,7 @@ def material_of(
     offset: float,
     cogging: tuple[float, float, float] = (0.0, 0.0, 0.0),
     fine_rad: float = 0.0,
+    draws: FrictionDraws | None = None,
 ) -> Material:
     """Work and torque of the material along a motion.
 
@@ -59,6 +83,7 @@ def material_of(
     independent of acceleration and speed. ``cogging`` is
     (cosine, sine, periods per turn) of a motor torque that is not in the measured drive.
     ``fine_rad`` is the length over which dry friction builds up where the law lets it jump, if any.
+    ``draws`` are what friction may be instead, for the doubt.
     """
     path = motion.opening
     step = np.diff(path)
@@ -73,7 +98,12 @@ def material_of(
         work = work - (cosine * np.sin(number * path) - sine * np.cos(number * path)) / number
     torque = motion.inertia * np.gradient(motion.rate) / motion.tick_s - motion.drive
     torque[:-1] += law + offset
-    return Material(np.asarray(work), np.asarray(torque), np.asarray(direction))
+    found = Material(np.asarray(work), np.asarray(torque), np.asarray(direction))
+    if draws is None:
+        return found
+    off = built_friction(draws.law, middle, rate, 0.0, direction) + draws.offset - (law + offset)
+    off -= np.where(rate < 0.0, draws.closing, draws.opening)
+    return replace(found, doubt=np.pad(np.cumsum(off * step, axis=1), ((0, 0), (1, 0))))
 
 
 def built_up(path: Array, sense: Array, friction: FrictionLaw, fine_rad: float) -> Array:
