@@ -106,6 +106,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         TORQUE + "two sds of what is left of the zeros, share of the drive (rms)",
     ),
     "fit foundations": ("at most", "what the fit builds on: failed verdicts there"),
+    "fit scatter at rest": (
+        "at most",
+        "response: scatter of cracks at rest over what noise, encoder and friction explain",
+    ),
     "fit teeth": (
         "at most",
         "kappa, which a harmonic puts off by tens of percent: power at a half or a third of the "

@@ -1,5 +1,6 @@
 """Verdicts and notes that only a cut's fit has."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -13,11 +14,14 @@ from scissorcal.calibration.cut.stale import count_empty, stale_verdict
 from scissorcal.calibration.cut.teeth import COHERENT
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.sensors import Sensors
+from scissorcal.recipe.priors import LogNormalPrior
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, failed, judge
 
 Array = NDArray[np.float64]
 
+SCATTER_SDS = 3.0
+"""Prior standard deviations of the noise's scale beyond which it is no noise that grew."""
 SUBHARMONIC = 0.3
 """Limit of the power at a half or a third of the line's frequency, relative to the line's."""
 
@@ -36,6 +40,24 @@ def cut_verdicts(
         stale_verdict(count_empty(scouted.segments.motions, scouted.materials, recordings)),
         *_line(scouted),
     )
+
+
+def scatter_verdict(design: CutExperiment, point: Array, prior: LogNormalPrior) -> Verdict:
+    """Judge the scatter of cracks at rest against all that is known to make it."""
+    scale = float(design.layout.natural(point)["noise_scale"])
+    mean, sd = prior.normal()
+    limit = math.exp(mean + SCATTER_SDS * sd)
+    segments = design.likelihood.segments
+    said = (
+        f"Mean torques of cracks at rest scatter {scale:.2g} times as much as the torque's noise, "
+        "the encoder's steps and the doubt in friction explain"
+    )
+    bad = (
+        f"{said}: another cause is at work, and what is fitted follows it. The encoder shows "
+        f"{segments.steps:.3g} steps of a loading. Check rig.edge and the sheet's place, look at "
+        "'near rest' of the friction fit, and use a finer encoder or faster strokes."
+    )
+    return judge("fit.cut", "scatter at rest", scale, limit, f"{said}.", bad)
 
 
 def cut_diagnostics(scouted: Scouted, design: CutExperiment) -> dict[str, Any]:

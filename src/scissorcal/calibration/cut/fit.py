@@ -18,7 +18,12 @@ from scissorcal.calibration.cut.averaging import (
     load_note,
 )
 from scissorcal.calibration.cut.between import between_notes, compare_cuts
-from scissorcal.calibration.cut.checks import cut_diagnostics, cut_verdicts, line_notes
+from scissorcal.calibration.cut.checks import (
+    cut_diagnostics,
+    cut_verdicts,
+    line_notes,
+    scatter_verdict,
+)
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import CoarseEncoderError, NoUnloadingError
 from scissorcal.calibration.cut.known import KnownFriction
@@ -333,6 +338,7 @@ def _assembled(
         usage=usage,
         extra_verdicts=(
             *cut_verdicts(data.friction, edge_verdicts, scouted, data.sensors, recordings),
+            scatter_verdict(design, point, data.recipe.fit.cut.priors.noise_scale),
             *((data.broken.verdict("fit.cut"),) if data.broken.interrupted else ()),
             *((between.verdict(),) if between else ()),
         ),

@@ -98,15 +98,10 @@ def scout(
     for loaded in (False, recipe.fit.cut.load_share != "none"):
         law = CutLaw("power", fracture, loaded=loaded)
         for _ in range(ROUNDS if loaded else 1):
-            segments = cut_into_segments(
-                motions,
-                materials,
-                geometry.at(values),
-                guess,
-                known.noise,
-                known.stroke_sd,
-                recipe.scene.cut,
-            )
+            at = (motions, materials, geometry.at(values), guess, known.noise, known.stroke_sd)
+            segments = cut_into_segments(*at, recipe.scene.cut, unseen=loaded)
+            if not segments.pieces:
+                segments = cut_into_segments(*at, recipe.scene.cut)
             if not segments.pieces:
                 refuse_coarse(segments)
                 raise NoUnloadingError("no stroke shows unloading")

@@ -5,7 +5,7 @@ enough again, the crack rests: the torque is elastic, and one place of the crack
 unloading and loading. Beyond, the crack runs.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -21,16 +21,23 @@ from scissorcal.calibration.cut.path import (
     torque_covariance,
 )
 from scissorcal.calibration.cut.path.runs import FEWEST_SEGMENTS, Run, find_runs, split
+from scissorcal.calibration.cut.rests import (
+    ELASTIC_SEGMENTS,
+    LEAST_RANGE_RAD,
+    SHORT_SEGMENT_COUNTS,
+    Rest,
+    left_for_good,
+    place_at_turn,
+    placed_by_loading,
+)
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-ELASTIC_SEGMENTS = 8
-"""Segments between touching and the deepest point of an elastic piece."""
-LEAST_SEGMENT_COUNTS, SHORT_SEGMENT_COUNTS = 6.0, 4.0
-"""Least encoder steps of an elastic segment; the second in a piece with too few segments."""
+LEAST_SEGMENT_COUNTS = 6.0
+"""Least encoder steps of an elastic segment."""
 LEAST_PIECE_COUNTS = (FEWEST_SEGMENTS + 0.5) * SHORT_SEGMENT_COUNTS  # encoder steps of a piece
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
 """Least length and least teeth of running segments: in shorter ones the teeth are
@@ -41,35 +48,11 @@ RUNNING_FROM = 1.6
 """Indentation over the critical one, for a crack at rest, from which running segments count."""
 FREE_SHARE = 0.4
 """Path without contact in a piece over its contact's length: it identifies the offset."""
-TURN_SHARE, STANDING_SHARE = 0.03, 0.25
-"""Shares of the contact's length that are left out after a turn: always, and where the blades
-rest, since friction may have either sign there."""
-LEAST_TORQUE_SDS = 5.0
-LEAST_RANGE_RAD = 1e-3
-HALF_WAY = 0.5
-"""Share of the critical indentation at which a loading shows where its crack rests."""
 COUNTS_A_TOOTH = 10.0
 """Encoder steps per tooth from which the motion within a tooth is resolved."""
 SWINGING = 0.5
 """Standard deviation of the rate over its mean from which blades may turn back: 0.8 to 1 where they
 did, 0.2 at most where they did not."""
-
-
-@dataclass(frozen=True)
-class Rest:
-    """A crack at rest: ``place`` (m, sheet's frame) is a first estimate.
-
-    ``opening`` and ``advance`` are where the blades turned; ``fresh`` marks a sheet that is not
-    cut yet, whose crack is at 0. ``seen`` is false where the encoder's steps hid the unloading, so
-    that the next loading has to show the place.
-    """
-
-    sheet: int
-    fresh: bool
-    place: float
-    opening: float = float("nan")
-    advance: float = float("nan")
-    seen: bool = True
 
 
 @dataclass(frozen=True)
@@ -137,13 +120,15 @@ def cut_into_segments(
     noise: TorqueNoise,
     offset_sd: float,
     cuts: bool,
+    unseen: bool = True,
 ) -> Segments:
     """Cut motions with what the material did (see :func:`material_of`) into segments.
 
     ``guess`` says where cracks wait and how deep the edge may sink before they run; ``cuts`` is
-    false where nothing is cut. A segment with an invalid sample is left out.
+    false where nothing is cut. A segment with an invalid sample is left out, and without ``unseen``
+    so are loadings of cracks that no unloading placed.
     """
-    builder = _Builder(motions, materials, geometry, guess, noise, offset_sd, cuts)
+    builder = _Builder(motions, materials, geometry, guess, noise, offset_sd, cuts, unseen)
     sheet: tuple[int, int] | None = None
     for run in find_runs(motions):
         here = (motions[run.motion].recording, run.sheet)
@@ -175,6 +160,7 @@ class _Builder:
     noise: TorqueNoise
     offset_sd: float
     cuts: bool
+    unseen: bool
     rests: list[Rest] = field(default_factory=list)
     pieces: list[Piece] = field(default_factory=list)
     stretches: list[Stretch] = field(default_factory=list)
@@ -193,7 +179,10 @@ class _Builder:
         motion = self.motions[run.motion]
         span = slice(run.low, run.high + 1)
         if not self.rests[-1].seen:
-            self.rests[-1] = self._placed_by_loading(run, self.rests[-1])
+            work = self.materials[run.motion].work
+            self.rests[-1] = placed_by_loading(
+                motion, work, run, self.rests[-1], self.geometry, self.guess
+            )
         opening, contact = motion.opening[span], self.rests[-1].place - motion.advance[span]
         depth, _ = self.geometry.depth_and_lever(self.geometry.edge, opening, contact)
         critical = np.full(len(depth), np.inf)
@@ -208,7 +197,7 @@ class _Builder:
         beyond = np.flatnonzero(depth > LOADING_END * critical)
         last = int(beyond[0]) if len(beyond) else len(depth) - 1
         length = abs(float(opening[last] - opening[first]))
-        if length > LEAST_RANGE_RAD:
+        if length > LEAST_RANGE_RAD and (self.unseen or self.rests[-1].seen):
             begin = first
             while begin > 0 and abs(opening[begin] - opening[first]) < FREE_SHARE * length:
                 begin -= 1
@@ -222,7 +211,14 @@ class _Builder:
         """Unloading from where the blades turned; a crack may have come to rest there."""
         motion = self.motions[run.motion]
         if self.cuts:
-            found = self._place_at_turn(run)
+            found = place_at_turn(
+                motion,
+                self.materials[run.motion].work,
+                run,
+                self.geometry,
+                self.guess,
+                self.noise,
+            )
             if found is None:
                 return
             turn = float(motion.opening[run.low]), float(motion.advance[run.low])
@@ -237,73 +233,11 @@ class _Builder:
         length = float(opening[free[0]] - opening[0])
         if length < LEAST_RANGE_RAD:
             return
-        begin = _left_for_good(opening, motion.standing[span], length)
+        begin = left_for_good(opening, motion.standing[span], length)
         end = int(free[0])
         while end < len(opening) - 1 and opening[end] < opening[free[0]] + FREE_SHARE * length:
             end += 1
         self._piece("unloading", run.motion, run.low + begin, run.low + end, length)
-
-    def _placed_by_loading(self, run: Run, rest: Rest) -> Rest:
-        """A rest whose place is that at which the torque passes the one at HALF_WAY to cracking."""
-        motion, geometry = self.motions[run.motion], self.geometry
-        ends = split(motion.opening, run.low, run.high, SHORT_SEGMENT_COUNTS * motion.resolution)
-        if len(ends) < 3:
-            return rest
-        torque, _ = mean_torque(motion, self.materials[run.motion].work, ends)
-        opening = 0.5 * (motion.opening[ends[1:]] + motion.opening[ends[:-1]])
-        advance = 0.5 * (motion.advance[ends[1:]] + motion.advance[ends[:-1]])
-        slope = geometry.slope(opening, rest.place - advance)
-        depth = HALF_WAY * self.guess.critical_depth(slope, geometry.moving_blades)
-        reached = (1.0 + self.guess.load) * self.guess.response.force_at(depth)
-        reached = (
-            reached * geometry.depth_and_lever(geometry.edge, opening, rest.place - advance)[1]
-        )
-        above = np.flatnonzero((torque[1:] >= reached[1:]) & (torque[:-1] < reached[:-1]))
-        if not len(above):
-            return rest
-        at = int(above[0])
-        short = reached[at : at + 2] - torque[at : at + 2]
-        share = float(short[0] / (short[0] - short[1]))
-        place = [
-            float(geometry.place(np.asarray(opening[k]), float(depth[k]))) + float(advance[k])
-            for k in (at, at + 1)
-        ]
-        return replace(rest, place=place[0] + share * (place[1] - place[0]))
-
-    def _place_at_turn(self, run: Run) -> tuple[float, bool] | None:
-        """The crack's place by the unloading alone, at the guessed response; whether it is seen."""
-        motion, geometry = self.motions[run.motion], self.geometry
-        work = self.materials[run.motion].work
-        opening, low = motion.opening, run.low
-        turn, advance = float(opening[low]), float(motion.advance[low])
-        least = LEAST_TORQUE_SDS * float(np.hypot(self.noise.white_Nm, self.noise.slow_Nm))
-        probe = split(opening, low, run.high, LEAST_RANGE_RAD)[:3]
-        if len(probe) < 2:
-            return None
-        torque, _ = mean_torque(motion, work, probe)
-        if torque[0] < least:
-            return None
-        place = self.guess.place_at_torque(geometry, turn, advance, float(torque[0]))
-        for _ in range(10):
-            contact = np.asarray(place - advance)
-            depth, lever = geometry.depth_and_lever(geometry.edge, np.asarray(turn), contact)
-            length = geometry.moving_blades * max(float(depth), 1e-6) / float(lever)
-            span = slice(low, run.high + 1)
-            begin = low + _left_for_good(opening[span], motion.standing[span], length)
-            least = max(3e-4, SHORT_SEGMENT_COUNTS * motion.resolution)
-            ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, least))
-            ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
-            if len(ends) < 4:
-                return place, False
-            seen, _ = mean_torque(motion, work, ends)
-            middle = 0.5 * (opening[ends[1:]] + opening[ends[:-1]])
-            at = place - 0.5 * (motion.advance[ends[1:]] + motion.advance[ends[:-1]])
-            expected, by_place = self.guess.torque(geometry, middle, at)
-            step = float(by_place @ (seen - expected)) / max(float(by_place @ by_place), 1e-12)
-            place += float(np.clip(step, -2e-4, 2e-4))
-            if abs(step) < 1e-7:
-                break
-        return place, True
 
     def _piece(self, kind: str, index: int, low: int, high: int, length: float) -> None:
         motion = self.motions[index]
@@ -366,19 +300,6 @@ class _Builder:
                     resolved=not unseen,
                 )
             )
-
-
-def _left_for_good(opening: Array, standing: Mask, length: float) -> int:
-    """First sample from which blades that turned at the first one stay away from it.
-
-    ``length`` (rad) is that of the contact; blades that rest within its first quarter are
-    still at the turn.
-    """
-    stop = int(np.argmax(opening > opening[0] + length)) or None
-    away = opening[:stop] - opening[0]
-    there = (away < TURN_SHARE * length) | (standing[:stop] & (away < STANDING_SHARE * length))
-    last = np.flatnonzero(there)
-    return int(last[-1]) + 1 if len(last) else 0
 
 
 def _parts(ends: Integers, invalid: Integers) -> list[Integers]:

@@ -15,9 +15,10 @@ from scissorcal.recording.recording import Recording
 
 FOUND = {"stribeck": "log_rise_share", "stribeck_rate": "log_rise_rate"}
 """Parameters of the law by the names of the probe's; the first is a share of Coulomb friction."""
-LEFT_OUT = 0.35
-"""Error of either logarithm by what the probe's law lacks: on the virtual rig, whose friction
-follows another law, it was 0.27, 0.36 and 0.17 of the level and 0.20, 0.35 and 0.38 of the rate."""
+LEFT_OUT = 0.5
+"""Error of either logarithm by what the probe's law lacks. With it, errors of level and rate are
+1.1 and 1.0 of their sd (rms) on the 14 of 24 random rigs (63000 to 63023) whose probe tells them.
+"""
 QUANTILE_90 = 1.645
 
 
