@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, expect
 
+from scissorcal.calibration.friction.typical import at_typical
 from scissorcal.kernel import Kernel
 from scissorcal.kernel.tables import Table
 from scissorcal.model.edge import Edge
@@ -181,7 +182,7 @@ def assert_torque(shown: Shown, edge: Edge, fit: Any) -> None:
     at = np.linspace(0.0, edge.length_m, DENSE)
     dense = Table(*np.float32([at, edge.offset_at(at), edge.slope_at(at)]))
     kernel = Kernel(replace(tables, edge=dense, tip_station=edge.length_m))
-    friction = FitDraws.centre(friction_fit())
+    friction = FitDraws.centre(at_typical(friction_fit()))
     model = central_model(FitDraws.centre(fit), friction)
     exact = replace(model, cutting=replace(model.cutting, edge=edge))
     low, high = shown.package.manifest.ranges.opening_rad

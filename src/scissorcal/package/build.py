@@ -86,7 +86,8 @@ def build_package(
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
-    The tables hold the law at the MAP point (docs/decisions/010-tables-hold-the-map-point.md).
+    The tables hold the cut at the MAP point and a typical law of friction (docs/decisions/010,
+    180).
     ``rng`` picks the posterior draws that the package keeps for the band, at most 200; the same
     fits, recipe and seed give the same bytes. Where ``scene.simplify`` is true the tables hold the
     simplest laws that are enough for the scene
