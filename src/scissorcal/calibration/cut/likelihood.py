@@ -264,8 +264,11 @@ def response_table(response: Response, reference_m: float) -> tuple[Array, Array
     rows = []
     for one_force, one_exponent, shape in zip(force, exponent, shapes, strict=True):
         one = replace(response, force=one_force, exponent=one_exponent, shape=shape)
-        held = one.force_at(depth)
-        rows.append((np.log(held), one.stiffness_at(depth) * depth / held, one.energy_at(depth)))
+        held, energy = (
+            np.maximum(some, np.finfo(np.float64).tiny)  # a trial exponent of 13 underflows
+            for some in (one.force_at(depth), one.energy_at(depth))
+        )
+        rows.append((np.log(held), one.stiffness_at(depth) * depth / held, energy))
     log_force, slope, energy = (np.stack(row) for row in zip(*rows, strict=True))
     return log_depth, log_force, slope, np.log(energy)
 
