@@ -32,7 +32,11 @@ Length_mm = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 Thickness_mm = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Speed_rad_per_s = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Speed_mm_per_s = Annotated[float, Field(gt=0, le=500, allow_inf_nan=False)]
-Speeds = Annotated[tuple[Speed_rad_per_s, ...], Strict(False), Field(min_length=1, max_length=100)]
+MOST_SPEEDS = 100
+"""Speeds that a list of a recipe holds."""
+Speeds = Annotated[
+    tuple[Speed_rad_per_s, ...], Strict(False), Field(min_length=1, max_length=MOST_SPEEDS)
+]
 SlidingSpeeds = Annotated[
-    tuple[Speed_mm_per_s, ...], Strict(False), Field(min_length=1, max_length=100)
+    tuple[Speed_mm_per_s, ...], Strict(False), Field(min_length=1, max_length=MOST_SPEEDS)
 ]

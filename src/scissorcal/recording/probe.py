@@ -107,11 +107,11 @@ class ProbeResult:
     ``torque_zero_Nm`` and ``force_zero_N`` are what the sensors show with motors off and nobody at
     the handles. ``delay_s``: from a measurement to the action of the torque that answers it,
     through line, host and motor, as far as `motor_torque` and the device's flags show it.
-    ``torque_gain``: measured over commanded torque. Friction is at rest's edge (``coulomb_Nm``,
-    the mean of both directions) and ``viscous_Nm_s_per_rad``, both with ``inertia_kg_m2`` from
-    small motions: rough, not what a friction fit gives. ``posterior`` is what the
-    pushes say of the joint (docs/files.md; estimates have besides what its law leaves out),
-    ``swings`` are the strongest pushes beside the model.
+    ``torque_gain``: measured over commanded torque. ``coulomb_Nm`` is the dry friction that the
+    longest push met, the mean of both directions; it, ``viscous_Nm_s_per_rad`` and
+    ``inertia_kg_m2`` are of small motions: rough, not what a friction fit gives. ``posterior`` is
+    what the pushes say of the joint (docs/files.md; estimates have besides what its law leaves
+    out), ``swings`` are the strongest pushes beside the model.
 
     ``facts`` are plain numbers by name, with their unit in it.
     """

@@ -21,6 +21,7 @@ from scissorcal.calibration.design import (
 from scissorcal.calibration.design.choice import SPARE, _shorter
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.model.transforms import IDENTITY
+from scissorcal.recipe.fields import MOST_SPEEDS
 
 TORQUE = np.array([0.1, 0.1, 0.1])
 
@@ -157,6 +158,17 @@ def test_a_tolerance_that_no_stroke_reaches_is_said_so() -> None:
     design = choose_captures(start, replace(offers, strokes=wrong))
     assert not design.expected.reached
     assert "the best found" in design.sentence
+
+
+def test_a_list_that_no_length_of_suffices_is_no_longer_than_a_recipe_holds() -> None:
+    """Long pieces, each of which would take 40 strokes, towards a tolerance of 1e-4 %."""
+    strokes = {
+        (speed, place): Offer(tells(50.0, 3), 4.0) for speed in (0.1, 0.6) for place in range(40)
+    }
+    found = choose_captures(known(1e-6), replace(stock(), strokes=strokes))
+    count = sum(len(piece) for piece in found.captures.pieces)
+    assert 60 < count <= MOST_SPEEDS
+    assert found.captures.fits_a_recipe
 
 
 def test_presses_take_speeds_in_turn() -> None:

@@ -6,6 +6,7 @@ from typing import Literal
 
 from scissorcal.calibration.design.band import Band, TorqueKnowledge, expected_band
 from scissorcal.calibration.design.information import Information
+from scissorcal.recipe.fields import MOST_SPEEDS
 
 WORTH = 1e-9
 """Least gain, in e-folds of the excess per minute, that counts as one."""
@@ -71,6 +72,12 @@ class CaptureList:
 
     speeds: tuple[float, ...] = ()
     pieces: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def fits_a_recipe(self) -> bool:
+        """Whether a recipe's lists of speeds hold it: a band that no data narrow asks for more."""
+        strokes = sum(len(piece) for piece in self.pieces)
+        return len(self.speeds) <= MOST_SPEEDS and strokes <= MOST_SPEEDS
 
     def told(self, stock: Stock, parameters: tuple[int, int]) -> tuple[Information, Information]:
         """What friction's and the cut's strokes of the list tell together."""
@@ -167,7 +174,7 @@ def choose_captures(known: TorqueKnowledge, stock: Stock) -> Design:
         complete = _begun(known, captures)
         if complete and _enough(band, captures):
             break
-        options = list(_options(known, stock, captures))
+        options = [one for one in _options(known, stock, captures) if one[2].fits_a_recipe]
         judged = [(_judged(known, stock, captures, band, option), option) for option in options]
         if complete:
             judged = [one for one in judged if one[0].gain > WORTH]

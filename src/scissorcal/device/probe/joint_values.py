@@ -75,7 +75,7 @@ as long as the pushes takes their motion in place of the inertia."""
 LATE_S = 6e-3
 """What motor and driver may add to the delay that flags show: 3 ms of lag, and 3 of filters."""
 LOW = np.array(
-    [math.log(1e-6), math.log(1e-5), -0.8, math.log(1e-6), -7.0, math.log(5e-3), math.log(2e-5),
+    [math.log(1e-6), math.log(1e-5), -0.8, math.log(1e-6), -7.0, math.log(5e-3), math.log(2e-6),
      math.log(2e-5), -6.0, math.log(1e-7), -0.5, -3.0, -0.01, math.log(1e-5), math.log(1e-1)]
 )  # fmt: skip
 HIGH = np.array(
