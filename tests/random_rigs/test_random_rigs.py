@@ -105,6 +105,15 @@ def test_inertia_far_off_has_no_narrow_interval(seed: int) -> None:
     assert trial.outcome == "not determined" or abs(trial.z) < 3.0
 
 
+SWINGING = 70_092
+"""Blades that gravity still moves to and fro after five seconds, by 3 mrad (sd)."""
+
+
+def test_blades_that_swing_are_no_encoder_that_jitters() -> None:
+    trial = trial_of(healthy(SWINGING))
+    assert "Not determined: the blades moved by" in trial.said
+
+
 def test_a_hand_that_holds_the_blades_at_a_stop_feels_no_swing() -> None:
     """It presses with 0.12 N m: no push takes the blades off the stop, and nothing is claimed."""
     trial = trial_of(healthy(STILL), clings=True)

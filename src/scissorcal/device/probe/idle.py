@@ -24,6 +24,9 @@ CLEARINGS = 100
 CHUNKS = 16
 WINDOW = 10.0
 LAGS = 50
+JITTER_RAD = 2e-3
+"""A rate over 10 ms then has a noise of 0.3 rad/s, a fifth of what a probe may reach: beyond it no
+push within rig.probe is told from noise."""
 WHITE_STEPS = 1.0
 """Readings that go to and fro between two steps, as those of an encoder without noise may where it
 rests between them, are off by half a step at most."""
@@ -63,6 +66,11 @@ class Idle:
     lost_share: float
     garbled_share: float
     duplicate_share: float
+
+    @property
+    def swings(self) -> bool:
+        """Whether the opening goes to and fro as blades do, not as an encoder that jitters."""
+        return self.jitter_rad > JITTER_RAD and self.jitter_correlation >= WHITE_CORRELATION
 
 
 def idle(talk: Talk) -> Idle:

@@ -7,7 +7,7 @@ interval refuses nothing. Every limit has its reason beside it.
 import math
 
 from scissorcal.device.motion import STOP_MARGIN_RAD
-from scissorcal.device.probe.idle import Idle
+from scissorcal.device.probe.idle import JITTER_RAD, REST_RAD, Idle
 from scissorcal.device.probe.lag import Lag
 from scissorcal.device.probe.measured_torque import Follow
 from scissorcal.device.probe.watchdog import Watchdog
@@ -31,9 +31,6 @@ FORCE_NOISE_N = 0.5
 TORQUE_ZERO_SHARE = 0.01
 """Of the motor's limit: what current sensors are specified for."""
 TORQUE_NOISE_SHARE = 0.05
-JITTER_RAD = 2e-3
-"""A rate over 10 ms then has a noise of 0.3 rad/s, a fifth of what a probe may reach: beyond it no
-push within rig.probe is told from noise."""
 JITTER_STEPS = 1.0
 """An encoder without noise stays within a step."""
 STEP_RATIO = 1.5
@@ -208,6 +205,9 @@ def _jitter(found: Idle, identity: Identity) -> Verdict:
         "with the motors off"
     )
     remedy = "shield the encoder's cable, check its supply, or average its readings in the firmware"
+    if found.moved_rad > REST_RAD or found.swings:
+        why = f"{said}, and the blades did not rest: whether the encoder does is not told."
+        return not_evaluated(SENSORS, "encoder jitter", why, JITTER_RAD, found.jitter_rad)
     if found.jitter_rad > JITTER_RAD:
         why = f"{said}: {remedy}, and check that nobody moves the handles."
         return Verdict(SENSORS, "encoder jitter", "fail", found.jitter_rad, JITTER_RAD, why)

@@ -69,7 +69,7 @@ class Outcome:
 
 def judge_rest(found: Idle) -> Outcome:
     """Whether the blades rest with the motors off."""
-    moved = found.moved_rad
+    moved = max(found.moved_rad, 2.0 * found.jitter_rad if found.swings else 0.0)
     if moved <= REST_RAD:
         good = "The blades are at rest."
         return Outcome((Verdict(SENSORS, "rest", "pass", moved, REST_RAD, good),))
