@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.model import FrictionExperiment
+from scissorcal.calibration.friction.slow_friction import slowest_rate
 from scissorcal.calibration.parameters import Layout
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, side_of
@@ -23,8 +24,6 @@ MOVED_LIMIT = 4.0
 UNMOVED = 1e-9
 MOST_STEPS = 30
 LOGS = (-60.0, 60.0)
-PASSING = 0.01
-"""Share of the motion below whose rate a joint only passes through."""
 NEAR_REST = 0.05
 """Half width of an interval, share of friction: with as much from the rest, a recipe's tolerance of
 7 % of the torque is kept."""
@@ -85,8 +84,7 @@ def near_rest_verdict(experiment: FrictionExperiment, draws: Array) -> Verdict:
     sweep was slow enough. ``draws`` (k, p) are the posterior's, unconstrained. A wide interval is
     no fault of the fit, so the check never fails.
     """
-    rates = np.abs(experiment.bins.rate)
-    slowest = float(np.quantile(rates, PASSING))
+    slowest = slowest_rate(experiment.bins)
     centre, unit = float(experiment.key["angle_center"]), f"{experiment.joint.position_unit}/s"
     named = {name: value[:, None] for name, value in experiment.layout.natural(draws).items()}
     wanted = 0.5 * slowest * np.array([-1.0, 1.0])

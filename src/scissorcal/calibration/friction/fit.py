@@ -36,7 +36,11 @@ from scissorcal.calibration.friction.noise import (
     stroke_offsets,
 )
 from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
-from scissorcal.calibration.friction.slow_friction import with_probed
+from scissorcal.calibration.friction.slow_friction import (
+    SlowFriction,
+    opened,
+    with_probed,
+)
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.idle import idle_noise
@@ -99,7 +103,6 @@ def fit_friction(
     tell = progress or (lambda done, sentence: None)
     refuse_unsound(recordings)
     joint = recordings[0].joint if recordings else Joint()
-    settings = with_probed(settings, recordings)
     sensors = inspect_sensors(recordings)
     cleaned, zero = _cleaned(recordings, settings, simulated=prior is not None)
     steady, broken = steadiness(recordings), interruptions(recordings)
@@ -107,6 +110,8 @@ def fit_friction(
     every = again()
     windows = every.where(every.bins.moving)
     refuse_friction(recordings, settings, every, windows, sensors)
+    slow = SlowFriction.of(recordings, windows.bins)
+    settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
     laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
     compared, chosen = _compare(laws, settings.lack_of_fit, stop, tell)
@@ -116,6 +121,7 @@ def fit_friction(
     posterior = infer_law(problem, effort, rng, optimum=chosen.optimum)
     if prior is None:  # a study simulates the law itself
         posterior = with_lack_of_fit(posterior, law, settings.lack_of_fit, rng)
+        posterior = opened(posterior, law, slow, chosen.held_out_rms, rng)
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
     usage = usage_of_windows(recordings, every, sensors.usable)
     return assemble(
@@ -170,11 +176,11 @@ def friction_experiment(
     ``fit.structure``.
     """
     joint = recordings[0].joint
-    settings = with_probed(settings, recordings)
     cleaned, zero = _cleaned(recordings, settings, simulated=False)
     usable = inspect_sensors(recordings).usable
     every = _slid(steadiness(recordings), cleaned, settings.cutoff_Hz, usable)
     windows = every.where(every.bins.moving)
+    settings = with_probed(settings, SlowFriction.of(recordings, windows.bins))
     law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
     adopt = tuple(fit.structure.get("adopt", ()))
     cogging = float(fit.structure.get("cogging_periods_per_turn", 0.0))

@@ -1,4 +1,4 @@
-"""What a rig's probe found of slow friction, as the prior of a fit to sweeps.
+"""What a rig's probe found of slow friction, in the place of what sweeps cannot show.
 
 Sweeps are no slower than an encoder lets a loop make them. Below, a law's rise towards rest is
 extrapolated: behind 8,192 counts a turn, 0.2 mN m that a law lacked at 0.28 rad/s became 75 mN m of
@@ -6,12 +6,21 @@ static friction where there were 5. Pushes of a probe begin at rest, and its law
 """
 
 import math
+from dataclasses import dataclass, replace
 
-from scissorcal.model.friction_terms import PARAMETERS
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.calibration.friction.model import FrictionExperiment
+from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.inference import Posterior
+from scissorcal.model.friction_terms import PARAMETERS, side_of
 from scissorcal.recipe.priors import FrictionPriors, LogNormalPrior
 from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.probe import Posterior, probe_of
+from scissorcal.recording import probe as probes
 from scissorcal.recording.recording import Recording
+
+Array = NDArray[np.float64]
 
 FOUND = {"stribeck": "log_rise_share", "stribeck_rate": "log_rise_rate"}
 """Parameters of the law by the names of the probe's; the first is a share of Coulomb friction."""
@@ -19,26 +28,62 @@ LEFT_OUT = 0.5
 """Error of either logarithm by what the probe's law lacks. With it, errors of level and rate are
 1.1 and 1.0 of their sd (rms) on the 14 of 24 random rigs (63000 to 63023) whose probe tells them.
 """
+PROPOSALS = 50
 QUANTILE_90 = 1.645
+PASSING = 0.01
+"""Share of the motion below whose rate a joint only passes through."""
 
 
-def with_probed(settings: FitFriction, recordings: tuple[Recording, ...]) -> FitFriction:
-    """Settings whose priors of slow friction are what the recordings' probe found, if it did.
+def slowest_rate(bins: Bins) -> float:
+    """The slowest rate (rad/s or m/s) that was swept, not only passed through."""
+    return float(np.quantile(np.abs(bins.rate), PASSING))
+
+
+@dataclass(frozen=True)
+class SlowFriction:
+    """The probe's logarithms of level and speed of Stribeck friction, with ``covariance`` (2, 2).
+
+    The level is a share of Coulomb friction. ``held`` says that the slowest sweep, at ``slowest``,
+    shows less than 1/e of the rise: then draws keep to what the probe found (a cut posterior,
+    Plummer 2015, doi:10.1007/s11222-014-9503-z), which what the law lacks there would overrule.
+    """
+
+    mean: tuple[float, float]
+    covariance: Array
+    slowest: float
+
+    @classmethod
+    def of(cls, recordings: tuple[Recording, ...], bins: Bins) -> "SlowFriction | None":
+        """That of the first recording with such a probe; None for a linear joint, or without."""
+        found = next((one for one in map(_posterior, recordings) if one is not None), None)
+        if found is None or recordings[0].joint.kind != "rotary":
+            return None
+        at = [found.names.index(name) for name in FOUND.values()]
+        covariance = np.array(found.covariance)[np.ix_(at, at)] + LEFT_OUT**2 * np.eye(2)
+        return cls((found.mean[at[0]], found.mean[at[1]]), covariance, slowest_rate(bins))
+
+    @property
+    def held(self) -> bool:
+        return self.slowest > math.exp(self.mean[1])
+
+    def sd(self, place: int) -> float:
+        """Sd of either logarithm."""
+        return math.sqrt(self.covariance[place, place])
+
+
+def with_probed(settings: FitFriction, slow: SlowFriction | None) -> FitFriction:
+    """Settings whose priors of slow friction are what the probe found.
 
     A prior that a recipe states stays, and so does one that is narrower than what was found.
     """
-    found = next((one for one in map(_posterior, recordings) if one is not None), None)
-    if found is None or recordings[0].joint.kind != "rotary":
+    if slow is None:
         return settings
-    priors = settings.priors.rotary
-    changed = {}
-    for name, probed in FOUND.items():
-        place, key = found.names.index(probed), _key(name)
-        sd = math.hypot(math.sqrt(found.covariance[place][place]), LEFT_OUT)
+    priors, changed = settings.priors.rotary, {}
+    for place, name in enumerate(FOUND):
+        key, sd = _key(name), slow.sd(place)
         if key in priors.model_fields_set or sd >= _sd(priors, key):
             continue
-        median = math.exp(found.mean[place])
-        own = PARAMETERS[name].prior
+        median, own = math.exp(slow.mean[place]), PARAMETERS[name].prior
         if own is not None and own.beside:
             median *= getattr(priors, _key(own.beside)).median
         changed[key] = LogNormalPrior(median=median, factor_90=math.exp(QUANTILE_90 * sd))
@@ -47,8 +92,42 @@ def with_probed(settings: FitFriction, recordings: tuple[Recording, ...]) -> Fit
     return settings.model_copy(update={"priors": joints})
 
 
-def _posterior(recording: Recording) -> Posterior | None:
-    probe = probe_of(recording.device)
+def opened(
+    posterior: Posterior,
+    law: FrictionExperiment,
+    slow: SlowFriction | None,
+    lacking: float,
+    rng: np.random.Generator,
+) -> Posterior:
+    """The posterior with slow friction as wide as the probe knows it, where sweeps do not show it.
+
+    Each draw gets a level and a speed of the probe's, weighed by how little they change friction at
+    the slowest sweep: by ``lacking`` (N m), the error of the law on strokes that it had not seen.
+    """
+    names = law.layout.names
+    if slow is None or not slow.held or not set(FOUND) <= set(names):
+        return posterior
+    level, rate = (names.index(name) for name in FOUND)
+    coulomb = [place for place, name in enumerate(names) if side_of(name, ("coulomb",))]
+    draws = posterior.draws.copy()
+    size = (len(draws), PROPOSALS)
+    tried = rng.multivariate_normal(np.array(slow.mean), slow.covariance, size)
+    levels = tried[..., 0] + draws[:, coulomb].mean(axis=1)[:, None]
+
+    def seen(log_level: Array, log_rate: Array) -> Array:
+        return np.asarray(np.exp(log_level - np.exp(2.0 * (math.log(slow.slowest) - log_rate))))
+
+    change = seen(levels, tried[..., 1]) - seen(draws[:, [level]], draws[:, [rate]])
+    height = -0.5 * (change / lacking) ** 2
+    height += rng.gumbel(size=size)  # the largest is a draw by weight
+    chosen = np.argmax(height, axis=1)[:, None]
+    draws[:, level] = np.take_along_axis(levels, chosen, 1)[:, 0]
+    draws[:, rate] = np.take_along_axis(tried[..., 1], chosen, 1)[:, 0]
+    return replace(posterior, draws=draws)
+
+
+def _posterior(recording: Recording) -> probes.Posterior | None:
+    probe = probes.probe_of(recording.device)
     if probe is None or probe.posterior is None:
         return None
     return probe.posterior if set(FOUND.values()) <= set(probe.posterior.names) else None
