@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult, FittedParameter
-from scissorcal.model import friction_torque
+from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.package import build_package, open_package
 from scissorcal.package.by_load import as_closing
+from tests.calibration.cut.test_known import bent
 from tests.package.fits import cut_fit, friction_fit, recipe
 
 SHARE = 0.2
@@ -70,3 +71,19 @@ def test_what_closing_costs_is_kept_however_it_is_divided():
 def test_a_law_without_friction_by_load_is_left_alone():
     cut = cut_fit(recipe())
     assert as_closing(cut) is cut
+
+
+def test_friction_is_rendered_where_its_posterior_lies(tmp_path):
+    """A mode with ten times the static friction of the median, as where no sweep was slow."""
+    fit = bent(0.3)
+    point = fit.map_point.copy()
+    point[[p.name for p in fit.parameters].index("stribeck")] = 0.03
+    path = tmp_path / "ridge.zip"
+    ridge = dataclasses.replace(fit, map_point=point)
+    build_package(recipe(), ridge, cut_fit(recipe()), path, np.random.default_rng(0))
+    law = open_package(path, warn=False).exact.friction
+    assert law is not None
+    means = FrictionLaw.of_fit({p.name: p.mean for p in fit.parameters}, law.angle_center)
+    for rate in (-0.1, -0.02):
+        expected = float(friction_torque(means, 0.55, rate))
+        assert float(friction_torque(law, 0.55, rate)) == pytest.approx(expected, rel=1e-3)

@@ -40,14 +40,14 @@ def test_a_healthy_rig_is_not_accused(seed: int) -> None:
 def test_of_many_healthy_rigs_none_is_accused_and_intervals_hold() -> None:
     """12 rigs whose blades stay where they are left, of other seeds than those of development.
 
-    Where the interval of inertia holds 85 %, fewer than 8 of 12 do in 1 of 200 runs.
+    Where the interval of inertia holds 85 %, fewer than 7 of 12 do in 1 of 200 runs.
     """
     seeds = [seed for seed in range(20_000, 20_060) if not falls(healthy(seed))][:12]
     found = [trial_of(healthy(seed)) for seed in seeds]
     assert not [trial for trial in found if trial.outcome == "named"]
     known = [trial for trial in found if trial.outcome == "right"]
     assert len(known) >= 10
-    assert sum(trial.inside for trial in known) >= 0.6 * len(known)
+    assert sum(trial.inside for trial in known) >= 0.55 * len(known)
 
 
 @pytest.mark.parametrize("kind", NAMED_BY_HAND)

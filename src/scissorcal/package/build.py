@@ -108,8 +108,7 @@ def build_package(
     the package reports it (docs/decisions/109-packages-from-failed-fits.md).
     """
     # the report imports this module to read packages; only a build needs what follows
-    from scissorcal.calibration.friction.typical import at_typical
-    from scissorcal.package.by_load import as_closing
+    from scissorcal.package.by_load import rendered_fits
     from scissorcal.package.check import check_package
     from scissorcal.package.reach import data_reach
     from scissorcal.package.simplest.model import simplest_model
@@ -118,8 +117,7 @@ def build_package(
     cut, friction = _wanted(recipe, friction, cut)
     if not allow_failed:
         _refuse_failed_fits(path, cut, friction, plate)
-    if friction is not None:
-        cut, friction = as_closing(cut), at_typical(friction)
+    cut, friction = rendered_fits(cut, friction)
     picked = pick_draws(cut, friction, rng)
     simplified = simplest_model(recipe, cut, friction, picked, tolerance=tolerance)
     compiled = simplified.tables[-1]

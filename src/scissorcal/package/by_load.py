@@ -1,4 +1,4 @@
-"""Friction that grows with the cut's torque, rendered with the material as closing blades feel it.
+"""What of fits is rendered: typical friction, and its part by load with the material.
 
 A package's friction is that of an empty joint. The pivot's share mu of the cut's torque stands with
 the material: closing blades feel (1 + mu) times its torque, which is what a capture measures best,
@@ -13,12 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration import FitResult
+from scissorcal.calibration.friction.typical import at_typical
 from scissorcal.calibration.result import FittedParameter
 from scissorcal.package.friction_tables import LOAD_SHARE, share_of
 
 Array = NDArray[np.float64]
 
 GROWING = ("response_force", "fracture_energy")
+
+
+def rendered_fits(cut: FitResult, friction: FitResult | None) -> tuple[FitResult, FitResult | None]:
+    """The fits as a package renders them: typical friction, and a cut with its part by load."""
+    return (cut, None) if friction is None else (as_closing(cut), at_typical(friction))
 
 
 def as_closing(cut: FitResult) -> FitResult:

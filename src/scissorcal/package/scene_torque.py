@@ -14,6 +14,7 @@ from scissorcal.errors import MissingError
 from scissorcal.model import edge_height
 from scissorcal.model.cutting import within_thickness
 from scissorcal.package.build import pick_draws
+from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.exact import (
     ExactModel,
     FitDraws,
@@ -194,6 +195,8 @@ class _Probe:
         keys = ({"response", "edge"}, {"angle_center"})
         if not all(has_numbers(fit, own) for fit, own in zip(fits, keys, strict=False)):
             raise MissingError("The fits hold no usable numbers: fit again, then report again.")
+        cut, friction = rendered_fits(cut, friction)
+        fits = [fit for fit in (cut, friction) if fit is not None]
         picked = pick_draws(cut, friction, np.random.default_rng(0))
         drawn = [FitDraws.of(fit, picked[f"draws/{fit.what}.npy"]) for fit in fits]
         best = [FitDraws.centre(fit) for fit in fits]

@@ -1,14 +1,19 @@
 """What a probe found of slow friction is the prior of a fit, unless a recipe states one."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from scissorcal.calibration.friction.fit import fit_friction
-from scissorcal.calibration.friction.slow_friction import LEFT_OUT, SlowFriction, with_probed
+from scissorcal.calibration.friction.slow_friction import (
+    LEFT_OUT,
+    SlowFriction,
+    opened,
+    with_probed,
+)
 from scissorcal.calibration.friction.typical import at_typical, typical_values
 from scissorcal.recipe.priors import JointPriors, LogNormalPrior
 from scissorcal.recipe.schema import FitFriction
@@ -16,14 +21,19 @@ from scissorcal.recording.header import Joint
 from scissorcal.recording.probe import PROBE_KEY, Posterior, ProbeResult
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 from tests.calibration.cut.test_known import bent
-from tests.calibration.truth import Truth, friction_recording
 
 SETTINGS = FitFriction()
 
 
-def probed(*recordings: Recording, slowest: float = 0.05) -> FitFriction:
+def slow_of(
+    *recordings: Recording, slowest: float = 0.05, settings: FitFriction = SETTINGS
+) -> SlowFriction | None:
     bins = SimpleNamespace(rate=np.full(100, slowest))
-    return with_probed(SETTINGS, SlowFriction.of(recordings, bins))  # type: ignore[arg-type]
+    return SlowFriction.of(recordings, bins, settings)  # type: ignore[arg-type]
+
+
+def probed(*recordings: Recording) -> FitFriction:
+    return with_probed(SETTINGS, slow_of(*recordings))
 
 
 SHARE, RATE = 0.4, 0.08
@@ -62,38 +72,63 @@ def test_what_a_recipe_states_stays() -> None:
     own = LogNormalPrior(median=0.002, factor_90=2.0)
     rotary = type(SETTINGS.priors.rotary)(stribeck_Nm=own)
     stated = SETTINGS.model_copy(update={"priors": JointPriors(rotary=rotary)})
-    bins = SimpleNamespace(rate=np.full(100, 0.05))
-    slow = SlowFriction.of((recording(),), bins)  # type: ignore[arg-type]
-    after = with_probed(stated, slow).priors.rotary
-    assert after.stribeck_Nm == own
-    assert after.stribeck_rate_rad_per_s.median == pytest.approx(RATE)
+    assert slow_of(recording(), settings=stated) is None
+    assert with_probed(stated, None) == stated
 
 
 @pytest.mark.parametrize(
     "one",
-    [recording(probed=False), recording(sd=3.0), recording(kind="linear")],
+    [recording(probed=False), recording(sd=0.7), recording(kind="linear")],
     ids=["no probe", "a probe that did not see it", "a linear joint"],
 )
 def test_without_such_a_probe_the_recipes_priors_hold(one: Recording) -> None:
     assert probed(one) == SETTINGS
 
 
-@pytest.mark.parametrize("speed", [0.06, 1.0], ids=["held", "seen by sweeps"])
-def test_what_no_sweep_shows_is_as_wide_as_the_probe_knows_it(speed: float) -> None:
-    """Sweeps from 0.3 rad/s on of friction whose rise ends at 0.06; the probe has 0.4 +- 0.2."""
+@dataclass(frozen=True)
+class Drawn:
+    """As much of a posterior as is opened."""
+
+    draws: NDArray[np.float64]
+
+
+def opened_from(slowest: float, lacking: float) -> tuple[Drawn, Drawn]:
+    """Draws with a tenth of the probe's level at its speed, before and after."""
     rng = np.random.default_rng(3)
-    made = friction_recording(Truth(), rng, speeds=(0.3, 0.6, 1.0))
-    device = recording(0.2, rate=speed).device
-    wanted = FitFriction(rung="stribeck", symmetry="symmetric", critic=False)
-    fit = fit_friction((replace(made, device=device),), wanted, effort="draft", rng=rng)
-    level = fit.column("stribeck") / fit.column("coulomb")
-    spread = float(np.log(level).std())
-    known = math.hypot(0.2, LEFT_OUT)
-    if speed < 0.3:
-        assert spread == pytest.approx(known, rel=0.15)
-        assert abs(math.log(float(np.median(level)) / SHARE)) < known
-    else:
-        assert spread < 1.2 * known
+    names = ("coulomb", "stribeck", "stribeck_rate")
+    centre = np.log([0.015, 0.1 * SHARE * 0.015, RATE])
+    before = Drawn(centre + 0.05 * rng.standard_normal((400, 3)))
+    law = SimpleNamespace(layout=SimpleNamespace(names=names))
+    after = opened(before, law, slow_of(recording(), slowest=slowest), lacking, rng)  # type: ignore[arg-type, type-var]
+    return before, after  # type: ignore[return-value]
+
+
+def test_what_no_sweep_shows_is_what_the_probe_found_and_as_wide() -> None:
+    before, after = opened_from(slowest=0.5, lacking=1e-4)
+    share, rate = after.draws[:, 1] - after.draws[:, 0], after.draws[:, 2]
+    known = math.hypot(0.1, LEFT_OUT)
+    assert share.mean() == pytest.approx(math.log(SHARE), abs=0.1)
+    assert share.std() == pytest.approx(known, rel=0.15)
+    assert rate.std() == pytest.approx(known, rel=0.15)
+    assert np.all(after.draws[:, 0] == before.draws[:, 0])
+
+
+def test_friction_at_the_slowest_sweep_changes_by_what_the_law_lacks() -> None:
+    lacking, slowest = 5e-5, 0.12
+    before, after = opened_from(slowest, lacking)
+
+    def seen(drawn: Drawn) -> NDArray[np.float64]:
+        level, rate = np.exp(drawn.draws[:, 1:]).T
+        return np.asarray(level * np.exp(-((slowest / rate) ** 2)))
+
+    change = seen(after) - seen(before)
+    assert np.sqrt(np.mean(change**2)) < 2.0 * lacking
+    assert (after.draws[:, 1] - after.draws[:, 0]).std() > 0.4
+
+
+def test_sweeps_that_show_the_rise_are_believed() -> None:
+    before, after = opened_from(slowest=RATE, lacking=1e-4)
+    assert after is before
 
 
 def test_a_mode_far_out_on_a_ridge_is_not_what_is_rendered() -> None:

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from scissorcal.device.probe.idle import largest_correlation
+from scissorcal.device.probe.probe import ProbeRefusedError, probe
+from scissorcal.recipe.library import builtin_recipe
+from tests.strange_device import Faults, Person, StrangeDevice, VirtualPort
 
 TIME_S = np.arange(1000) * 1e-3
 
@@ -18,6 +21,16 @@ def test_a_vibration_is_correlated_at_any_rate(rate_Hz: float) -> None:
     noise = np.random.default_rng(1).normal(size=1000)
     shaken = 2.0 * np.sin(2 * np.pi * rate_Hz * TIME_S) + noise
     assert largest_correlation(shaken) > 0.5
+
+
+@pytest.mark.parametrize("sd_mrad", [3.0, 5.0, 20.0])
+def test_an_encoder_that_jitters_is_named_before_blades_that_move(sd_mrad: float) -> None:
+    """Noise of one reading moves a mean over some of them, and no blades."""
+    noise = Faults(encoder_noise_rad=1e-3 * sd_mrad)
+    device = StrangeDevice(noise, seed=2)
+    with pytest.raises(ProbeRefusedError, match="The opening jitters by"):
+        probe(VirtualPort(device), builtin_recipe("paper-80gsm"), confirm=Person(device))
+    assert device.largest_torque == 0.0
 
 
 def test_a_constant_and_a_short_series_are_no_noise() -> None:

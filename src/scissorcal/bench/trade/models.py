@@ -9,6 +9,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.kernel import ModelTables
 from scissorcal.package.build import pick_draws
+from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.compile import (
     TOLERANCE,
     Compiled,
@@ -76,15 +77,15 @@ def present_law(case: Case) -> Law:
 
 
 def held_law(case: Case, cut: FitResult, friction: FitResult | None) -> Law:
-    """The law that a package of these fits would hold, at the MAP point.
+    """The law that a package of these fits would hold, at its best point.
 
     As the package's build makes it: the simplest that is enough for the scene, or the law of the
     fits as they stand where ``scene.simplify`` is false. Raises InputError where the fitted law
     cannot be compiled.
     """
+    cut, rendered = rendered_fits(cut, friction if case.recipe.scene.render_friction else None)
     if not case.recipe.scene.simplify:
-        return central_law(case, cut, friction)
-    rendered = friction if case.recipe.scene.render_friction else None
+        return central_law(case, cut, rendered)
     draws = pick_draws(cut, rendered, np.random.default_rng(case.seed))
     found = simplest_model(case.recipe, cut, rendered, draws)
     return central_law(case, found.cut, found.friction)

@@ -12,6 +12,7 @@ from scissorcal.bench.trade.point import Error
 from scissorcal.calibration.result import FitResult
 from scissorcal.model import FrictionLaw, edge_height, friction_torque
 from scissorcal.package.build import pick_draws
+from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.compile import SLOWEST_EPS, scene_ranges
 from scissorcal.package.exact import (
     ExactModel,
@@ -84,7 +85,7 @@ def fitted_torque(case: Case, cut: FitResult | None, friction: FitResult | None)
         if friction is None:
             raise ValueError("There is neither a fit of a cut nor one of friction.")
         return _friction_alone(case, friction, points)
-    rendered = friction if case.recipe.scene.render_friction else None
+    cut, rendered = rendered_fits(cut, friction if case.recipe.scene.render_friction else None)
     picked = pick_draws(cut, rendered, rng)
     drawn = exact_model(
         FitDraws.of(cut, picked["draws/cut.npy"]),

@@ -18,7 +18,8 @@ ELASTIC_SEGMENTS = 8
 """Segments between touching and the deepest point of an elastic piece."""
 SHORT_SEGMENT_COUNTS = 4.0
 """Least encoder steps of an elastic segment in a piece with too few segments."""
-LEAST_RANGE_RAD = 1e-3
+LEAST_RANGE_RAD, LEAST_SEGMENT_RAD = 1e-3, 3e-4
+"""Least contact, and the least segment of one: at 0.3 rad/s a tick of 1 kHz."""
 PLACED_AT = 0.75
 """Share of the critical indentation at which a loading shows where its crack rests: the torque of a
 running crack tells the critical one whatever the response, and cracks start at 0.88 of it."""
@@ -33,8 +34,9 @@ class Rest:
     """A crack at rest: ``place`` (m, sheet's frame) is a first estimate.
 
     ``opening`` and ``advance`` are where the blades turned; ``fresh`` marks a sheet that is not
-    cut yet, whose crack is at 0. ``seen`` is false where the encoder's steps hid the unloading, so
-    that the next loading has to show the place.
+    cut yet, whose crack is at 0. ``seen`` is false where the unloading has too few segments (of a
+    coarse encoder, or a short contact), so that the next loading has to show the place, and
+    ``placed`` where that did not.
     """
 
     sheet: int
@@ -43,6 +45,7 @@ class Rest:
     opening: float = float("nan")
     advance: float = float("nan")
     seen: bool = True
+    placed: bool = True
 
 
 def place_at_turn(
@@ -68,8 +71,8 @@ def place_at_turn(
         length = geometry.moving_blades * max(float(depth), 1e-6) / float(lever)
         span = slice(low, run.high + 1)
         begin = low + left_for_good(opening[span], motion.standing[span], length)
-        least = max(3e-4, SHORT_SEGMENT_COUNTS * motion.resolution)
-        ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, least))
+        shortest = max(LEAST_SEGMENT_RAD, SHORT_SEGMENT_COUNTS * motion.resolution)
+        ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, shortest))
         ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
         if len(ends) < 4:
             return place, False
@@ -88,9 +91,10 @@ def placed_by_loading(
     motion: PathMotion, work: Array, run: Run, rest: Rest, geometry: Geometry, guess: Guess
 ) -> Rest:
     """A rest whose crack is where the torque passes that of PLACED_AT of its critical depth."""
-    ends = split(motion.opening, run.low, run.high, SHORT_SEGMENT_COUNTS * motion.resolution)
+    shortest = max(LEAST_SEGMENT_RAD, SHORT_SEGMENT_COUNTS * motion.resolution)
+    ends = split(motion.opening, run.low, run.high, shortest)
     if len(ends) < 3:
-        return rest
+        return replace(rest, placed=False)
     torque, _ = mean_torque(motion, work, ends)
     opening = 0.5 * (motion.opening[ends[1:]] + motion.opening[ends[:-1]])
     advance = 0.5 * (motion.advance[ends[1:]] + motion.advance[ends[:-1]])
@@ -100,7 +104,7 @@ def placed_by_loading(
     reached = reached * geometry.depth_and_lever(geometry.edge, opening, rest.place - advance)[1]
     above = np.flatnonzero((torque[1:] >= reached[1:]) & (torque[:-1] < reached[:-1]))
     if not len(above):
-        return rest
+        return replace(rest, placed=False)
     at = int(above[0])
     short = reached[at : at + 2] - torque[at : at + 2]
     share = float(short[0] / (short[0] - short[1]))
@@ -108,7 +112,7 @@ def placed_by_loading(
         float(geometry.place(np.asarray(opening[k]), float(depth[k]))) + float(advance[k])
         for k in (at, at + 1)
     ]
-    return replace(rest, place=place[0] + share * (place[1] - place[0]))
+    return replace(rest, place=place[0] + share * (place[1] - place[0]), placed=True)
 
 
 def left_for_good(opening: Array, standing: Mask, length: float) -> int:

@@ -95,12 +95,12 @@ def scout(
     )
     values = _values_of(guess, fracture)
     evaluations = 0
-    for loaded in (False, recipe.fit.cut.load_share != "none"):
+    for unseen, loaded in ((False, False), (True, recipe.fit.cut.load_share != "none")):
         law = CutLaw("power", fracture, loaded=loaded)
         for _ in range(ROUNDS if loaded else 1):
             at = (motions, materials, geometry.at(values), guess, known.noise, known.stroke_sd)
-            segments = cut_into_segments(*at, recipe.scene.cut, unseen=loaded)
-            if not segments.pieces:
+            segments = cut_into_segments(*at, recipe.scene.cut, unseen=unseen)
+            if not segments.pieces and not unseen:
                 segments = cut_into_segments(*at, recipe.scene.cut)
             if not segments.pieces:
                 refuse_coarse(segments)

@@ -197,7 +197,8 @@ class _Builder:
         beyond = np.flatnonzero(depth > LOADING_END * critical)
         last = int(beyond[0]) if len(beyond) else len(depth) - 1
         length = abs(float(opening[last] - opening[first]))
-        if length > LEAST_RANGE_RAD and (self.unseen or self.rests[-1].seen):
+        rest = self.rests[-1]
+        if length > LEAST_RANGE_RAD and (rest.seen or (self.unseen and rest.placed)):
             begin = first
             while begin > 0 and abs(opening[begin] - opening[first]) < FREE_SHARE * length:
                 begin -= 1

@@ -80,9 +80,9 @@ def start_verdict(experiment: FrictionExperiment, point: Array) -> Verdict:
 def near_rest_verdict(experiment: FrictionExperiment, draws: Array) -> Verdict:
     """Judge whether friction is known below the rates that were swept.
 
-    There a law extrapolates: Stribeck's level and rate keep what the prior says of them where no
-    sweep was slow enough. ``draws`` (k, p) are the posterior's, unconstrained. A wide interval is
-    no fault of the fit, so the check never fails.
+    There a law extrapolates: Stribeck's level and rate keep what the prior or the rig's probe says
+    of them where no sweep was slow enough. ``draws`` (k, p) are the posterior's, unconstrained. A
+    wide interval is no fault of the fit, so the check never fails.
     """
     slowest = slowest_rate(experiment.bins)
     centre, unit = float(experiment.key["angle_center"]), f"{experiment.joint.position_unit}/s"

@@ -110,7 +110,7 @@ def fit_friction(
     every = again()
     windows = every.where(every.bins.moving)
     refuse_friction(recordings, settings, every, windows, sensors)
-    slow = SlowFriction.of(recordings, windows.bins)
+    slow = SlowFriction.of(recordings, windows.bins, settings)
     settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
     laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
@@ -180,7 +180,7 @@ def friction_experiment(
     usable = inspect_sensors(recordings).usable
     every = _slid(steadiness(recordings), cleaned, settings.cutoff_Hz, usable)
     windows = every.where(every.bins.moving)
-    settings = with_probed(settings, SlowFriction.of(recordings, windows.bins))
+    settings = with_probed(settings, SlowFriction.of(recordings, windows.bins, settings))
     law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
     adopt = tuple(fit.structure.get("adopt", ()))
     cogging = float(fit.structure.get("cogging_periods_per_turn", 0.0))

@@ -15,7 +15,7 @@ from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior
 from scissorcal.model.friction_terms import PARAMETERS, side_of
-from scissorcal.recipe.priors import FrictionPriors, LogNormalPrior
+from scissorcal.recipe.priors import LogNormalPrior
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording import probe as probes
 from scissorcal.recording.recording import Recording
@@ -28,11 +28,13 @@ LEFT_OUT = 0.5
 """Error of either logarithm by what the probe's law lacks. With it, errors of level and rate are
 1.1 and 1.0 of their sd (rms) on the 14 of 24 random rigs (63000 to 63023) whose probe tells them.
 """
+TOLD_SD = 0.5
+"""Sd of either logarithm up to which pushes told it: the probe's own priors have 1.0 and 0.7."""
 HELD_FALL = 2.0
 """Of a static friction 0.3 above Coulomb's, e^-2 is 4 %: as much as laws are off by on strokes that
 they had not seen (2 to 4 %)."""
 PROPOSALS = 50
-QUANTILE_90 = 1.645
+"""For each draw: enough that some lie within what the law lacks, where one in ten does."""
 PASSING = 0.01
 """Share of the motion below whose rate a joint only passes through."""
 
@@ -56,13 +58,25 @@ class SlowFriction:
     slowest: float
 
     @classmethod
-    def of(cls, recordings: tuple[Recording, ...], bins: Bins) -> "SlowFriction | None":
-        """That of the first recording with such a probe; None for a linear joint, or without."""
-        found = next((one for one in map(_posterior, recordings) if one is not None), None)
-        if found is None or recordings[0].joint.kind != "rotary":
+    def of(
+        cls, recordings: tuple[Recording, ...], bins: Bins, settings: FitFriction
+    ) -> "SlowFriction | None":
+        """That of the newest probe among the recordings'.
+
+        None without one, for a linear joint, where its pushes did not tell both values, and where a
+        recipe states a prior of either.
+        """
+        made = [found for found in map(_probe, recordings) if found is not None]
+        stated = settings.priors.rotary.model_fields_set & {_key(name) for name in FOUND}
+        if not made or stated or recordings[0].joint.kind != "rotary":
             return None
+        found = max(made, key=lambda one: one.made_at).posterior
+        assert found is not None
         at = [found.names.index(name) for name in FOUND.values()]
-        covariance = np.array(found.covariance)[np.ix_(at, at)] + LEFT_OUT**2 * np.eye(2)
+        covariance = np.array(found.covariance)[np.ix_(at, at)]
+        if np.any(np.sqrt(np.diag(covariance)) > TOLD_SD):
+            return None
+        covariance = covariance + LEFT_OUT**2 * np.eye(2)
         return cls((found.mean[at[0]], found.mean[at[1]]), covariance, slowest_rate(bins))
 
     @property
@@ -75,21 +89,16 @@ class SlowFriction:
 
 
 def with_probed(settings: FitFriction, slow: SlowFriction | None) -> FitFriction:
-    """Settings whose priors of slow friction are what the probe found.
-
-    A prior that a recipe states stays, and so does one that is narrower than what was found.
-    """
+    """Settings whose priors of slow friction are what the probe found."""
     if slow is None:
         return settings
     priors, changed = settings.priors.rotary, {}
     for place, name in enumerate(FOUND):
-        key, sd = _key(name), slow.sd(place)
-        if key in priors.model_fields_set or sd >= _sd(priors, key):
-            continue
         median, own = math.exp(slow.mean[place]), PARAMETERS[name].prior
         if own is not None and own.beside:
             median *= getattr(priors, _key(own.beside)).median
-        changed[key] = LogNormalPrior(median=median, factor_90=math.exp(QUANTILE_90 * sd))
+        width = math.exp(probes.NORMAL_90 * slow.sd(place))
+        changed[_key(name)] = LogNormalPrior(median=median, factor_90=width)
     rotary = priors.model_copy(update=changed)
     joints = settings.priors.model_copy(update={"rotary": rotary})
     return settings.model_copy(update={"priors": joints})
@@ -129,17 +138,12 @@ def opened(
     return replace(posterior, draws=draws)
 
 
-def _posterior(recording: Recording) -> probes.Posterior | None:
+def _probe(recording: Recording) -> probes.ProbeResult | None:
+    """The recording's probe, if it has a posterior of slow friction."""
     probe = probes.probe_of(recording.device)
-    if probe is None or probe.posterior is None:
-        return None
-    return probe.posterior if set(FOUND.values()) <= set(probe.posterior.names) else None
+    names = set(probe.posterior.names) if probe and probe.posterior else set()
+    return probe if set(FOUND.values()) <= names else None
 
 
 def _key(name: str) -> str:
     return PARAMETERS[name].prior_key("rotary")
-
-
-def _sd(priors: FrictionPriors, key: str) -> float:
-    stated: LogNormalPrior = getattr(priors, key)
-    return stated.normal()[1]

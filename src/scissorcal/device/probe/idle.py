@@ -80,7 +80,10 @@ def idle(talk: Talk) -> Idle:
         begin, garbled, duplicates = talk.mark(), talk.link.garbled, talk.duplicates
         talk.play(_quiet(talk, IDLE_S))
         heard = talk.heard(begin)
-        if not np.ptp(_slow(heard["opening"])) > REST_RAD:
+        opening = heard["opening"]
+        fast = opening - _slow(opening)
+        swings = np.std(fast) > JITTER_RAD and largest_correlation(fast) >= WHITE_CORRELATION
+        if not (np.ptp(_slow(opening)) > REST_RAD or swings):
             break
     names = ("opening", "advance", "motor_torque", "handle_force")
     not_finite = tuple(name for name in names if not np.isfinite(heard[name]).all())

@@ -7,7 +7,7 @@ interval refuses nothing. Every limit has its reason beside it.
 import math
 
 from scissorcal.device.motion import STOP_MARGIN_RAD
-from scissorcal.device.probe.idle import JITTER_RAD, REST_RAD, Idle
+from scissorcal.device.probe.idle import JITTER_RAD, Idle
 from scissorcal.device.probe.lag import Lag
 from scissorcal.device.probe.measured_torque import Follow
 from scissorcal.device.probe.watchdog import Watchdog
@@ -205,7 +205,7 @@ def _jitter(found: Idle, identity: Identity) -> Verdict:
         "with the motors off"
     )
     remedy = "shield the encoder's cable, check its supply, or average its readings in the firmware"
-    if found.moved_rad > REST_RAD or found.swings:
+    if found.swings:
         why = f"{said}, and the blades did not rest: whether the encoder does is not told."
         return not_evaluated(SENSORS, "encoder jitter", why, JITTER_RAD, found.jitter_rad)
     if found.jitter_rad > JITTER_RAD:

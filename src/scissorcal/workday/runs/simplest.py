@@ -28,6 +28,7 @@ def workspace_scene_choice(engine: Engine) -> "SceneChoice | None":
     import numpy as np
 
     from scissorcal.package.build import pick_draws
+    from scissorcal.package.by_load import rendered_fits
     from scissorcal.package.simplest.model import simplest_model
 
     if not engine.needed(STEP) or set(available(engine, NEEDED)) != set(NEEDED):
@@ -36,9 +37,10 @@ def workspace_scene_choice(engine: Engine) -> "SceneChoice | None":
     if found is not None:
         return found
     cut, friction = load_result(engine, "cut"), load_result(engine, "friction")
-    rendered = friction if engine.recipe.scene.render_friction else None
-    draws = pick_draws(cut, rendered, np.random.default_rng(SEED))
-    simplified = simplest_model(engine.recipe, cut, rendered, draws)
+    wanted = friction if engine.recipe.scene.render_friction else None
+    own, rendered = rendered_fits(cut, wanted)
+    draws = pick_draws(own, rendered, np.random.default_rng(SEED))
+    simplified = simplest_model(engine.recipe, own, rendered, draws)
     return store_scene_choice(engine, simplified, {"cut": cut, "friction": friction})
 
 
