@@ -1,7 +1,7 @@
 """Work of the material between openings, and its covariance."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,20 +37,19 @@ class Material:
     exact, the latter carries the noise of an acceleration. Where blades rest, friction acts
     along their mean creep: tremor of the smoothed position is noise, whose friction would add up.
     ``direction`` (n - 1,) is how dry friction acts between samples, from -1 (closing) to 1, less
-    where it has not built up. ``doubt`` (k, n) in J is by how much the work differs with friction
-    as each of k draws has it, beside what it differs by at one rate in either direction.
+    where it has not built up. ``doubt`` is what friction may be instead, None where it is known.
     """
 
     work: Array
     torque: Array
     direction: Array
-    doubt: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    doubt: "FrictionDoubt | None" = None
 
     def torque_doubt(self, motion: PathMotion, ends: Integers) -> Array:
         """Covariance (k, k) of mean torques between samples ``ends`` (k + 1,) by that doubt."""
-        if not len(self.doubt):
+        if self.doubt is None:
             return np.zeros((len(ends) - 1, len(ends) - 1))
-        off = np.diff(self.doubt[:, ends], axis=1) / np.diff(motion.opening[ends])
+        off = self.doubt.work_between(ends) / np.diff(motion.opening[ends])
         return np.asarray(off.T @ off / len(off))
 
 
@@ -66,6 +65,31 @@ class FrictionDraws:
     offset: Array
     closing: Array
     opening: Array
+
+
+@dataclass(frozen=True)
+class FrictionDoubt:
+    """By how much friction differs along a path (n - 1,) with the draws of its posterior.
+
+    ``taken`` is the friction (N m) that was taken off between samples, ``step`` (rad) the way. It
+    is worked out where it is asked for: for all of a long recording it is half a gigabyte.
+    """
+
+    draws: FrictionDraws
+    middle: Array
+    rate: Array
+    direction: Array
+    taken: Array
+    step: Array
+
+    def work_between(self, ends: Integers) -> Array:
+        """Differences of the work (draws, k) in J between samples ``ends`` (k + 1,)."""
+        span = slice(int(ends[0]), int(ends[-1]))
+        rate, draws = self.rate[span], self.draws
+        law = built_friction(draws.law, self.middle[span], rate, 0.0, self.direction[span])
+        off = law + draws.offset - self.taken[span]
+        off -= np.where(rate < 0.0, draws.closing, draws.opening)
+        return np.asarray(np.add.reduceat(off * self.step[span], ends[:-1] - ends[0], axis=1))
 
 
 def material_of(
@@ -98,12 +122,8 @@ def material_of(
         work = work - (cosine * np.sin(number * path) - sine * np.cos(number * path)) / number
     torque = motion.inertia * np.gradient(motion.rate) / motion.tick_s - motion.drive
     torque[:-1] += law + offset
-    found = Material(np.asarray(work), np.asarray(torque), np.asarray(direction))
-    if draws is None:
-        return found
-    off = built_friction(draws.law, middle, rate, 0.0, direction) + draws.offset - (law + offset)
-    off -= np.where(rate < 0.0, draws.closing, draws.opening)
-    return replace(found, doubt=np.pad(np.cumsum(off * step, axis=1), ((0, 0), (1, 0))))
+    doubt = FrictionDoubt(draws, middle, rate, direction, law + offset, step) if draws else None
+    return Material(np.asarray(work), np.asarray(torque), np.asarray(direction), doubt)
 
 
 def built_up(path: Array, sense: Array, friction: FrictionLaw, fine_rad: float) -> Array:
