@@ -63,8 +63,8 @@ class KnownFriction:
         centre = float(friction.structure["angle_center"])
         means = typical_values(friction)
         per_turn = float(friction.structure.get("cogging_periods_per_turn", 0.0))
-        # The fit gives what the drive has to give beside friction: the motor's own torque, negated.
         law = FrictionLaw.of_fit(_with_presliding(means, friction.diagnostics), centre)
+        # The fit gives what the drive has to give beside friction: the motor's own torque, negated.
         cogging = [-float(means.get(f"cogging_{part}", 0.0)) for part in ("cos", "sin")]
         closing, opening = (
             max(floor, _spread(friction, centre, sign * USUAL_RATE)) for sign in (-1, 1)

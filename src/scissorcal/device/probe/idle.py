@@ -70,7 +70,7 @@ class Idle:
     @property
     def swings(self) -> bool:
         """Whether the opening goes to and fro as blades do, not as an encoder that jitters."""
-        return self.jitter_rad > JITTER_RAD and self.jitter_correlation >= WHITE_CORRELATION
+        return _swing(self.jitter_rad, self.jitter_correlation)
 
 
 def idle(talk: Talk) -> Idle:
@@ -81,9 +81,9 @@ def idle(talk: Talk) -> Idle:
         talk.play(_quiet(talk, IDLE_S))
         heard = talk.heard(begin)
         opening = heard["opening"]
-        fast = opening - _slow(opening)
-        swings = np.std(fast) > JITTER_RAD and largest_correlation(fast) >= WHITE_CORRELATION
-        if not (np.ptp(_slow(opening)) > REST_RAD or swings):
+        slow = _slow(opening)
+        swings = _swing(float(np.std(opening - slow)), largest_correlation(opening - slow))
+        if not (np.ptp(slow) > REST_RAD or swings):
             break
     names = ("opening", "advance", "motor_torque", "handle_force")
     not_finite = tuple(name for name in names if not np.isfinite(heard[name]).all())
@@ -216,6 +216,10 @@ def _cleared(talk: Talk) -> Stage[tuple[bool, bool]]:
 def _quiet(talk: Talk, seconds: float) -> Stage[None]:
     for _ in range(talk.ticks(seconds)):
         yield RELEASE
+
+
+def _swing(spread_rad: float, correlation: float) -> bool:
+    return spread_rad > JITTER_RAD and correlation >= WHITE_CORRELATION
 
 
 def _slow(values: Array) -> Array:
