@@ -153,7 +153,7 @@ def _diagnostics(
         + posterior.evaluations
         - posterior.optimum.evaluations,
         "observations": len(residuals),
-        "independent_share": white.share,
+        "independent_share": chosen.share,
         "whiteness_p": white.p_value,
         "first_lag_autocorrelation": white.first_lag,
         "largest_inflation": float(posterior.inflation.max()),

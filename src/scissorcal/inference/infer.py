@@ -15,6 +15,7 @@ from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
+from scissorcal.inference.shear import Shear
 from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus, about, picked
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 
@@ -88,7 +89,8 @@ def infer(
     proposal = _proposal(counted, best, local)
     if stop is not None:
         local = laplace(counter.over(problem, stop), shape, spread)
-    run = _Run(problem.names, local, proposal, counter, rng, count, tell)
+    target = _target(problem.shear, local, proposal)
+    run = _Run(problem.names, local.null, target, counter, rng, count, tell)
     try:
         found = run.at(effort, problem, budget or BUDGET[effort], escalate, checkpoint)
     except NotFiniteError as error:
@@ -99,7 +101,7 @@ def infer(
     return Posterior(
         names=problem.names,
         optimum=best,
-        draws=found.draws,
+        draws=np.clip(target.bent(found.draws), problem.lower, problem.upper),
         covariance=local.covariance,
         k_hat=found.k_hat,
         effective=found.effective,
@@ -152,6 +154,36 @@ def _proposal(problem: Problem, best: Optimum, local: Laplace) -> Mixture:
 
 
 @dataclass(frozen=True)
+class _Target:
+    """What is sampled, in the coordinates in which it is: density, first proposal, normal shape.
+
+    ``bent`` leads back to the parameters' own coordinates.
+    """
+
+    log_posterior: Callable[[Array], float]
+    log_posteriors: Callable[[Array], Array]
+    proposal: Mixture
+    centre: Array
+    covariance: Array
+    bent: Callable[[Array], Array]
+
+
+def _target(shear: Shear | None, local: Laplace, proposal: Mixture) -> _Target:
+    one, many, centre = local.log_posterior, local.log_posteriors, local.centre
+    if shear is None:
+        return _Target(one, many, proposal, centre, local.covariance, lambda draws: draws)
+    bent = shear.bent
+    return _Target(
+        log_posterior=lambda point: one(bent(point)),
+        log_posteriors=lambda points: many(bent(points)),
+        proposal=shear.mixture(proposal),
+        centre=shear.straight(centre),
+        covariance=shear.covariance(centre, local.covariance),
+        bent=bent,
+    )
+
+
+@dataclass(frozen=True)
 class _Found:
     """What one effort ended with."""
 
@@ -170,8 +202,8 @@ class _Found:
 @dataclass(frozen=True)
 class _Run:
     names: tuple[str, ...]
-    local: Laplace
-    proposal: Mixture
+    null: tuple[str, ...]
+    target: _Target
     counter: Counter
     rng: np.random.Generator
     count: int
@@ -187,43 +219,42 @@ class _Run:
     ) -> _Found:
         try:
             if effort == "draft":
-                return self.draft(problem)
+                return self.draft()
             if effort == "standard":
                 return self.standard(budget, escalate, checkpoint)
             return self.thorough(budget, checkpoint)
         except TimeUsedUpError:
-            return self.out_of_time(problem)
+            return self.out_of_time()
 
-    def draft(self, problem: Problem) -> _Found:
+    def draft(self) -> _Found:
         draws = self.rng.multivariate_normal(
-            self.local.centre, self.local.covariance, size=self.count, method="cholesky"
+            self.target.centre, self.target.covariance, size=self.count, method="cholesky"
         )
-        draws = np.clip(draws, problem.lower, problem.upper)
-        status = SamplingStatus.FLAT if self.local.null else SamplingStatus.APPROXIMATED
+        status = SamplingStatus.FLAT if self.null else SamplingStatus.APPROXIMATED
         sentence = status.value
-        if self.local.null:
-            sentence += f" It concerns {'; '.join(self.local.null)}."
+        if self.null:
+            sentence += f" It concerns {'; '.join(self.null)}."
         nothing = np.full(len(self.names), np.nan)
         return _Found(draws, "draft", status, sentence, float(self.count), np.nan, nothing, nothing)
 
-    def out_of_time(self, problem: Problem) -> _Found:
+    def out_of_time(self) -> _Found:
         status = SamplingStatus.BUDGET_USED_UP
         sentence = f"{status.value} The time ended first: the draws are the normal approximation's."
-        return replace(self.draft(problem), status=status, sentence=sentence)
+        return replace(self.draft(), status=status, sentence=sentence)
 
     def standard(self, budget: int, escalate: bool, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "sampling")
-        target = self.local.log_posterior
+        target, proposal = self.target.log_posterior, self.target.proposal
         first = self.counter.calls
-        many = self.local.log_posteriors
-        sampled = sample_by_importance(target, self.proposal, self.count, self.rng, many=many)
+        many = self.target.log_posteriors
+        sampled = sample_by_importance(target, proposal, self.count, self.rng, many=many)
         said = f"k-hat {sampled.k_hat:.2f}"
         if sampled.k_hat > GOOD_K and escalate:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
             rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // self.count - 2)
             if rounds > 0:
                 mixed = sample_by_mixture(
-                    target, sampled, self.proposal, self.count, self.rng, rounds, many
+                    target, sampled, proposal, self.count, self.rng, rounds, many
                 )
                 said += f", {mixed.k_hat:.2f} with an adapted mixture"
                 # Weights that passed are not refused by the stricter limit of a better proposal.
@@ -242,12 +273,12 @@ class _Run:
     def thorough(self, budget: int, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "checking the approximation")
         sampled = sample_by_importance(
-            self.local.log_posterior,
-            self.proposal,
+            self.target.log_posterior,
+            self.target.proposal,
             self.count,
             self.rng,
             rounds=1,
-            many=self.local.log_posteriors,
+            many=self.target.log_posteriors,
         )
         return self._walked(budget, checkpoint, sampled, "")
 
@@ -269,12 +300,12 @@ class _Run:
         self, budget: int, checkpoint: Path | None, sampled: Sampled, before: str
     ) -> _Found:
         chains = run_ensembles(
-            self.local.log_posterior,
-            self.proposal,
+            self.target.log_posterior,
+            self.target.proposal,
             self.rng,
             budget=budget,
             checkpoint=checkpoint,
-            many=self.local.log_posteriors,
+            many=self.target.log_posteriors,
             progress=lambda done, sentence: self.tell(0.5 + 0.5 * done, sentence),
         )
         return _Found(

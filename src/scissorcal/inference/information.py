@@ -17,19 +17,26 @@ class Slopes:
 
     ``pull`` (n,) is minus the derivative of a term's logarithm by z. ``by_mean`` (n, p) are the
     slopes of the residuals over their sizes, the sizes held; ``by_size`` (n, p) those of log s. A
-    score is -pull * by_mean + (z * pull - 1) * by_size.
+    score is -pull * by_mean + (z * pull - 1) * by_size, times the ``share`` of independent terms.
     """
 
     z: Array
     pull: Array
     by_mean: Array
     by_size: Array
+    share: float = 1.0
+
+    def where(self, keep: NDArray[np.bool_]) -> "Slopes":
+        """Those of the terms that ``keep`` (n,) selects."""
+        z, pull = self.z[keep], self.pull[keep]
+        return Slopes(z, pull, self.by_mean[keep], self.by_size[keep], self.share)
 
     @property
     def scores(self) -> Array:
         """Derivatives of each term's logarithm, shape (n, p)."""
         size_pull = self.z * self.pull - 1.0
-        return np.asarray(size_pull[:, None] * self.by_size - self.pull[:, None] * self.by_mean)
+        scores = size_pull[:, None] * self.by_size - self.pull[:, None] * self.by_mean
+        return np.asarray(self.share * scores)
 
 
 def slopes_at(problem: Problem, point: Array, step: Array) -> Slopes | None:
@@ -42,7 +49,7 @@ def slopes_at(problem: Problem, point: Array, step: Array) -> Slopes | None:
     by_size = both[len(z) :]
     nu = problem.tails
     pull = z if np.isinf(nu) else (nu + 1.0) * z / (nu + z**2)
-    return Slopes(z, pull, both[: len(z)] + z[:, None] * by_size, by_size)
+    return Slopes(z, pull, both[: len(z)] + z[:, None] * by_size, by_size, problem.share)
 
 
 def likelihood_information(
@@ -62,9 +69,8 @@ def likelihood_information(
         return _positive(-hessian(problem.log_likelihood, point, step, many), problem.prior_sd)
     of_mean = 1.0 if np.isinf(nu) else (nu + 1.0) / (nu + 3.0)
     of_size = 2.0 if np.isinf(nu) else 2.0 * nu / (nu + 3.0)
-    return np.asarray(
-        of_mean * slopes.by_mean.T @ slopes.by_mean + of_size * slopes.by_size.T @ slopes.by_size
-    )
+    by_mean, by_size = slopes.by_mean.T @ slopes.by_mean, slopes.by_size.T @ slopes.by_size
+    return np.asarray(slopes.share * (of_mean * by_mean + of_size * by_size))
 
 
 def _positive(matrix: Array, scale: Array) -> Array:

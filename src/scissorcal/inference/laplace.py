@@ -100,7 +100,7 @@ def shape_at(problem: Problem, point: Array, fall: float = 0.3) -> Shape:
     scale = problem.prior_sd
     step = natural_step(problem.log_likelihood, point, 0.1 * scale, fall)
     slopes = slopes_at(problem, point, step)
-    scores = slopes.scores if slopes else gradient(problem.log_likelihood_terms, point, step)
+    scores = slopes.scores if slopes else _scores(problem, point, step)
     slope_prior, curvature_prior = _prior_shape(problem, point, step)
     columns = np.vstack([scores, curvature_prior, slope_prior])
     finite = np.asarray(np.all(np.isfinite(columns), axis=0))
@@ -267,6 +267,11 @@ def _stretch(information: Array, spread: Array, scale: Array) -> tuple[Array, Ar
 def _root(matrix: Array) -> Array:
     values, vectors = np.linalg.eigh(matrix)
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+
+
+def _scores(problem: Problem, point: Array, step: Array) -> Array:
+    """Derivatives of each term's logarithm (n, p), by differences."""
+    return np.asarray(problem.share * gradient(problem.log_likelihood_terms, point, step))
 
 
 def _prior_shape(problem: Problem, point: Array, step: Array) -> tuple[Array, Array]:

@@ -65,7 +65,7 @@ def long_run_covariance(problem: Problem, scores: Array, slopes: Slopes | None) 
         excess, largest = _excess(by_mean, pull[here], blocks[here], noise)
         total += excess
         dispersion = max(dispersion, largest)
-    return LongRun(total, tuple(orders), dispersion)
+    return LongRun(slopes.share**2 * total, tuple(orders), dispersion)
 
 
 def covariance_of_sum(slopes: Array, series: Labels, noise: ArNoise) -> Array:

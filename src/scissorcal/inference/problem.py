@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.inference.shear import Shear
+
 Array = NDArray[np.float64]
 
 
@@ -27,6 +29,9 @@ class Problem:
     (strokes) whose scores are compared as wholes; where missing, all terms are one population and
     the series are the blocks.
 
+    ``share`` is the share of the terms that count as independent: the likelihood is taken to that
+    power, so that a prior is weighed against what the data are worth and not against their number.
+
     ``independent`` says that the terms are independent given the parameters and that the model is
     taken as true: the posterior is then used exactly as written, and its likelihood is not
     stretched for autocorrelation.
@@ -37,6 +42,8 @@ class Problem:
 
     ``smooth`` says that the log-posterior has continuous second derivatives, so that a search may
     go by differences where there are no squares.
+
+    ``shear`` are coordinates in which a known ridge is straight; samplers work in them.
 
     ``tally`` is called before each likelihood that a subclass works out without its terms, so that
     counters see it too.
@@ -54,16 +61,18 @@ class Problem:
     tails: float = np.inf
     populations: NDArray[np.int64] | None = None
     blocks: NDArray[np.int64] | None = None
+    share: float = 1.0
     independent: bool = False
     log_posterior_many: Callable[[Array], Array] | None = None
     smooth: bool = False
+    shear: Shear | None = None
     tally: Callable[[], None] | None = None
 
     def log_likelihood(self, point: Array) -> float:
         """Sum of the likelihood's terms; -inf where any of them is not finite."""
         if self.log_posterior_many is not None:
             return float(self.log_likelihoods(point[None])[0])
-        total = float(np.sum(self.log_likelihood_terms(point)))
+        total = self.share * float(np.sum(self.log_likelihood_terms(point)))
         return total if np.isfinite(total) else -np.inf
 
     def log_posterior(self, point: Array) -> float:
@@ -92,7 +101,8 @@ class Problem:
             return np.array([self.log_likelihood(point) for point in points])
         prior = np.array([float(self.log_prior(point)) for point in points])
         if not np.all(np.isfinite(prior)):
-            sums = np.array([float(np.sum(self.log_likelihood_terms(u))) for u in points])
+            terms = self.log_likelihood_terms
+            sums = self.share * np.array([float(np.sum(terms(u))) for u in points])
             return np.where(np.isfinite(sums), sums, -np.inf)
         heights = np.asarray(self.log_posterior_many(points)) - prior
         return np.where(np.isfinite(heights), heights, -np.inf)

@@ -142,7 +142,7 @@ class _Search:
         if len(moving) == 0:
             return
         begin, scale = self.point, self.scale
-        rows_of_prior = self.prior.at(begin)
+        rows_of_prior, weight = self.prior.at(begin), np.sqrt(self.problem.share)
 
         def moved(x: Array) -> Array:
             point = begin.copy()
@@ -158,7 +158,7 @@ class _Search:
             point = moved(x)
             z, log_sd = self.normal(point)
             with np.errstate(all="ignore"):
-                data = z * np.exp(log_sd - held)
+                data = weight * z * np.exp(log_sd - held)
             out = OUTSIDE * (point - self.clipped(point)) / scale
             every = _finite(np.concatenate([data, rows_of_prior(point), out]))
             if (cost := float(every @ every)) < lowest:
@@ -231,8 +231,10 @@ class _Search:
         for _ in range(SCORING_STEPS):
             z, _, by_mean, by_size = self.slopes()
             curvature, slope = self.prior.shape(self.point)
-            gradient_ = slope + (z**2 - 1.0) @ by_size - z @ by_mean
-            precision = by_mean.T @ by_mean + 2.0 * by_size.T @ by_size + curvature
+            share = self.problem.share
+            gradient_ = slope + share * ((z**2 - 1.0) @ by_size - z @ by_mean)
+            told = by_mean.T @ by_mean + 2.0 * by_size.T @ by_size
+            precision = share * told + curvature
             if not (np.all(np.isfinite(precision)) and np.all(np.isfinite(gradient_))):
                 self.promised = np.inf
                 break

@@ -6,9 +6,9 @@ import pytest
 
 from scissorcal.calibration.cut.guess import CoarseEncoderError
 from scissorcal.calibration.cut.scout import refuse_coarse
-from scissorcal.calibration.cut.segments import LEAST_PIECE_COUNTS, Segments
+from scissorcal.calibration.cut.segments import Segments
 
-FEW = Segments((), (), (), (), longest=0.016, steps=20.9)
+FEW = Segments((), (), (), (), longest=0.016, steps=20.9, segments=5.2)
 
 
 def test_too_few_steps_are_named_with_the_counts_that_would_do() -> None:
@@ -18,6 +18,6 @@ def test_too_few_steps_are_named_with_the_counts_that_would_do() -> None:
         refuse_coarse(FEW)
 
 
-@pytest.mark.parametrize("steps", [0.0, LEAST_PIECE_COUNTS])
-def test_no_unloading_at_all_and_enough_steps_are_not_the_encoders(steps: float) -> None:
-    refuse_coarse(replace(FEW, steps=steps))
+@pytest.mark.parametrize("segments", [0.0, 5.5])
+def test_no_unloading_at_all_and_enough_segments_are_not_the_encoders(segments: float) -> None:
+    refuse_coarse(replace(FEW, segments=segments))

@@ -57,7 +57,11 @@ def test_the_next_loading_places_a_crack_whose_unloading_the_encoder_hides():
     assert [rest.seen for rest in found.rests] == [True, False, False]
     assert found.rests[1].place == pytest.approx(ends[0], abs=5e-6)
     assert abs(found.rests[2].place - ends[1]) > 1e-4, "no loading follows the last stroke"
-    assert [piece.rest for piece in found.pieces] == [1]
+    assert [(piece.kind, piece.rest) for piece in found.pieces] == [
+        ("unloading", 1),
+        ("loading", 1),
+        ("unloading", 2),
+    ]
 
 
 def test_mean_torques_are_those_of_the_truth(two_strokes):

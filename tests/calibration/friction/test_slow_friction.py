@@ -28,7 +28,7 @@ SETTINGS = FitFriction()
 def slow_of(
     *recordings: Recording, slowest: float = 0.05, settings: FitFriction = SETTINGS
 ) -> SlowFriction | None:
-    bins = SimpleNamespace(rate=np.full(100, slowest))
+    bins = SimpleNamespace(slowest_rate=slowest)
     return SlowFriction.of(recordings, bins, settings)  # type: ignore[arg-type]
 
 

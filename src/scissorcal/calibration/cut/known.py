@@ -1,8 +1,6 @@
 """What a cut's fit takes from the fit of friction: levels, inertia, cogging, noise."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +61,7 @@ class KnownFriction:
         centre = float(friction.structure["angle_center"])
         means = typical_values(friction)
         per_turn = float(friction.structure.get("cogging_periods_per_turn", 0.0))
-        law = FrictionLaw.of_fit(_with_presliding(means, friction.diagnostics), centre)
+        law = FrictionLaw.of_fit(means, centre)
         # The fit gives what the drive has to give beside friction: the motor's own torque, negated.
         cogging = [-float(means.get(f"cogging_{part}", 0.0)) for part in ("cos", "sin")]
         closing, opening = (
@@ -116,15 +114,6 @@ def _draws(friction: FitResult, taken: dict[str, Array], law: FrictionLaw) -> Fr
     )
     offset = values.get("offset", np.zeros((len(every), 1)))
     return FrictionDraws(FrictionLaw.of_fit(known | values, centre), offset, closing, opening)
-
-
-def _with_presliding(values: dict[str, Array], seen: Mapping[str, Any]) -> dict[str, Array]:
-    """A law without presliding with what the rig's probe saw of it, as far as it did."""
-    share, length = (seen.get(f"presliding_slow_{part}") for part in ("share", "rad"))
-    if "presliding_share" in values or share is None or length is None:
-        return values
-    found = {"presliding_share": float(share), "presliding_length": float(length)}
-    return {**values, **{name: np.asarray(value) for name, value in found.items()}}
 
 
 def _spread(friction: FitResult, centre: float, rate: float) -> float:

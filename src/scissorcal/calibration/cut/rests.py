@@ -16,8 +16,12 @@ Mask = NDArray[np.bool_]
 
 ELASTIC_SEGMENTS = 8
 """Segments between touching and the deepest point of an elastic piece."""
-SHORT_SEGMENT_COUNTS = 4.0
-"""Least encoder steps of an elastic segment in a piece with too few segments."""
+PATH_ERROR = 0.06
+"""Largest share of an elastic segment that its ends are off by (sd). Behind 8,192 counts a turn the
+smoothed opening is off by 0.09 of a step, so that a segment has 2; unloading paper there has 9."""
+PLACING = 2.0
+"""Length of the segments that place a crack, in those of a fit, which knows the error of each: with
+shorter ones, behind 8,000 counts a turn, an unloading placed a crack 0.3 mm off."""
 LEAST_RANGE_RAD, LEAST_SEGMENT_RAD = 1e-3, 3e-4
 """Least contact, and the least segment of one: at 0.3 rad/s a tick of 1 kHz."""
 PLACED_AT = 0.75
@@ -71,7 +75,7 @@ def place_at_turn(
         length = geometry.moving_blades * max(float(depth), 1e-6) / float(lever)
         span = slice(low, run.high + 1)
         begin = low + left_for_good(opening[span], motion.standing[span], length)
-        shortest = max(LEAST_SEGMENT_RAD, SHORT_SEGMENT_COUNTS * motion.resolution)
+        shortest = max(LEAST_SEGMENT_RAD, PLACING * shortest_segment(motion, low, run.high))
         ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, shortest))
         ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
         if len(ends) < 4:
@@ -91,7 +95,7 @@ def placed_by_loading(
     motion: PathMotion, work: Array, run: Run, rest: Rest, geometry: Geometry, guess: Guess
 ) -> Rest:
     """A rest whose crack is where the torque passes that of PLACED_AT of its critical depth."""
-    shortest = max(LEAST_SEGMENT_RAD, SHORT_SEGMENT_COUNTS * motion.resolution)
+    shortest = max(LEAST_SEGMENT_RAD, PLACING * shortest_segment(motion, run.low, run.high))
     ends = split(motion.opening, run.low, run.high, shortest)
     if len(ends) < 3:
         return replace(rest, placed=False)
@@ -113,6 +117,11 @@ def placed_by_loading(
         for k in (at, at + 1)
     ]
     return replace(rest, place=place[0] + share * (place[1] - place[0]), placed=True)
+
+
+def shortest_segment(motion: PathMotion, low: int, high: int) -> float:
+    """Least length (rad) of an elastic segment between two samples of a motion."""
+    return float(np.sqrt(2.0) * np.median(motion.opening_sd[low : high + 1]) / PATH_ERROR)
 
 
 def left_for_good(opening: Array, standing: Mask, length: float) -> int:

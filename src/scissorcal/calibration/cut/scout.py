@@ -20,8 +20,8 @@ from scissorcal.calibration.cut.laws import CutLaw, cut_layout
 from scissorcal.calibration.cut.likelihood import CutLikelihood
 from scissorcal.calibration.cut.model import CutExperiment, starting_point
 from scissorcal.calibration.cut.path import Material, PathMotion
-from scissorcal.calibration.cut.path.runs import find_runs
-from scissorcal.calibration.cut.segments import LEAST_PIECE_COUNTS, Segments, cut_into_segments
+from scissorcal.calibration.cut.path.runs import FEWEST_SEGMENTS, find_runs
+from scissorcal.calibration.cut.segments import Segments, cut_into_segments
 from scissorcal.calibration.cut.structure import edge_layout, geometry_of, response_from
 from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
 from scissorcal.inference import Counter, Optimum, find_optimum
@@ -118,14 +118,16 @@ def scout(
 
 def refuse_coarse(segments: Segments) -> None:
     """Raise CoarseEncoderError where no loading or unloading has steps enough."""
-    if not 0.0 < segments.steps < LEAST_PIECE_COUNTS:
+    whole = FEWEST_SEGMENTS + 0.5
+    if not 0.0 < segments.segments < whole:
         return
-    needed = LEAST_PIECE_COUNTS * 2.0 * math.pi / segments.longest
+    takes = whole / segments.segments * segments.steps
+    needed = takes * 2.0 * math.pi / segments.longest
     raise CoarseEncoderError(
         f"the blades load and unload the material over {1e3 * segments.longest:.2g} mrad of "
         f"opening, {segments.steps:.2g} steps of the encoder "
         f"({1e3 * segments.longest / segments.steps:.2g} mrad each), and its response takes "
-        f"{LEAST_PIECE_COUNTS:.0f}. If rig.edge and the sheet's place are right, use an encoder of "
+        f"{math.ceil(takes)}. If rig.edge and the sheet's place are right, use an encoder of "
         f"at least {math.ceil(needed / 1000.0) * 1000:,} counts a turn, or a material that the "
         "blades sink into further."
     )

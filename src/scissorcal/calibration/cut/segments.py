@@ -24,11 +24,11 @@ from scissorcal.calibration.cut.path.runs import FEWEST_SEGMENTS, Run, find_runs
 from scissorcal.calibration.cut.rests import (
     ELASTIC_SEGMENTS,
     LEAST_RANGE_RAD,
-    SHORT_SEGMENT_COUNTS,
     Rest,
     left_for_good,
     place_at_turn,
     placed_by_loading,
+    shortest_segment,
 )
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 
@@ -36,9 +36,6 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-LEAST_SEGMENT_COUNTS = 6.0
-"""Least encoder steps of an elastic segment."""
-LEAST_PIECE_COUNTS = (FEWEST_SEGMENTS + 0.5) * SHORT_SEGMENT_COUNTS  # encoder steps of a piece
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
 """Least length and least teeth of running segments: in shorter ones the teeth are
 fitted as short-range unevenness in place of the long-range one, and intervals get too narrow."""
@@ -101,7 +98,8 @@ class Stretch:
 class Segments:
     """The data of a likelihood of cuts.
 
-    ``longest`` (rad) is the loading or unloading with the most steps of the encoder, ``steps``.
+    ``longest`` (rad) is the loading or unloading with the most segments that an encoder shows,
+    ``segments`` their number, ``steps`` those of the encoder.
     """
 
     motions: tuple[PathMotion, ...]
@@ -110,6 +108,7 @@ class Segments:
     stretches: tuple[Stretch, ...]
     longest: float = 0.0
     steps: float = 0.0
+    segments: float = 0.0
 
 
 def cut_into_segments(
@@ -146,6 +145,7 @@ def cut_into_segments(
         tuple(builder.stretches),
         builder.longest,
         builder.steps,
+        builder.segments,
     )
 
 
@@ -166,6 +166,7 @@ class _Builder:
     stretches: list[Stretch] = field(default_factory=list)
     longest: float = 0.0
     steps: float = 0.0
+    segments: float = 0.0
     sheets: int = 0
     sheet: int = -1
 
@@ -243,12 +244,11 @@ class _Builder:
     def _piece(self, kind: str, index: int, low: int, high: int, length: float) -> None:
         motion = self.motions[index]
         way = abs(float(motion.opening[high] - motion.opening[low]))
-        if motion.resolution > 0.0 and way > self.steps * motion.resolution:
-            self.longest, self.steps = way, way / motion.resolution
-        step = max(length / ELASTIC_SEGMENTS, LEAST_SEGMENT_COUNTS * motion.resolution)
-        fewest = abs(float(motion.opening[high] - motion.opening[low])) / (FEWEST_SEGMENTS + 0.5)
-        step = min(step, max(fewest, SHORT_SEGMENT_COUNTS * motion.resolution))
-        ends = split(motion.opening, low, high, step)
+        shortest = shortest_segment(motion, low, high)
+        if way > self.segments * shortest:
+            self.longest, self.segments = way, way / shortest
+            self.steps = way / motion.resolution
+        ends = split(motion.opening, low, high, max(length / ELASTIC_SEGMENTS, shortest))
         if len(ends) - 1 < FEWEST_SEGMENTS or not np.all(motion.usable[ends[0] : ends[-1] + 1]):
             return
         material = self.materials[index]

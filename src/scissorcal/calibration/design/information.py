@@ -104,8 +104,7 @@ def cut_information(design: CutExperiment, point: Array) -> dict[int, Informatio
     found = {}
     for label in np.unique(design.strokes):
         here = design.strokes == label
-        part = Slopes(*(array[here] for array in vars(slopes).values()))
-        curvature = likelihood_information(problem, point, step, part)
+        curvature = likelihood_information(problem, point, step, slopes.where(here))
         by_kind = {kind: error[here].sum(axis=0) for kind, error in errors.items()}
         found[int(label)] = Information(curvature, curvature, by_kind)
     return found

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.model import FrictionExperiment
-from scissorcal.calibration.friction.slow_friction import slowest_rate
 from scissorcal.calibration.parameters import Layout
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, side_of
@@ -84,7 +83,7 @@ def near_rest_verdict(experiment: FrictionExperiment, draws: Array) -> Verdict:
     of them where no sweep was slow enough. ``draws`` (k, p) are the posterior's, unconstrained. A
     wide interval is no fault of the fit, so the check never fails.
     """
-    slowest = slowest_rate(experiment.bins)
+    slowest = experiment.bins.slowest_rate
     centre, unit = float(experiment.key["angle_center"]), f"{experiment.joint.position_unit}/s"
     named = {name: value[:, None] for name, value in experiment.layout.natural(draws).items()}
     wanted = 0.5 * slowest * np.array([-1.0, 1.0])

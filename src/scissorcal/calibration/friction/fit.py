@@ -17,15 +17,15 @@ from scissorcal.calibration.between import (
     jackknife,
     widened,
 )
-from scissorcal.calibration.comparison import NEGLIGIBLE, choose
 from scissorcal.calibration.effort import candidates_for, draft_note
-from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
+from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.calibration.friction.checks import (
     bandwidth_verdict,
     near_rest_verdict,
     physical_verdict,
     start_verdict,
 )
+from scissorcal.calibration.friction.choice import choose_law, rms
 from scissorcal.calibration.friction.cogging import NO_COGGING, Cogging, find_cogging
 from scissorcal.calibration.friction.lack_of_fit import with_lack_of_fit
 from scissorcal.calibration.friction.model import FrictionExperiment, design
@@ -52,7 +52,7 @@ from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros, zero_verdicts
 from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.inference import Posterior, Stop, infer, tails_of
+from scissorcal.inference import Posterior, Stop, infer
 from scissorcal.model.friction_terms import NUISANCE, needs_load
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.probe import probe_of
@@ -67,13 +67,9 @@ DRAFT_LAWS = {
 }
 """What draft effort fits to a joint where nothing says otherwise."""
 
-PRESLIDING = ("presliding_fine_rad", "presliding_slow_rad", "presliding_slow_share")
-"""Facts of a probe on how friction builds up after a turn, which a fit of cuts takes where windows
-without turns do not show it."""
-
-OUTLIERS = 4.0
-"""Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
-place of normal noise; milder tails are left to the widening by the scores."""
+PRESLIDING = "presliding_fine_rad"
+"""Fact of a probe: the shortest way over which friction builds up after a turn, which a fit of cuts
+takes. A longer one shows in sweeps, and is a term of the law."""
 
 
 def fit_friction(
@@ -114,8 +110,7 @@ def fit_friction(
     settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
     laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
-    compared, chosen = _compare(laws, settings.lack_of_fit, stop, tell)
-    law = next(design for design in laws if design.name == chosen.candidate.name)
+    compared, chosen, law = choose_law(laws, settings.lack_of_fit, stop, tell)
     infer_law = partial(infer, checkpoint=checkpoint, stop=stop, progress=_last_part(tell))
     problem = chosen.candidate.problem(law.series)
     posterior = infer_law(problem, effort, rng, optimum=chosen.optimum)
@@ -149,7 +144,7 @@ def fit_friction(
             sensors.verdict,
             *((broken.verdict("fit.friction"),) if broken.interrupted else ()),
             *((steady.verdict(),) if steady.rows else ()),
-            *zero_verdicts("fit.friction", zero, recordings, _rms(law.observed)),
+            *zero_verdicts("fit.friction", zero, recordings, rms(law.observed)),
             *((between.verdict(),) if between else ()),
         ),
         extra_notes=(
@@ -196,7 +191,8 @@ def friction_experiment(
         cogging,
         zero_sd=zero.sd if zero and _has_offset(fit) else None,
     )
-    return replace(found, tails=float(fit.structure.get("tails", np.inf)))
+    tails = float(fit.structure.get("tails", np.inf))
+    return replace(found, tails=tails, share=float(fit.diagnostics["independent_share"]))
 
 
 def _slid(
@@ -224,40 +220,6 @@ def _has_offset(fit: FitResult) -> bool:
     return any(parameter.name == "offset" for parameter in fit.parameters)
 
 
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def _compare(
-    laws: list[FrictionExperiment], lack_of_fit: float, stop: Stop | None, tell: Progress
-) -> tuple[list[FittedCandidate], FittedCandidate]:
-    """Fit every candidate law and choose one.
-
-    The chosen law is fitted again with a Student-t noise where its residuals have outliers; that
-    fit takes the place of the first. A share ``lack_of_fit`` of the drive that is stated as the
-    law's error is what makes laws differ, and residuals below it have no outliers.
-    """
-    compared: list[FittedCandidate] = []
-    for index, law in enumerate(laws):
-        tell(0.6 * index / len(laws), f"friction: trying {law.name}")
-        compared.append(fit_candidate(law.candidate(law.observed), law.series, law.strokes, stop))
-    drive = _rms(laws[0].observed)
-    chosen = choose(compared, drive, lack_of_fit or NEGLIGIBLE)
-    likelihood = chosen.candidate.likelihood
-    if _rms(likelihood.residuals(chosen.optimum.point)) < lack_of_fit * drive:
-        return compared, chosen
-    tails = tails_of(likelihood.standardised(chosen.optimum.point), chosen.share)
-    if tails > OUTLIERS:
-        return compared, chosen
-    place = next(i for i, one in enumerate(compared) if one.candidate is chosen.candidate)
-    law = laws[place]
-    robust = replace(law, tails=tails).candidate(law.observed)
-    starts = chosen.optimum.point[None, :]
-    again = fit_candidate(replace(robust, starts=starts), law.series, law.strokes)
-    compared[place] = replace(again, equivalent=chosen.equivalent)
-    return compared, compared[place]
-
-
 def _last_part(tell: Progress) -> Progress:
     """The progress of inference, as the last part of the fit's."""
     return lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}")
@@ -278,7 +240,7 @@ def _diagnostics(
     return {
         "window_lengthening": law.windows.lengthening,
         "jackknife_sd": jackknife(law, point, NUISANCE),
-        **{name: seen[name] for name in PRESLIDING if name in seen},
+        **({PRESLIDING: seen[PRESLIDING]} if PRESLIDING in seen else {}),
         **(between.diagnostics() if between else {}),
         **noise_diagnostics(noise),
         "stroke_offset_sd_Nm": stroke_offsets(residuals, law.strokes, law.windows, noise),

@@ -17,6 +17,7 @@ from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.calibration.stated_prior import StatedPrior
+from scissorcal.inference.shear import Shear
 from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, side_of, terms_of
 from scissorcal.model.terms import Role, Term
 from scissorcal.model.transforms import LOG
@@ -34,6 +35,10 @@ LEAST_OFFSET = 1e-3
 """Share of the drive's spread from which a search for the offset begins at least: beside zero it
 would end where it began."""
 
+MOST_FALLEN = 20.0
+"""Logarithm of the logarithm by which Stribeck friction has fallen, to stay within numbers; from 4
+on nothing is left of it."""
+
 SHORT = 0.03
 """Share of the range that is travelled, at which a search for Dahl's length begins."""
 
@@ -46,7 +51,8 @@ class FrictionExperiment:
     discrete choices: ``law``, ``symmetric``, ``angle_center``, ``adopt``, the names of adopted
     terms, and ``cogging_periods_per_turn`` where cogging was found. ``tails`` are the degrees of
     freedom of the noise. ``shared`` are moments that another law over the same windows has made
-    already, if any. ``prior_precision`` (p, p) is that of all parameters together.
+    already, if any. ``prior_precision`` (p, p) is that of all parameters together. ``share`` is the
+    share of the windows that count as independent.
     """
 
     windows: Windows
@@ -56,6 +62,7 @@ class FrictionExperiment:
     prior_precision: Array
     joint: Joint
     tails: float = np.inf
+    share: float = 1.0
     what: Literal["friction", "cut"] = "friction"
     nuisance: tuple[str, ...] = NUISANCE
     shared: StrokeMoments | None = field(default=None, repr=False, compare=False)
@@ -139,7 +146,24 @@ class FrictionExperiment:
             blocks=self.strokes,
             reduced=reduced,
             search=search if reduced else None,
+            share=self.share,
+            shear=self._ridge(),
         )
+
+    def _ridge(self) -> Shear | None:
+        """Coordinates in which Stribeck's level is what is left of it at the slowest rate.
+
+        That is what motion determines; the level at rest and its rate lie along a curved ridge.
+        """
+        names = self.layout.names
+        if not {"stribeck", SCALES[0]} <= set(names):
+            return None
+        slowest = np.log(self.bins.slowest_rate)
+
+        def fallen(log_rate: Array) -> Array:
+            return np.asarray(np.exp(np.minimum(2.0 * (slowest - log_rate), MOST_FALLEN)))
+
+        return Shear(names.index("stribeck"), names.index(SCALES[0]), fallen)
 
     def _reduced(self, measured: Array) -> ReducedLaw | None:
         """The law over products of columns, where its noise is normal."""

@@ -109,6 +109,7 @@ def _least_squares(problem: CandidateProblem, point: Array) -> tuple[Array, int]
     """
     law, count = _law(problem), 0
     mean, precision = problem.prior_mean[:-1], problem.prior_precision[:-1, :-1]
+    weight = np.sqrt(problem.share) * np.exp(-point[-1])
 
     def evaluate(coefficients: Array) -> tuple[Array, Array]:
         nonlocal count
@@ -118,7 +119,7 @@ def _least_squares(problem: CandidateProblem, point: Array) -> tuple[Array, int]
         cell = law.cell_at(u)
         factors, slopes = law.factors_and_slopes(u, cell)
         slopes = np.where(inside == coefficients, slopes, 0.0)
-        columns = np.column_stack([slopes, factors]) * np.exp(-point[-1])
+        columns = np.column_stack([slopes, factors]) * weight
         away = np.column_stack([np.eye(len(mean)), coefficients - mean])
         products = columns.T @ law.summed(cell) @ columns + away.T @ precision @ away
         size = np.sqrt(np.maximum(np.diag(products), TINY))
@@ -132,7 +133,8 @@ def _least_squares(problem: CandidateProblem, point: Array) -> tuple[Array, int]
 
 def _with_best_noise(problem: CandidateProblem, point: Array) -> Array:
     """The point (p,) with the noise at its best for the squares that the law leaves there."""
-    squares, count = _law(problem).squares(point), _law(problem).counted
+    share, law = problem.share, _law(problem)
+    squares, count = share * law.squares(point), share * law.counted
     mean, precision = problem.prior_mean[-1], problem.prior_precision[-1, -1]
     size = 0.5 * np.log(squares / count)
     for _ in range(20):

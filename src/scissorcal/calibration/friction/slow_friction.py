@@ -35,13 +35,6 @@ HELD_FALL = 2.0
 they had not seen (2 to 4 %)."""
 PROPOSALS = 50
 """For each draw: enough that some lie within what the law lacks, where one in ten does."""
-PASSING = 0.01
-"""Share of the motion below whose rate a joint only passes through."""
-
-
-def slowest_rate(bins: Bins) -> float:
-    """The slowest rate (rad/s or m/s) that was swept, not only passed through."""
-    return float(np.quantile(np.abs(bins.rate), PASSING))
 
 
 @dataclass(frozen=True)
@@ -77,7 +70,7 @@ class SlowFriction:
         if np.any(np.sqrt(np.diag(covariance)) > TOLD_SD):
             return None
         covariance = covariance + LEFT_OUT**2 * np.eye(2)
-        return cls((found.mean[at[0]], found.mean[at[1]]), covariance, slowest_rate(bins))
+        return cls((found.mean[at[0]], found.mean[at[1]]), covariance, bins.slowest_rate)
 
     @property
     def held(self) -> bool:

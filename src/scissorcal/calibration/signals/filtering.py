@@ -13,6 +13,10 @@ Integers = NDArray[np.int64]
 BIN_S = 0.005
 
 
+PASSING = 0.01
+"""Share of the motion below whose rate a joint only passes through."""
+
+
 @dataclass(frozen=True)
 class Bins:
     """Band-limited motion and drive in bins of a few milliseconds; all arrays (n,).
@@ -38,6 +42,11 @@ class Bins:
     sheet: Integers
     bin_s: float
     rate_floor: float
+
+    @property
+    def slowest_rate(self) -> float:
+        """The slowest rate (rad/s or m/s) that was swept, not only passed through."""
+        return float(np.quantile(np.abs(self.rate), PASSING))
 
     def where(self, keep: NDArray[np.bool_]) -> "Bins":
         """Return the bins that ``keep`` selects."""

@@ -323,13 +323,11 @@ def _of_swings(swung: Swung) -> dict[str, object]:
     """Estimates and facts of the joint."""
     fit = swung.fit
     joint = fit.joint
-    fall, slow = ("log_rise_share", "log_rise_rate"), ("log_slow", "slow_logit")
+    fall = ("log_rise_share", "log_rise_rate")
     told = {
         "stribeck_Nm": (fit.built_up * joint.rise, fall),
         "stribeck_rate_rad_per_s": (joint.rise_rate, fall),
         "presliding_fine_rad": (joint.fine, ("log_fine",)),
-        "presliding_slow_rad": (joint.slow, slow),
-        "presliding_slow_share": (joint.slow_share, slow),
     }
     return {
         "inertia_kg_m2": fit.inertia,
