@@ -87,6 +87,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "at most",
         "friction at half of the slowest swept rate: half width of its interval, share of it",
     ),
+    "fit inertia": (
+        "at most",
+        "that sweeps and the probe's pushes find one inertia: how far apart, in their sds",
+    ),
     "fit bandwidth": ("at most", f"{_INTERVALS}: sds by which a parameter moves with the cutoff"),
     "fit steady sweeps": (
         "at most",

@@ -37,6 +37,18 @@ def test_the_search_over_products_ends_where_a_search_over_bins_does(fitted):
     assert candidate.optimum(experiment.series).value > slow.value - 1e-3
 
 
+def test_at_the_optimum_the_prior_balances_what_the_windows_are_worth(fitted):
+    """Windows overlap, and count by the share of them that is independent."""
+    _, experiment = fitted
+    candidate = experiment.candidate(experiment.observed)
+    point = candidate.optimum(experiment.series).point
+    assert 0.0 < candidate.share < 0.5
+    pull = candidate.share * candidate.reduced.slope(point)
+    held = candidate.prior_precision @ (point - candidate.prior_mean)
+    size = np.sqrt(np.diag(candidate.share * candidate.reduced.information(point)))
+    assert pull / size == pytest.approx(held / size, abs=1e-3)
+
+
 def test_simulated_data_have_the_priors_of_the_original(fitted):
     _, experiment = fitted
     u = experiment.candidate(experiment.observed).starts[0]

@@ -19,6 +19,7 @@ from scissorcal.calibration.between import (
 )
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate
+from scissorcal.calibration.friction.against_probe import inertia_verdict
 from scissorcal.calibration.friction.checks import (
     bandwidth_verdict,
     near_rest_verdict,
@@ -140,6 +141,7 @@ def fit_friction(
             physical_verdict(law, chosen.optimum.point, chosen.share),
             start_verdict(law, chosen.optimum.point),
             near_rest_verdict(law, posterior.draws),
+            *((heavy,) if (heavy := inertia_verdict(law, posterior.draws, recordings)) else ()),
             _bandwidth(again, law, chosen, posterior, effort),
             sensors.verdict,
             *((broken.verdict("fit.friction"),) if broken.interrupted else ()),

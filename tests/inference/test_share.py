@@ -1,0 +1,56 @@
+"""A likelihood counts by the share of its terms that are independent."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scissorcal.inference import Problem, find_optimum, infer
+from scissorcal.inference.laplace import shape_at
+from tests.inference.test_long_run import regression, sweeps
+
+TIMES = 40
+COUNT = 600
+
+
+def problems(believed: float = 0.01) -> tuple[Problem, Problem]:
+    """Sweeps with an offset that a prior of sd ``believed`` nearly knows: once, and 40 times."""
+    rng = np.random.default_rng(3)
+    columns = np.column_stack([np.ones(COUNT), sweeps(COUNT)])
+    measured = columns @ np.array([0.3, 1.0, 0.5, 0.2]) + 0.5 * rng.standard_normal(COUNT)
+    series = np.zeros(COUNT, dtype=np.int64)
+
+    def log_prior(u: np.ndarray) -> float:
+        return -0.5 * float((u[0] / believed) ** 2 + np.sum((u[1:] / 50.0) ** 2))
+
+    once = replace(regression(columns, measured, series), log_prior=log_prior)
+    often = regression(
+        np.tile(columns, (TIMES, 1)), np.tile(measured, TIMES), np.repeat(np.arange(TIMES), COUNT)
+    )
+    return once, replace(often, log_prior=log_prior, share=1.0 / TIMES)
+
+
+def test_what_is_said_forty_times_is_worth_what_it_is_worth_once() -> None:
+    once, often = problems()
+    there, here = find_optimum(once).point, find_optimum(often).point
+    assert here == pytest.approx(there, abs=1e-5)
+    assert often.log_posterior(there) == pytest.approx(once.log_posterior(there))
+    shapes = [shape_at(one, there) for one in (once, often)]
+    assert shapes[1].information == pytest.approx(shapes[0].information, rel=1e-6, abs=1e-6)
+    assert shapes[1].slope == pytest.approx(shapes[0].slope, abs=1e-6)
+
+
+def test_terms_in_full_overrule_a_prior_that_a_share_heeds() -> None:
+    """Forty times 600 terms move the offset to 0.29, 29 of its prior's sds; a share of them 2."""
+    _, often = problems()
+    heeded, overruled = (find_optimum(one).point[0] for one in (often, replace(often, share=1.0)))
+    assert heeded < 0.06
+    assert overruled > 4.0 * heeded
+
+
+def test_intervals_are_those_of_the_independent_terms() -> None:
+    """The scores' covariance then widens nothing further, but for its own noise."""
+    once, often = problems()
+    plain = infer(replace(once, independent=True), "draft", np.random.default_rng(0))
+    shared = infer(replace(often, independent=True), "draft", np.random.default_rng(0))
+    assert shared.covariance == pytest.approx(plain.covariance, rel=1e-3, abs=1e-9)
