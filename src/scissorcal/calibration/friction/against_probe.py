@@ -37,8 +37,8 @@ def inertia_verdict(
         f"{apart:.2g} standard deviations apart"
     )
     coarse = (
-        "the encoder's steps hide how these sweeps swing. Sweep faster (capture.friction), or use "
-        "a finer encoder"
+        "the encoder's steps hide how these sweeps swing. Add faster sweeps "
+        "(capture.friction.speeds_rad_per_s), or use a finer encoder"
     )
     changed = "probe again, with what is on the blades now, and capture anew"
     cure = coarse if law.windows.lengthening > 1.0 else changed
