@@ -4,7 +4,7 @@ It stands here, and not with the probe, because it travels in recordings: a fit 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from datetime import datetime
 from typing import Any, Literal
@@ -161,6 +161,12 @@ def probe_of(device: Mapping[str, Any]) -> ProbeResult | None:
     """The probe that a recording's ``device`` holds; None where it was made without one."""
     plain = device.get(PROBE_KEY)
     return None if plain is None else probe_from_dict(plain)
+
+
+def newest_probe(devices: Iterable[Mapping[str, Any]]) -> ProbeResult | None:
+    """The latest probe that the ``device`` of any recording holds; None where none does."""
+    made = [found for device in devices if (found := probe_of(device)) is not None]
+    return max(made, key=lambda one: one.made_at, default=None)
 
 
 def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:

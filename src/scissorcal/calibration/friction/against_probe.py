@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.model import FrictionExperiment
-from scissorcal.recording.probe import Estimate, probe_of
+from scissorcal.recording.probe import Estimate, newest_probe
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, judge
 
@@ -24,8 +24,8 @@ def inertia_verdict(
     coarse, blades swing by less than a step: what moves them is then taken for inertia. ``draws``
     (k, p) are the posterior's, unconstrained.
     """
-    made = [probe for one in recordings if (probe := probe_of(one.device)) is not None]
-    pushed = max(made, key=lambda one: one.made_at).inertia_kg_m2 if made else None
+    probe = newest_probe(one.device for one in recordings)
+    pushed = probe.inertia_kg_m2 if probe else None
     if pushed is None or law.joint.kind != "rotary":
         return None
     every = law.layout.natural(draws)["inertia"]

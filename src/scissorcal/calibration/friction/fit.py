@@ -56,7 +56,7 @@ from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import Posterior, Stop, infer
 from scissorcal.model.friction_terms import NUISANCE, needs_load
 from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.probe import probe_of
+from scissorcal.recording.probe import newest_probe
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict, not_evaluated
 
@@ -236,8 +236,8 @@ def _diagnostics(
     """What a fit stores beside its parameters: noise, scatter of strokes and of recordings."""
     point = chosen.optimum.point
     noise = sample_noise(law, point, idle_noise(recordings))
-    probes = [probe for one in recordings if (probe := probe_of(one.device)) is not None]
-    seen = probes[-1].facts if probes else {}
+    probe = newest_probe(one.device for one in recordings)
+    seen = probe.facts if probe else {}
     residuals = chosen.candidate.likelihood.residuals(point)
     return {
         "window_lengthening": law.windows.lengthening,

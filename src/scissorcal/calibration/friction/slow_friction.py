@@ -59,12 +59,12 @@ class SlowFriction:
         None without one, for a linear joint, where its pushes did not tell both values, and where a
         recipe states a prior of either.
         """
-        made = [found for found in map(_probe, recordings) if found is not None]
+        probe = probes.newest_probe(one.device for one in recordings)
+        found = probe.posterior if probe else None
         stated = settings.priors.rotary.model_fields_set & {_key(name) for name in FOUND}
-        if not made or stated or recordings[0].joint.kind != "rotary":
+        told = found is not None and set(FOUND.values()) <= set(found.names)
+        if found is None or not told or stated or recordings[0].joint.kind != "rotary":
             return None
-        found = max(made, key=lambda one: one.made_at).posterior
-        assert found is not None
         at = [found.names.index(name) for name in FOUND.values()]
         covariance = np.array(found.covariance)[np.ix_(at, at)]
         if np.any(np.sqrt(np.diag(covariance)) > TOLD_SD):
@@ -129,13 +129,6 @@ def opened(
     draws[:, level] = np.take_along_axis(levels, chosen, 1)[:, 0]
     draws[:, rate] = np.take_along_axis(tried[..., 1], chosen, 1)[:, 0]
     return replace(posterior, draws=draws)
-
-
-def _probe(recording: Recording) -> probes.ProbeResult | None:
-    """The recording's probe, if it has a posterior of slow friction."""
-    probe = probes.probe_of(recording.device)
-    names = set(probe.posterior.names) if probe and probe.posterior else set()
-    return probe if set(FOUND.values()) <= names else None
 
 
 def _key(name: str) -> str:

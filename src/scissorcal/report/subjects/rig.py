@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scissorcal.recording.probe import ESTIMATES, Estimate, ProbeResult, Swing, probe_of
+from scissorcal.recording.probe import ESTIMATES, Estimate, ProbeResult, Swing, newest_probe
 from scissorcal.report.inputs import RecordingSummary
 from scissorcal.report.panel import (
     Axis,
@@ -25,10 +25,9 @@ LOOKS: tuple[Look, ...] = ("blue", "vermillion", "green", "purple", "orange", "i
 
 def rig_panels(recordings: Sequence[RecordingSummary]) -> tuple[Panel, ...]:
     """What the latest probe in the recordings says; none where none was probed."""
-    probes = [found for one in recordings if (found := probe_of(one.device)) is not None]
-    if not probes:
+    last = newest_probe(one.device for one in recordings)
+    if last is None:
         return ()
-    last = max(probes, key=lambda one: one.made_at)
     rows = [
         _row(name, found, scale, unit)
         for name, key, scale, unit in ESTIMATES
