@@ -109,8 +109,10 @@ def test_a_list_grows_by_what_gains_most_per_minute() -> None:
     """Fast sweeps tell as much as slow ones here, in a tenth of the time."""
     design = choose_captures(known(tolerance=0.05), stock())
     added = design.captures.speeds[3:]
-    assert added
-    assert set(added) == {1.0}
+    assert added[0] == 1.0
+    counts = {speed: design.captures.speeds.count(speed) for speed in (0.05, 0.2, 1.0)}
+    assert counts[1.0] == max(counts.values())
+    assert counts[1.0] <= 2 * min(counts.values()), "the law that is assumed may lack something"
     assert design.expected.reached
     later = list(design.steps[2:])
     assert all(step.gain > 0 for step in later if step.minutes > 0)
