@@ -7,6 +7,7 @@ import pytest
 
 from scissorcal.inference import Problem, find_optimum, infer
 from scissorcal.inference.laplace import shape_at
+from scissorcal.inference.long_run import long_run_covariance
 from tests.inference.test_long_run import regression, sweeps
 
 TIMES = 40
@@ -41,16 +42,36 @@ def test_what_is_said_forty_times_is_worth_what_it_is_worth_once() -> None:
 
 
 def test_terms_in_full_overrule_a_prior_that_a_share_heeds() -> None:
-    """Forty times 600 terms move the offset to 0.29, 29 of its prior's sds; a share of them 2."""
+    """Forty times 600 terms move the offset to 0.30, 30 of its prior's sds; a share of them 5."""
     _, often = problems()
     heeded, overruled = (find_optimum(one).point[0] for one in (often, replace(often, share=1.0)))
     assert heeded < 0.06
     assert overruled > 4.0 * heeded
 
 
-def test_intervals_are_those_of_the_independent_terms() -> None:
-    """The scores' covariance then widens nothing further, but for its own noise."""
-    once, often = problems()
-    plain = infer(replace(once, independent=True), "draft", np.random.default_rng(0))
-    shared = infer(replace(often, independent=True), "draft", np.random.default_rng(0))
-    assert shared.covariance == pytest.approx(plain.covariance, rel=1e-3, abs=1e-9)
+def test_the_scores_covariance_counts_the_share_twice() -> None:
+    """So that what it says of the data, H J^-1 H, does not depend on the share."""
+    once, _ = problems()
+    point = find_optimum(once).point
+    whole, half = (
+        long_run_covariance(one, shape.scores, shape.slopes).covariance
+        for one in (once, replace(once, share=0.5))
+        for shape in (shape_at(one, point),)
+    )
+    assert half == pytest.approx(0.25 * whole, abs=1e-6 * whole.max())
+
+
+def test_intervals_tell_of_a_share_that_they_are_wider_for_it() -> None:
+    once, _ = problems(believed=50.0)
+    plain = infer(once, "draft", np.random.default_rng(0))
+    shared = infer(replace(once, share=0.25), "draft", np.random.default_rng(0))
+    assert shared.inflation[1:-1] == pytest.approx(2.0 * np.ones(3), rel=0.1)
+    assert plain.inflation[1:-1] == pytest.approx(np.ones(3), rel=0.1)
+
+
+def test_a_search_without_squares_weighs_a_share_alike() -> None:
+    """Student-t terms are searched by values; with many degrees of freedom they are normal."""
+    _, often = problems()
+    here = find_optimum(often).point
+    there = find_optimum(replace(often, standardised=None)).point
+    assert there == pytest.approx(here, abs=2e-3)

@@ -101,7 +101,8 @@ class Candidate:
     ``blocks`` and ``populations`` (n,) are as in :class:`scissorcal.inference.problem.Problem`.
     ``reduced`` is the same model over sums by stroke, where it has them. ``search`` finds the
     optimum where the model has a quicker way than :func:`~.optimise.find_optimum`. ``share`` is
-    the share of bins that count as independent, ``shear`` coordinates in which a ridge is straight.
+    the share of bins that count as independent, where it is known, ``shear`` coordinates in which a
+    ridge is straight.
     """
 
     name: str
@@ -115,7 +116,7 @@ class Candidate:
     populations: Integers | None = None
     reduced: StrokeSums | None = None
     search: Callable[[CandidateProblem], Optimum] | None = None
-    share: float = 1.0
+    share: float | None = None
     shear: Shear | None = None
 
     def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> CandidateProblem:
@@ -153,7 +154,7 @@ class Candidate:
             tails=self.likelihood.tails,
             populations=kept(self.populations),
             blocks=kept(self.blocks),
-            share=self.share,
+            share=1.0 if self.share is None else self.share,
             shear=self.shear,
         )
 
@@ -234,7 +235,7 @@ def fit_candidate(
     arXiv:1711.05305). ``stop`` says whether the time allowed for the search is used up.
     """
     counter = Counter()
-    candidate, optimum = _searched(candidate, series, stop)
+    candidate, optimum, before = _searched(candidate, series, stop)
     problem = counter.over(candidate.problem(series))
     point, likelihood = optimum.point, candidate.likelihood
     white = ljung_box(likelihood.standardised(point), series)
@@ -253,29 +254,30 @@ def fit_candidate(
         scores=np.array([densities[strokes == label].sum() for label in labels]),
         held_out_residuals=residuals,
         information=without.information,
-        log_likelihood=problem.log_likelihood(point) / candidate.share,
-        share=candidate.share if candidate.share < 1.0 else white.share,
+        log_likelihood=problem.log_likelihood(point) / problem.share,
+        share=white.share if candidate.share is None else candidate.share,
         series=series,
         strokes=strokes,
-        fitting=counter.calls + optimum.evaluations,
+        fitting=counter.calls + before + optimum.evaluations,
     )
 
 
 def _searched(
     candidate: Candidate, series: Integers, stop: Stop | None
-) -> tuple[Candidate, Optimum]:
+) -> tuple[Candidate, Optimum, int]:
     """The candidate with the share of its bins that are independent, and its optimum with that.
+
+    The last number are evaluations of a search before that one.
 
     Only sums by stroke are dense enough for it to matter, and cheap enough to be searched again:
     windows overlap, and 46,000 of them moved an offset by 8 standard deviations of its prior.
     """
     optimum = candidate.optimum(series, stop)
-    if candidate.reduced is None or candidate.share < 1.0:
-        return candidate, optimum
+    if candidate.reduced is None or candidate.share is not None:
+        return candidate, optimum, 0
     white = ljung_box(candidate.likelihood.standardised(optimum.point), series)
-    starts = np.vstack([optimum.point, candidate.starts])
-    weighed = replace(candidate, share=white.share, starts=starts)
-    return weighed, weighed.optimum(series, stop)
+    weighed = replace(candidate, share=white.share)
+    return weighed, weighed.optimum(series, stop), optimum.evaluations
 
 
 def split_strokes(labels: Integers) -> list[Integers]:
@@ -315,9 +317,9 @@ class _Refits:
             seen = ~np.isin(self.strokes, fold)
             share, slope = float(np.mean(seen)), self._scores[seen].sum(axis=0)
             others = self.counter.over(candidate.problem(self.problem.series, seen))
-        slope = candidate.share * slope
+        slope = self.problem.share * slope
         slope = slope - candidate.prior_precision @ (point - candidate.prior_mean)
-        precision = share * candidate.share * self.information + candidate.prior_precision
+        precision = share * self.problem.share * self.information + candidate.prior_precision
         return _step_uphill(others, point, _newton(precision, slope))
 
 

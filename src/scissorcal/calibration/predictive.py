@@ -60,7 +60,7 @@ def _noise(fitted: FittedCandidate, count: int, rng: np.random.Generator) -> Arr
     """Draws of the noise (count, n): autoregressive, with the likelihood's standard deviations.
 
     The autoregression is fitted to the residuals at the optimum over these standard deviations,
-    within each series without a gap: the likelihood itself takes points as independent.
+    within each series without a gap: the likelihood itself counts a share of the points.
     """
     likelihood, point = fitted.candidate.likelihood, fitted.optimum.point
     sd = np.exp(likelihood.normal(point)[1])

@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.inference.counting import Counter, Stop, TimeUsedUpError
-from scissorcal.inference.importance import GOOD_K, Sampled, sample_by_importance, sample_by_mixture
+from scissorcal.inference.importance import (
+    GOOD_K,
+    Sampled,
+    pooled,
+    sample_by_importance,
+    sample_by_mixture,
+)
 from scissorcal.inference.laplace import Laplace, Shape, laplace, local_covariance, polish
 from scissorcal.inference.long_run import long_run_covariance
 from scissorcal.inference.mixture import Mixture
@@ -25,7 +31,7 @@ Progress = Callable[[float, str], None]
 BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
 """Evaluations that sampling may take where the caller says nothing."""
 
-MIXTURE_ROUNDS = 5
+MIXTURE_ROUNDS, MIXTURES = 5, 3
 LEAST_HELD = 1e-4
 """Curvature of a log-posterior, in units of the prior's width, below which nothing holds a point;
 a normal prior alone gives one."""
@@ -49,8 +55,9 @@ def infer(
 ) -> Posterior:
     """Infer a posterior whose likelihood terms may be autocorrelated.
 
-    The optimum is that of the posterior as given. Its curvature H treats all terms as
-    independent; the scores' long-run covariance J tells what they are really worth. The
+    The optimum is that of the posterior as given. Its curvature H counts all terms, or the
+    problem's share of them, as independent; the scores' long-run covariance J tells what they are
+    worth along each direction. The
     likelihood is therefore stretched about its optimum so that its curvature becomes
     H J^-1 H, which gives intervals their stated coverage although the noise is coloured or the
     model not quite true (Chandler and Bate 2007, doi:10.1093/biomet/asm015). Where the problem
@@ -90,7 +97,7 @@ def infer(
     if stop is not None:
         local = laplace(counter.over(problem, stop), shape, spread)
     target = _target(problem.shear, local, proposal)
-    run = _Run(problem.names, local.null, target, counter, rng, count, tell)
+    run = _Run(problem, local, target, counter, rng, count, tell)
     try:
         found = run.at(effort, problem, budget or BUDGET[effort], escalate, checkpoint)
     except NotFiniteError as error:
@@ -101,7 +108,7 @@ def infer(
     return Posterior(
         names=problem.names,
         optimum=best,
-        draws=np.clip(target.bent(found.draws), problem.lower, problem.upper),
+        draws=found.draws,
         covariance=local.covariance,
         k_hat=found.k_hat,
         effective=found.effective,
@@ -155,7 +162,7 @@ def _proposal(problem: Problem, best: Optimum, local: Laplace) -> Mixture:
 
 @dataclass(frozen=True)
 class _Target:
-    """What is sampled, in the coordinates in which it is: density, first proposal, normal shape.
+    """What is sampled, in the coordinates in which it is: its density and the first proposal.
 
     ``bent`` leads back to the parameters' own coordinates.
     """
@@ -163,22 +170,18 @@ class _Target:
     log_posterior: Callable[[Array], float]
     log_posteriors: Callable[[Array], Array]
     proposal: Mixture
-    centre: Array
-    covariance: Array
     bent: Callable[[Array], Array]
 
 
 def _target(shear: Shear | None, local: Laplace, proposal: Mixture) -> _Target:
     one, many, centre = local.log_posterior, local.log_posteriors, local.centre
-    if shear is None:
-        return _Target(one, many, proposal, centre, local.covariance, lambda draws: draws)
+    if shear is None or not shear.serves(centre):
+        return _Target(one, many, proposal, lambda draws: draws)
     bent = shear.bent
     return _Target(
         log_posterior=lambda point: one(bent(point)),
         log_posteriors=lambda points: many(bent(points)),
         proposal=shear.mixture(proposal),
-        centre=shear.straight(centre),
-        covariance=shear.covariance(centre, local.covariance),
         bent=bent,
     )
 
@@ -201,8 +204,8 @@ class _Found:
 
 @dataclass(frozen=True)
 class _Run:
-    names: tuple[str, ...]
-    null: tuple[str, ...]
+    problem: Problem
+    local: Laplace
     target: _Target
     counter: Counter
     rng: np.random.Generator
@@ -228,13 +231,14 @@ class _Run:
 
     def draft(self) -> _Found:
         draws = self.rng.multivariate_normal(
-            self.target.centre, self.target.covariance, size=self.count, method="cholesky"
+            self.local.centre, self.local.covariance, size=self.count, method="cholesky"
         )
-        status = SamplingStatus.FLAT if self.null else SamplingStatus.APPROXIMATED
+        draws = np.clip(draws, self.problem.lower, self.problem.upper)
+        status = SamplingStatus.FLAT if self.local.null else SamplingStatus.APPROXIMATED
         sentence = status.value
-        if self.null:
-            sentence += f" It concerns {'; '.join(self.null)}."
-        nothing = np.full(len(self.names), np.nan)
+        if self.local.null:
+            sentence += f" It concerns {'; '.join(self.local.null)}."
+        nothing = np.full(len(self.problem.names), np.nan)
         return _Found(draws, "draft", status, sentence, float(self.count), np.nan, nothing, nothing)
 
     def out_of_time(self) -> _Found:
@@ -253,9 +257,7 @@ class _Run:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
             rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // self.count - 2)
             if rounds > 0:
-                mixed = sample_by_mixture(
-                    target, sampled, proposal, self.count, self.rng, rounds, many
-                )
+                mixed = self._mixed(sampled, rounds, budget)
                 said += f", {mixed.k_hat:.2f} with an adapted mixture"
                 # Weights that passed are not refused by the stricter limit of a better proposal.
                 passed = sampled.trusted and mixed.k_hat < sampled.k_hat
@@ -263,12 +265,39 @@ class _Run:
         if sampled.trusted or not escalate:
             return self._weighed(sampled, said)
         left = budget - (self.counter.calls - first)
-        wanted = fewest_evaluations(len(self.names))
+        wanted = fewest_evaluations(len(self.problem.names))
         if left < wanted:
             said += f"; ensembles need at least {wanted} evaluations and {left} are left"
             return self._weighed(sampled, said)
         self.tell(0.6, f"{said}: running ensembles")
         return self._walked(left, checkpoint, sampled, f"Escalated from standard ({said}). ")
+
+    def _mixed(self, sampled: Sampled, rounds: int, budget: int) -> Sampled:
+        """Draws of a mixture, and of a further one made from them, until all are trusted together.
+
+        Each mixture's draws are judged before they make another one, so that they stay what they
+        were judged as; a k-hat near its limit is told apart by more of them.
+        """
+        target = self.target
+        judged: list[Sampled] = []
+        one = together = sampled
+        while len(judged) < MIXTURES:
+            one = sample_by_mixture(
+                target.log_posterior,
+                one,
+                target.proposal,
+                self.count,
+                self.rng,
+                rounds,
+                target.log_posteriors,
+            )
+            judged.append(one)
+            together = replace(pooled(judged), limit=one.limit, evaluations=one.evaluations)
+            if together.trusted or one.k_hat == np.inf:
+                break
+            if one.evaluations + (rounds + 2) * self.count > budget:
+                break
+        return together
 
     def thorough(self, budget: int, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "checking the approximation")
@@ -284,9 +313,9 @@ class _Run:
 
     def _weighed(self, sampled: Sampled, said: str) -> _Found:
         status = SamplingStatus.WEIGHED if sampled.trusted else SamplingStatus.HEAVY_WEIGHTS
-        nothing = np.full(len(self.names), np.nan)
+        nothing = np.full(len(self.problem.names), np.nan)
         return _Found(
-            draws=sampled.resample(self.count, self.rng),
+            draws=self.target.bent(sampled.resample(self.count, self.rng)),
             reached="standard",
             status=status,
             sentence=f"{status.value} ({said}.)",
@@ -309,10 +338,10 @@ class _Run:
             progress=lambda done, sentence: self.tell(0.5 + 0.5 * done, sentence),
         )
         return _Found(
-            draws=_thinned(chains, self.count, self.rng),
+            draws=self.target.bent(_thinned(chains, self.count, self.rng)),
             reached="thorough",
             status=chains.status,
-            sentence=before + _said(chains, self.names),
+            sentence=before + _said(chains, self.problem.names),
             effective=chains.effective,
             k_hat=sampled.k_hat,
             r_hat=chains.r_hat,

@@ -172,8 +172,8 @@ def laplace(problem: Problem, shape: Shape, spread: Array | None) -> Laplace:
     """Approximate a posterior at its optimum by a normal distribution.
 
     ``spread`` (p, p) is the covariance of the sum of scores as autocorrelation makes it; None
-    where the terms are independent. The information H treats all terms as independent; where they
-    are not, the likelihood is stretched about its optimum so that its curvature becomes
+    where the terms are independent. The information H counts their share as independent; where it
+    says too much, the likelihood is stretched about its optimum so that its curvature becomes
     H J^-1 H, with J the ``spread`` (Chandler and Bate 2007, doi:10.1093/biomet/asm015).
     """
     scale, point = problem.prior_sd, shape.point
@@ -184,7 +184,7 @@ def laplace(problem: Problem, shape: Shape, spread: Array | None) -> Laplace:
     )
     covariance = _inverse(robust + shape.curvature_prior, scale)
     slope = shape.slope_prior + stretch.T @ shape.scores.sum(axis=0)
-    naive = _inverse(shape.information + shape.curvature_prior, scale)
+    naive = _inverse(shape.information / problem.share + shape.curvature_prior, scale)
 
     def log_posterior(u: Array) -> float:
         if np.any(u < problem.lower) or np.any(u > problem.upper):
@@ -250,8 +250,8 @@ def _inverse(precision: Array, scale: Array, least: float = LEAST_INFORMATION) -
 def _stretch(information: Array, spread: Array, scale: Array) -> tuple[Array, Array]:
     """The map C of Chandler and Bate and the robust information H J^-1 H, both (p, p).
 
-    Along directions where the scores vary less than their information says, which negative
-    autocorrelation can bring about, the information is kept: robustness only widens.
+    Along directions where the scores vary less than their information says, as those do that change
+    faster than the noise's memory, the information is kept: robustness only widens.
     """
     unit = np.outer(scale, scale)
     H = information * unit + RIDGE * np.eye(len(scale))

@@ -308,7 +308,7 @@ def _rounding(problem: Problem, point: Array) -> Array:
     ]
     scaled = np.stack(columns, axis=-1)
     scaled = np.where(np.abs(scaled) < HUGE, scaled, 0.0)
-    information = scaled.T @ scaled + np.eye(len(point))
+    information = problem.share * scaled.T @ scaled + np.eye(len(point))
     values, vectors = np.linalg.eigh(information)
     values = np.maximum(values, 1.0)  # exact ones are; rounding of large ones leaves some below 0
     return np.asarray(problem.prior_sd[:, None] * vectors / np.sqrt(values))

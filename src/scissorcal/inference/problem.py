@@ -38,7 +38,7 @@ class Problem:
 
     ``log_posterior_many`` gives, where the model can work out many points at once, the sum of
     prior and likelihood at points (k, p), shape (k,); what is not finite counts as -inf. Bounds
-    need not be looked at. It is then used for single points too.
+    need not be looked at. It is then used for single points too, and knows of no share.
 
     ``smooth`` says that the log-posterior has continuous second derivatives, so that a search may
     go by differences where there are no squares.
@@ -67,6 +67,10 @@ class Problem:
     smooth: bool = False
     shear: Shear | None = None
     tally: Callable[[], None] | None = None
+
+    def __post_init__(self) -> None:
+        if self.log_posterior_many is not None and self.share != 1.0:
+            raise ValueError("a posterior of many points at once counts all of its terms")
 
     def log_likelihood(self, point: Array) -> float:
         """Sum of the likelihood's terms; -inf where any of them is not finite."""
@@ -101,8 +105,7 @@ class Problem:
             return np.array([self.log_likelihood(point) for point in points])
         prior = np.array([float(self.log_prior(point)) for point in points])
         if not np.all(np.isfinite(prior)):
-            terms = self.log_likelihood_terms
-            sums = self.share * np.array([float(np.sum(terms(u))) for u in points])
+            sums = np.array([float(np.sum(self.log_likelihood_terms(u))) for u in points])
             return np.where(np.isfinite(sums), sums, -np.inf)
         heights = np.asarray(self.log_posterior_many(points)) - prior
         return np.where(np.isfinite(heights), heights, -np.inf)

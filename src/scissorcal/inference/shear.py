@@ -19,11 +19,17 @@ class Shear:
 
     Where data determine a combination of two parameters, the posterior is a curved ridge, and no
     Student-t fits it. Such a change of one coordinate has a Jacobian of 1: densities are the same.
+    At points whose ``bend`` is beyond ``most`` there is no such ridge.
     """
 
     place: int
     other: int
     bend: Callable[[Array], Array]
+    most: float = np.inf
+
+    def serves(self, point: Array) -> bool:
+        """Whether a posterior with its optimum at ``point`` (p,) has the ridge."""
+        return bool(self.bend(point[self.other]) <= self.most)
 
     def straight(self, points: Array) -> Array:
         """Points (..., p) in the coordinates in which the ridge is straight.
@@ -44,11 +50,6 @@ class Shear:
         moved = np.array(points, dtype=np.float64)
         moved[..., self.place] += self.bend(moved[..., self.other])
         return moved
-
-    def covariance(self, centre: Array, covariance: Array) -> Array:
-        """A covariance (p, p) about ``centre`` (p,), both in the parameters' own coordinates."""
-        slope = self._slope(centre)
-        return np.asarray(slope @ covariance @ slope.T)
 
     def mixture(self, mixture: Mixture) -> Mixture:
         """A mixture of the parameters' own coordinates, component by component."""

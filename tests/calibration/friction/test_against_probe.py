@@ -42,7 +42,7 @@ def test_sweeps_may_differ_by_what_both_measurements_are_off(share: float, statu
     assert judged(share * PUSHED, recording(NOW)).status == status
 
 
-@pytest.mark.parametrize(("coarse", "cure"), [(True, "Add faster sweeps"), (False, "probe again")])
+@pytest.mark.parametrize(("coarse", "cure"), [(True, "Add faster sweeps"), (False, "Probe again")])
 def test_the_cause_is_the_encoder_only_where_windows_had_to_be_longer(
     coarse: bool, cure: str
 ) -> None:

@@ -17,8 +17,8 @@ Mask = NDArray[np.bool_]
 ELASTIC_SEGMENTS = 8
 """Segments between touching and the deepest point of an elastic piece."""
 PATH_ERROR = 0.06
-"""Largest share of an elastic segment that its ends are off by (sd). Behind 8,192 counts a turn the
-smoothed opening is off by 0.09 of a step, so that a segment has 2; unloading paper there has 9."""
+"""Largest error (sd) of an elastic segment's length, as a share of it. Behind 8,192 counts a turn
+the smoothed opening is off by 0.09 of a step, so a segment has 2; unloading paper there has 9."""
 PLACING = 2.0
 """Length of the segments that place a crack, in those of a fit, which knows the error of each: with
 shorter ones, behind 8,000 counts a turn, an unloading placed a crack 0.3 mm off."""

@@ -35,6 +35,9 @@ KAPPAS = np.linspace(0.05, 0.985, 188)
 MOST_SDS = 4.0
 """A line is rejected where it lies more standard deviations from the rest of the data."""
 
+FEWEST_FOR_A_PIECE = FEWEST_SEGMENTS + 0.5
+"""Shortest segments of a loading or unloading from which it surely makes a piece."""
+
 MOST_EVALUATIONS = 10_000
 """Likelihoods after which a preliminary search ends; those of virtual days take 240 to 1,300."""
 LARGEST_MISFIT = 100.0
@@ -117,17 +120,16 @@ def scout(
 
 
 def refuse_coarse(segments: Segments) -> None:
-    """Raise CoarseEncoderError where no loading or unloading has steps enough."""
-    whole = FEWEST_SEGMENTS + 0.5
-    if not 0.0 < segments.segments < whole:
+    """Raise CoarseEncoderError where no loading or unloading has segments enough."""
+    if not 0.0 < segments.most_segments < FEWEST_FOR_A_PIECE:
         return
-    takes = whole / segments.segments * segments.steps
-    needed = takes * 2.0 * math.pi / segments.longest
+    steps = FEWEST_FOR_A_PIECE / segments.most_segments * segments.steps
+    needed = steps * 2.0 * math.pi / segments.longest
     raise CoarseEncoderError(
         f"the blades load and unload the material over {1e3 * segments.longest:.2g} mrad of "
         f"opening, {segments.steps:.2g} steps of the encoder "
         f"({1e3 * segments.longest / segments.steps:.2g} mrad each), and its response takes "
-        f"{math.ceil(takes)}. If rig.edge and the sheet's place are right, use an encoder of "
+        f"{math.ceil(steps)}. If rig.edge and the sheet's place are right, use an encoder of "
         f"at least {math.ceil(needed / 1000.0) * 1000:,} counts a turn, or a material that the "
         "blades sink into further."
     )

@@ -99,7 +99,7 @@ class Segments:
     """The data of a likelihood of cuts.
 
     ``longest`` (rad) is the loading or unloading with the most segments that an encoder shows,
-    ``segments`` their number, ``steps`` those of the encoder.
+    ``most_segments`` their number, ``steps`` those of the encoder.
     """
 
     motions: tuple[PathMotion, ...]
@@ -108,7 +108,7 @@ class Segments:
     stretches: tuple[Stretch, ...]
     longest: float = 0.0
     steps: float = 0.0
-    segments: float = 0.0
+    most_segments: float = 0.0
 
 
 def cut_into_segments(
@@ -145,7 +145,7 @@ def cut_into_segments(
         tuple(builder.stretches),
         builder.longest,
         builder.steps,
-        builder.segments,
+        builder.most_segments,
     )
 
 
@@ -166,7 +166,7 @@ class _Builder:
     stretches: list[Stretch] = field(default_factory=list)
     longest: float = 0.0
     steps: float = 0.0
-    segments: float = 0.0
+    most_segments: float = 0.0
     sheets: int = 0
     sheet: int = -1
 
@@ -245,8 +245,8 @@ class _Builder:
         motion = self.motions[index]
         way = abs(float(motion.opening[high] - motion.opening[low]))
         shortest = shortest_segment(motion, low, high)
-        if way > self.segments * shortest:
-            self.longest, self.segments = way, way / shortest
+        if way > self.most_segments * shortest:
+            self.longest, self.most_segments = way, way / shortest
             self.steps = way / motion.resolution
         ends = split(motion.opening, low, high, max(length / ELASTIC_SEGMENTS, shortest))
         if len(ends) - 1 < FEWEST_SEGMENTS or not np.all(motion.usable[ends[0] : ends[-1] + 1]):

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 STEP = 1e-3
 """Step in prior standard deviations by which a friction law's mean is differentiated."""
+SILENT, TINY = 1e-10, 1e-300
+"""Share of the largest curvature below which a stroke tells nothing, and the least size of one."""
 LAGS = 60
 """Windows over which their noise is correlated at most: 0.3 s."""
 
@@ -64,14 +66,14 @@ def friction_information(
 ) -> dict[int, Information]:
     """Information of each empty stroke by its label, at ``point`` (p,).
 
-    The fit takes its windows as independent, with curvature H = sum x x' / s^2, x the slopes of the
-    drive. Their noise is correlated: with its covariance R from ``noise`` by sample, and strokes
+    Windows that are independent have curvature H = sum x x' / s^2, x the slopes of the drive. Their
+    noise is correlated: with its covariance R from ``noise`` by sample, and strokes
     that differ by ``stroke_sd`` (N m), the score has the covariance
 
         J = sum_strokes (x' R x + stroke_sd^2 (sum x)(sum x)') / s^4,
 
     and the data are worth H J^-1 H, to which the fit stretches its likelihood (Chandler and Bate
-    2007, doi:10.1093/biomet/asm015).
+    2007, doi:10.1093/biomet/asm015), but no more than the share of H that a fit has found.
     """
     slopes = gradient(design.mean, point, STEP * design.layout.sd)
     variance = float(np.exp(2.0 * point[-1]))
@@ -84,8 +86,22 @@ def friction_information(
         spread = here.T @ _convolved(here, correlated) + stroke_sd**2 * np.outer(total, total)
         scores = spread / variance**2
         curvature[-1, -1] = scores[-1, -1] = 2.0 * len(here)
-        found[int(label)] = Information(curvature, scores)
+        found[int(label)] = Information(curvature, _at_least(scores, curvature, design.share))
     return found
+
+
+def _at_least(scores: Array, curvature: Array, share: float | None) -> Array:
+    """Covariance of a score (p, p), along no direction less than curvature over ``share``."""
+    if share is None:
+        return scores
+    size = np.sqrt(np.maximum(np.diag(curvature), TINY))
+    values, vectors = np.linalg.eigh(curvature / np.outer(size, size))
+    told = values > SILENT * values[-1]
+    root = size[:, None] * vectors[:, told] * np.sqrt(values[told])
+    white = vectors[:, told] / np.sqrt(values[told]) / size[:, None]
+    factors, directions = np.linalg.eigh(white.T @ scores @ white)
+    away = root @ directions
+    return np.asarray((away * np.maximum(factors, 1.0 / share)) @ away.T)
 
 
 def cut_information(design: CutExperiment, point: Array) -> dict[int, Information]:

@@ -40,11 +40,14 @@ def inertia_verdict(
         "the encoder's steps hide how these sweeps swing. Add faster sweeps "
         "(capture.friction.speeds_rad_per_s), or use a finer encoder"
     )
-    changed = "probe again, with what is on the blades now, and capture anew"
+    changed = (
+        "something on the blades has changed since the probe, or the swings are not theirs alone. "
+        "Probe again, and capture anew"
+    )
     cure = coarse if law.windows.lengthening > 1.0 else changed
     good, bad = f"{said}.", f"{said}; {cure}."
     return judge("fit.friction", "inertia", apart, APART, good, bad)
 
 
 def _shown(inertia: Estimate) -> str:
-    return f"{KG_MM2 * inertia.mean:.3g} +- {KG_MM2 * inertia.sd:.2g} kg mm^2"
+    return f"{KG_MM2 * inertia.mean:.0f} +- {KG_MM2 * inertia.sd:.0f} kg mm^2"

@@ -25,19 +25,19 @@ def choose_law(
 
     The fits of all laws, that of the chosen one, and its design. The chosen law is fitted again
     with a Student-t noise where its residuals have outliers; that fit takes the place of the first.
-    A share ``lack_of_fit`` of the drive that is stated as the law's error is
-    what makes laws differ, and residuals below it have no outliers.
+    A share ``lack_of_fit`` of the drive that is stated as the law's error is what makes laws
+    differ, and residuals below it have no outliers.
     """
     compared: list[FittedCandidate] = []
     for index, law in enumerate(laws):
         tell(0.6 * index / len(laws), f"friction: trying {law.name}")
         compared.append(fit_candidate(law.candidate(law.observed), law.series, law.strokes, stop))
-    drive = rms(laws[0].observed)
+    drive = _rms(laws[0].observed)
     chosen = choose(compared, drive, lack_of_fit or NEGLIGIBLE)
     place = next(i for i, one in enumerate(compared) if one.candidate is chosen.candidate)
     law = replace(laws[place], share=chosen.candidate.share)
     likelihood, point = chosen.candidate.likelihood, chosen.optimum.point
-    if rms(likelihood.residuals(point)) < lack_of_fit * drive:
+    if _rms(likelihood.residuals(point)) < lack_of_fit * drive:
         return compared, chosen, law
     tails = tails_of(likelihood.standardised(point), chosen.share)
     if tails > OUTLIERS:
@@ -48,6 +48,5 @@ def choose_law(
     return compared, compared[place], law
 
 
-def rms(values: NDArray[np.float64]) -> float:
-    """Root mean square."""
+def _rms(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(values**2)))

@@ -26,7 +26,7 @@ from scissorcal.calibration.friction.checks import (
     physical_verdict,
     start_verdict,
 )
-from scissorcal.calibration.friction.choice import choose_law, rms
+from scissorcal.calibration.friction.choice import choose_law
 from scissorcal.calibration.friction.cogging import NO_COGGING, Cogging, find_cogging
 from scissorcal.calibration.friction.lack_of_fit import with_lack_of_fit
 from scissorcal.calibration.friction.model import FrictionExperiment, design
@@ -119,11 +119,14 @@ def fit_friction(
         posterior = with_lack_of_fit(posterior, law, settings.lack_of_fit, rng)
         posterior = opened(posterior, law, slow, chosen.held_out_rms, rng)
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
+    posterior = widened(posterior, between, rng)
+    swung = inertia_verdict(law, posterior.draws, recordings)
     usage = usage_of_windows(recordings, every, sensors.usable)
+    drive = float(np.sqrt(np.mean(law.observed**2)))
     return assemble(
         what="friction",
         effort=effort,
-        posterior=widened(posterior, between, rng),
+        posterior=posterior,
         compared=compared,
         chosen=chosen,
         structure={**chosen.candidate.key, "joint": joint.kind, **_tails_if_heavy(chosen)},
@@ -141,12 +144,12 @@ def fit_friction(
             physical_verdict(law, chosen.optimum.point, chosen.share),
             start_verdict(law, chosen.optimum.point),
             near_rest_verdict(law, posterior.draws),
-            *((heavy,) if (heavy := inertia_verdict(law, posterior.draws, recordings)) else ()),
+            *((swung,) if swung else ()),
             _bandwidth(again, law, chosen, posterior, effort),
             sensors.verdict,
             *((broken.verdict("fit.friction"),) if broken.interrupted else ()),
             *((steady.verdict(),) if steady.rows else ()),
-            *zero_verdicts("fit.friction", zero, recordings, rms(law.observed)),
+            *zero_verdicts("fit.friction", zero, recordings, drive),
             *((between.verdict(),) if between else ()),
         ),
         extra_notes=(

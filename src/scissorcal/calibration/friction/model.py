@@ -35,9 +35,12 @@ LEAST_OFFSET = 1e-3
 """Share of the drive's spread from which a search for the offset begins at least: beside zero it
 would end where it began."""
 
-MOST_FALLEN = 20.0
-"""Logarithm of the logarithm by which Stribeck friction has fallen, to stay within numbers; from 4
-on nothing is left of it."""
+MOST_FALLEN = 3.0
+"""Of Stribeck friction that has fallen by e^-3 5 % are left, about what laws lack: beyond, sweeps
+tell nothing of it, level and rate have the shape of their priors, and there is no ridge."""
+
+LARGE = 20.0
+"""Logarithm of the fall's exponent up to which it is worked out, to stay within numbers."""
 
 SHORT = 0.03
 """Share of the range that is travelled, at which a search for Dahl's length begins."""
@@ -52,7 +55,7 @@ class FrictionExperiment:
     terms, and ``cogging_periods_per_turn`` where cogging was found. ``tails`` are the degrees of
     freedom of the noise. ``shared`` are moments that another law over the same windows has made
     already, if any. ``prior_precision`` (p, p) is that of all parameters together. ``share`` is the
-    share of the windows that count as independent.
+    share of the windows that count as independent, where it is known.
     """
 
     windows: Windows
@@ -62,7 +65,7 @@ class FrictionExperiment:
     prior_precision: Array
     joint: Joint
     tails: float = np.inf
-    share: float = 1.0
+    share: float | None = None
     what: Literal["friction", "cut"] = "friction"
     nuisance: tuple[str, ...] = NUISANCE
     shared: StrokeMoments | None = field(default=None, repr=False, compare=False)
@@ -153,7 +156,8 @@ class FrictionExperiment:
     def _ridge(self) -> Shear | None:
         """Coordinates in which Stribeck's level is what is left of it at the slowest rate.
 
-        That is what motion determines; the level at rest and its rate lie along a curved ridge.
+        That is what motion determines; the level at rest and its rate lie along a curved ridge, as
+        far as anything is left.
         """
         names = self.layout.names
         if not {"stribeck", SCALES[0]} <= set(names):
@@ -161,9 +165,9 @@ class FrictionExperiment:
         slowest = np.log(self.bins.slowest_rate)
 
         def fallen(log_rate: Array) -> Array:
-            return np.asarray(np.exp(np.minimum(2.0 * (slowest - log_rate), MOST_FALLEN)))
+            return np.asarray(np.exp(np.minimum(2.0 * (slowest - log_rate), LARGE)))
 
-        return Shear(names.index("stribeck"), names.index(SCALES[0]), fallen)
+        return Shear(names.index("stribeck"), names.index(SCALES[0]), fallen, MOST_FALLEN)
 
     def _reduced(self, measured: Array) -> ReducedLaw | None:
         """The law over products of columns, where its noise is normal."""

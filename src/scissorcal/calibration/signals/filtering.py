@@ -11,8 +11,6 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 BIN_S = 0.005
-
-
 PASSING = 0.01
 """Share of the motion below whose rate a joint only passes through."""
 
