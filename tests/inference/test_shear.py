@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.inference import Problem, infer
-from scissorcal.inference.mixture import Mixture
-from scissorcal.inference.shear import Shear
+from scissorcal.inference.mixture import Mixture, Shear
 
 WIDE, NARROW, BEND = 1.0, 0.05, 2.0
 SHEAR = Shear(0, 1, lambda x: BEND * np.square(x))

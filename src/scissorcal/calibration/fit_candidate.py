@@ -14,9 +14,9 @@ from scissorcal.inference.autocorrelation import ljung_box
 from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.curvature import gradient, natural_step
 from scissorcal.inference.information import likelihood_information
+from scissorcal.inference.mixture import Shear
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.problem import Problem
-from scissorcal.inference.shear import Shear
 from scissorcal.inference.tails import log_density
 
 Array = NDArray[np.float64]

@@ -11,17 +11,15 @@ from scissorcal.inference.counting import Counter, Stop, TimeUsedUpError
 from scissorcal.inference.importance import (
     GOOD_K,
     Sampled,
-    pooled,
     sample_by_importance,
     sample_by_mixture,
 )
 from scissorcal.inference.laplace import Laplace, Shape, laplace, local_covariance, polish
 from scissorcal.inference.long_run import long_run_covariance
-from scissorcal.inference.mixture import Mixture
+from scissorcal.inference.mixture import Mixture, Shear
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
-from scissorcal.inference.shear import Shear
 from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus, about, picked
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 
@@ -31,7 +29,7 @@ Progress = Callable[[float, str], None]
 BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
 """Evaluations that sampling may take where the caller says nothing."""
 
-MIXTURE_ROUNDS, MIXTURES = 5, 3
+MIXTURE_ROUNDS = 5
 LEAST_HELD = 1e-4
 """Curvature of a log-posterior, in units of the prior's width, below which nothing holds a point;
 a normal prior alone gives one."""
@@ -96,8 +94,8 @@ def infer(
     proposal = _proposal(counted, best, local)
     if stop is not None:
         local = laplace(counter.over(problem, stop), shape, spread)
-    target = _target(problem.shear, local, proposal)
-    run = _Run(problem, local, target, counter, rng, count, tell)
+    targets = _targets(problem.shear, local, proposal)
+    run = _Run(problem, local, targets, counter, rng, count, tell)
     try:
         found = run.at(effort, problem, budget or BUDGET[effort], escalate, checkpoint)
     except NotFiniteError as error:
@@ -173,17 +171,20 @@ class _Target:
     bent: Callable[[Array], Array]
 
 
-def _target(shear: Shear | None, local: Laplace, proposal: Mixture) -> _Target:
+def _targets(shear: Shear | None, local: Laplace, proposal: Mixture) -> tuple[_Target, ...]:
+    """The posterior in the coordinates in which a ridge is straight, if it has one, and its own."""
     one, many, centre = local.log_posterior, local.log_posteriors, local.centre
+    plain = _Target(one, many, proposal, lambda draws: draws)
     if shear is None or not shear.serves(centre):
-        return _Target(one, many, proposal, lambda draws: draws)
+        return (plain,)
     bent = shear.bent
-    return _Target(
+    sheared = _Target(
         log_posterior=lambda point: one(bent(point)),
         log_posteriors=lambda points: many(bent(points)),
         proposal=shear.mixture(proposal),
         bent=bent,
     )
+    return sheared, plain
 
 
 @dataclass(frozen=True)
@@ -206,7 +207,7 @@ class _Found:
 class _Run:
     problem: Problem
     local: Laplace
-    target: _Target
+    targets: tuple[_Target, ...]
     counter: Counter
     rng: np.random.Generator
     count: int
@@ -248,74 +249,72 @@ class _Run:
 
     def standard(self, budget: int, escalate: bool, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "sampling")
-        target, proposal = self.target.log_posterior, self.target.proposal
         first = self.counter.calls
-        many = self.target.log_posteriors
-        sampled = sample_by_importance(target, proposal, self.count, self.rng, many=many)
+        target, sampled = self._weigh()
         said = f"k-hat {sampled.k_hat:.2f}"
         if sampled.k_hat > GOOD_K and escalate:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
             rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // self.count - 2)
             if rounds > 0:
-                mixed = self._mixed(sampled, rounds, budget)
+                mixed = sample_by_mixture(
+                    target.log_posterior,
+                    sampled,
+                    target.proposal,
+                    self.count,
+                    self.rng,
+                    rounds,
+                    target.log_posteriors,
+                )
                 said += f", {mixed.k_hat:.2f} with an adapted mixture"
                 # Weights that passed are not refused by the stricter limit of a better proposal.
                 passed = sampled.trusted and mixed.k_hat < sampled.k_hat
                 sampled = replace(mixed, limit=sampled.limit) if passed else mixed
         if sampled.trusted or not escalate:
-            return self._weighed(sampled, said)
+            return self._weighed(target, sampled, said)
         left = budget - (self.counter.calls - first)
         wanted = fewest_evaluations(len(self.problem.names))
         if left < wanted:
             said += f"; ensembles need at least {wanted} evaluations and {left} are left"
-            return self._weighed(sampled, said)
+            return self._weighed(target, sampled, said)
         self.tell(0.6, f"{said}: running ensembles")
-        return self._walked(left, checkpoint, sampled, f"Escalated from standard ({said}). ")
+        return self._walked(
+            target, left, checkpoint, sampled, f"Escalated from standard ({said}). "
+        )
 
-    def _mixed(self, sampled: Sampled, rounds: int, budget: int) -> Sampled:
-        """Draws of a mixture, and of a further one made from them, until all are trusted together.
-
-        Each mixture's draws are judged before they make another one, so that they stay what they
-        were judged as; a k-hat near its limit is told apart by more of them.
-        """
-        target = self.target
-        judged: list[Sampled] = []
-        one = together = sampled
-        while len(judged) < MIXTURES:
-            one = sample_by_mixture(
+    def _weigh(self) -> tuple[_Target, Sampled]:
+        """Draws by importance, in the coordinates in which the first proposal does better."""
+        tried: list[tuple[_Target, Sampled]] = []
+        for target in self.targets:
+            sampled = sample_by_importance(
                 target.log_posterior,
-                one,
                 target.proposal,
                 self.count,
                 self.rng,
-                rounds,
-                target.log_posteriors,
+                many=target.log_posteriors,
             )
-            judged.append(one)
-            together = replace(pooled(judged), limit=one.limit, evaluations=one.evaluations)
-            if together.trusted or one.k_hat == np.inf:
+            tried.append((target, sampled))
+            if sampled.k_hat <= GOOD_K:
                 break
-            if one.evaluations + (rounds + 2) * self.count > budget:
-                break
-        return together
+        return min(tried, key=lambda one: one[1].k_hat)
 
     def thorough(self, budget: int, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "checking the approximation")
+        target = self.targets[0]
         sampled = sample_by_importance(
-            self.target.log_posterior,
-            self.target.proposal,
+            target.log_posterior,
+            target.proposal,
             self.count,
             self.rng,
             rounds=1,
-            many=self.target.log_posteriors,
+            many=target.log_posteriors,
         )
-        return self._walked(budget, checkpoint, sampled, "")
+        return self._walked(target, budget, checkpoint, sampled, "")
 
-    def _weighed(self, sampled: Sampled, said: str) -> _Found:
+    def _weighed(self, target: _Target, sampled: Sampled, said: str) -> _Found:
         status = SamplingStatus.WEIGHED if sampled.trusted else SamplingStatus.HEAVY_WEIGHTS
         nothing = np.full(len(self.problem.names), np.nan)
         return _Found(
-            draws=self.target.bent(sampled.resample(self.count, self.rng)),
+            draws=target.bent(sampled.resample(self.count, self.rng)),
             reached="standard",
             status=status,
             sentence=f"{status.value} ({said}.)",
@@ -326,19 +325,24 @@ class _Run:
         )
 
     def _walked(
-        self, budget: int, checkpoint: Path | None, sampled: Sampled, before: str
+        self,
+        target: _Target,
+        budget: int,
+        checkpoint: Path | None,
+        sampled: Sampled,
+        before: str,
     ) -> _Found:
         chains = run_ensembles(
-            self.target.log_posterior,
-            self.target.proposal,
+            target.log_posterior,
+            target.proposal,
             self.rng,
             budget=budget,
             checkpoint=checkpoint,
-            many=self.target.log_posteriors,
+            many=target.log_posteriors,
             progress=lambda done, sentence: self.tell(0.5 + 0.5 * done, sentence),
         )
         return _Found(
-            draws=self.target.bent(_thinned(chains, self.count, self.rng)),
+            draws=target.bent(_thinned(chains, self.count, self.rng)),
             reached="thorough",
             status=chains.status,
             sentence=before + _said(chains, self.problem.names),

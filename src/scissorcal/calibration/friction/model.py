@@ -17,7 +17,7 @@ from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.inference.shear import Shear
+from scissorcal.inference.mixture import Shear
 from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, side_of, terms_of
 from scissorcal.model.terms import Role, Term
 from scissorcal.model.transforms import LOG
