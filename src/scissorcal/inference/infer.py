@@ -94,8 +94,8 @@ def infer(
     proposal = _proposal(counted, best, local)
     if stop is not None:
         local = laplace(counter.over(problem, stop), shape, spread)
-    targets = _targets(problem.shear, local, proposal)
-    run = _Run(problem, local, targets, counter, rng, count, tell)
+    target = _target(problem.shear, local, proposal)
+    run = _Run(problem, local, target, counter, rng, count, tell)
     try:
         found = run.at(effort, problem, budget or BUDGET[effort], escalate, checkpoint)
     except NotFiniteError as error:
@@ -171,20 +171,17 @@ class _Target:
     bent: Callable[[Array], Array]
 
 
-def _targets(shear: Shear | None, local: Laplace, proposal: Mixture) -> tuple[_Target, ...]:
-    """The posterior in the coordinates in which a ridge is straight, if it has one, and its own."""
+def _target(shear: Shear | None, local: Laplace, proposal: Mixture) -> _Target:
     one, many, centre = local.log_posterior, local.log_posteriors, local.centre
-    plain = _Target(one, many, proposal, lambda draws: draws)
     if shear is None or not shear.serves(centre):
-        return (plain,)
+        return _Target(one, many, proposal, lambda draws: draws)
     bent = shear.bent
-    sheared = _Target(
+    return _Target(
         log_posterior=lambda point: one(bent(point)),
         log_posteriors=lambda points: many(bent(points)),
         proposal=shear.mixture(proposal),
         bent=bent,
     )
-    return sheared, plain
 
 
 @dataclass(frozen=True)
@@ -207,7 +204,7 @@ class _Found:
 class _Run:
     problem: Problem
     local: Laplace
-    targets: tuple[_Target, ...]
+    target: _Target
     counter: Counter
     rng: np.random.Generator
     count: int
@@ -249,72 +246,49 @@ class _Run:
 
     def standard(self, budget: int, escalate: bool, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "sampling")
+        target, proposal = self.target.log_posterior, self.target.proposal
         first = self.counter.calls
-        target, sampled = self._weigh()
+        many = self.target.log_posteriors
+        sampled = sample_by_importance(target, proposal, self.count, self.rng, many=many)
         said = f"k-hat {sampled.k_hat:.2f}"
         if sampled.k_hat > GOOD_K and escalate:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
             rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // self.count - 2)
             if rounds > 0:
                 mixed = sample_by_mixture(
-                    target.log_posterior,
-                    sampled,
-                    target.proposal,
-                    self.count,
-                    self.rng,
-                    rounds,
-                    target.log_posteriors,
+                    target, sampled, proposal, self.count, self.rng, rounds, many
                 )
                 said += f", {mixed.k_hat:.2f} with an adapted mixture"
                 # Weights that passed are not refused by the stricter limit of a better proposal.
                 passed = sampled.trusted and mixed.k_hat < sampled.k_hat
                 sampled = replace(mixed, limit=sampled.limit) if passed else mixed
         if sampled.trusted or not escalate:
-            return self._weighed(target, sampled, said)
+            return self._weighed(sampled, said)
         left = budget - (self.counter.calls - first)
         wanted = fewest_evaluations(len(self.problem.names))
         if left < wanted:
             said += f"; ensembles need at least {wanted} evaluations and {left} are left"
-            return self._weighed(target, sampled, said)
+            return self._weighed(sampled, said)
         self.tell(0.6, f"{said}: running ensembles")
-        return self._walked(
-            target, left, checkpoint, sampled, f"Escalated from standard ({said}). "
-        )
-
-    def _weigh(self) -> tuple[_Target, Sampled]:
-        """Draws by importance, in the coordinates in which the first proposal does better."""
-        tried: list[tuple[_Target, Sampled]] = []
-        for target in self.targets:
-            sampled = sample_by_importance(
-                target.log_posterior,
-                target.proposal,
-                self.count,
-                self.rng,
-                many=target.log_posteriors,
-            )
-            tried.append((target, sampled))
-            if sampled.k_hat <= GOOD_K:
-                break
-        return min(tried, key=lambda one: one[1].k_hat)
+        return self._walked(left, checkpoint, sampled, f"Escalated from standard ({said}). ")
 
     def thorough(self, budget: int, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "checking the approximation")
-        target = self.targets[0]
         sampled = sample_by_importance(
-            target.log_posterior,
-            target.proposal,
+            self.target.log_posterior,
+            self.target.proposal,
             self.count,
             self.rng,
             rounds=1,
-            many=target.log_posteriors,
+            many=self.target.log_posteriors,
         )
-        return self._walked(target, budget, checkpoint, sampled, "")
+        return self._walked(budget, checkpoint, sampled, "")
 
-    def _weighed(self, target: _Target, sampled: Sampled, said: str) -> _Found:
+    def _weighed(self, sampled: Sampled, said: str) -> _Found:
         status = SamplingStatus.WEIGHED if sampled.trusted else SamplingStatus.HEAVY_WEIGHTS
         nothing = np.full(len(self.problem.names), np.nan)
         return _Found(
-            draws=target.bent(sampled.resample(self.count, self.rng)),
+            draws=self.target.bent(sampled.resample(self.count, self.rng)),
             reached="standard",
             status=status,
             sentence=f"{status.value} ({said}.)",
@@ -325,24 +299,19 @@ class _Run:
         )
 
     def _walked(
-        self,
-        target: _Target,
-        budget: int,
-        checkpoint: Path | None,
-        sampled: Sampled,
-        before: str,
+        self, budget: int, checkpoint: Path | None, sampled: Sampled, before: str
     ) -> _Found:
         chains = run_ensembles(
-            target.log_posterior,
-            target.proposal,
+            self.target.log_posterior,
+            self.target.proposal,
             self.rng,
             budget=budget,
             checkpoint=checkpoint,
-            many=target.log_posteriors,
+            many=self.target.log_posteriors,
             progress=lambda done, sentence: self.tell(0.5 + 0.5 * done, sentence),
         )
         return _Found(
-            draws=target.bent(_thinned(chains, self.count, self.rng)),
+            draws=self.target.bent(_thinned(chains, self.count, self.rng)),
             reached="thorough",
             status=chains.status,
             sentence=before + _said(chains, self.problem.names),
