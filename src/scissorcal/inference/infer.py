@@ -8,12 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.inference.counting import Counter, Stop, TimeUsedUpError
-from scissorcal.inference.importance import (
-    GOOD_K,
-    Sampled,
-    sample_by_importance,
-    sample_by_mixture,
-)
+from scissorcal.inference.importance import GOOD_K, Sampled, sample_by_importance, sample_by_mixture
 from scissorcal.inference.laplace import Laplace, Shape, laplace, local_covariance, polish
 from scissorcal.inference.long_run import long_run_covariance
 from scissorcal.inference.mixture import Mixture, Shear
@@ -55,11 +50,10 @@ def infer(
 
     The optimum is that of the posterior as given. Its curvature H counts all terms, or the
     problem's share of them, as independent; the scores' long-run covariance J tells what they are
-    worth along each direction. The
-    likelihood is therefore stretched about its optimum so that its curvature becomes
-    H J^-1 H, which gives intervals their stated coverage although the noise is coloured or the
-    model not quite true (Chandler and Bate 2007, doi:10.1093/biomet/asm015). Where the problem
-    says that its terms are independent, it is taken as written.
+    worth along each direction. The likelihood is therefore stretched about its optimum so that its
+    curvature becomes H J^-1 H, which gives intervals their stated coverage although the noise is
+    coloured or the model not quite true (Chandler and Bate 2007, doi:10.1093/biomet/asm015). Where
+    the problem says that its terms are independent, it is taken as written.
 
     ``effort`` draft draws from the normal approximation; standard draws by Pareto-smoothed
     importance sampling around every optimum; thorough runs independent ensembles. Where standard
@@ -97,7 +91,7 @@ def infer(
     target = _target(problem.shear, local, proposal)
     run = _Run(problem, local, target, counter, rng, count, tell)
     try:
-        found = run.at(effort, problem, budget or BUDGET[effort], escalate, checkpoint)
+        found = run.at(effort, budget or BUDGET[effort], escalate, checkpoint)
     except NotFiniteError as error:
         if best.success:
             raise
@@ -213,7 +207,6 @@ class _Run:
     def at(
         self,
         effort: Effort,
-        problem: Problem,
         budget: int,
         escalate: bool,
         checkpoint: Path | None,

@@ -2,13 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from scissorcal.inference.mixture import Shear
+from scissorcal.inference.mixture import Shear
 
 Array = NDArray[np.float64]
 
@@ -67,7 +65,7 @@ class Problem:
     independent: bool = False
     log_posterior_many: Callable[[Array], Array] | None = None
     smooth: bool = False
-    shear: "Shear | None" = None
+    shear: Shear | None = None
     tally: Callable[[], None] | None = None
 
     def __post_init__(self) -> None:
