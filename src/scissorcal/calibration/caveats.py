@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.signals.window_length import LONG_WINDOWS
 
 FEW_COUNTS = 1.0
 """Encoder counts per sample of a closing stroke (median) below which an encoder is coarse."""
-
-LONG_WINDOWS = 2.0
-"""Lengthening of friction's windows from which its intervals are poorly calibrated."""
 
 RESPONSE = ("response_force", "response_exponent")
 
@@ -82,7 +80,9 @@ def _coarse_words(fit: FitResult) -> str:
 
 
 def _long_windows(fit: FitResult) -> bool:
-    return fit.what != "cut" and (_number(fit, "window_lengthening") or 1.0) >= LONG_WINDOWS
+    if fit.what == "cut" or fit.diagnostics.get("inertia_of_probe"):
+        return False
+    return (_number(fit, "window_lengthening") or 1.0) >= LONG_WINDOWS
 
 
 def _long_windows_words(fit: FitResult) -> str:

@@ -10,7 +10,7 @@ from scissorcal.calibration.fit_candidate import SEARCH_REACH, FittedCandidate
 from scissorcal.calibration.result import StrokeError
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior, SearchStatus
-from scissorcal.inference.importance import ADAPTED_LIMIT, GOOD_MIXTURE_K
+from scissorcal.inference.importance import ADAPTED_LIMIT
 from scissorcal.inference.importance import K_HAT_LIMIT as K_HAT_LIMIT
 from scissorcal.model.friction_terms import NEAR_REST
 from scissorcal.verdicts import Status, Verdict, judge, not_evaluated
@@ -24,8 +24,8 @@ HELD_OUT_LIMIT = 0.2
 OTHER_SPEED = 1.5
 """Ratio between the fastest and the slowest motion from which speeds count as varied."""
 OTHER_CONTACT_M = 2e-3
-LIMITS = (K_HAT_LIMIT, ADAPTED_LIMIT, GOOD_MIXTURE_K)
-"""Limits of k-hat, from a proposal made without draws to a mixture that was adapted to them."""
+LIMITS = (K_HAT_LIMIT, ADAPTED_LIMIT)
+"""Limits of k-hat, of a proposal made without draws and of one that was adapted to them."""
 NEAR_EDGE = 0.98 * SEARCH_REACH
 """Prior standard deviations from its centre at which a parameter is at the search's limit."""
 
@@ -101,8 +101,11 @@ def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:
     if posterior.ensembles:
         # what decides then is in the sentence; k-hat is of a proposal that was not used
         return Verdict(scope, "k-hat", status, None, None, posterior.sentence)
-    exceeded = [limit for limit in LIMITS if status == "fail" and k is not None and k > limit]
-    limit = exceeded[0] if exceeded else K_HAT_LIMIT
+    exceeded = [limit for limit in LIMITS if k is not None and k > limit]
+    if status == "fail" and k is not None and not exceeded:
+        # too few effective draws, as the sentence says
+        return Verdict(scope, "k-hat", status, None, None, posterior.sentence)
+    limit = exceeded[0] if status == "fail" and exceeded else K_HAT_LIMIT
     return Verdict(scope, "k-hat", status, k, limit, posterior.sentence)
 
 

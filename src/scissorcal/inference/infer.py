@@ -24,7 +24,6 @@ Progress = Callable[[float, str], None]
 BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
 """Evaluations that sampling may take where the caller says nothing."""
 
-MIXTURE_ROUNDS = 5
 LEAST_HELD = 1e-4
 """Curvature of a log-posterior, in units of the prior's width, below which nothing holds a point;
 a normal prior alone gives one."""
@@ -58,14 +57,15 @@ def infer(
     ``effort`` draft draws from the normal approximation; standard draws by Pareto-smoothed
     importance sampling around every optimum; thorough runs independent ensembles. Where standard
     does not do well (k-hat above 0.5) it goes on by itself, unless ``escalate`` is false, with a
-    mixture that adapts to the posterior; where it still fails its check (k-hat above 0.7, or 0.5
-    for a proposal that was adapted to draws) and ``budget`` allows, with ensembles. What it became
-    is said in the result. ``optimum`` may be passed if it is known already,
-    ``count`` is the number of draws, ``budget`` the evaluations that sampling may take,
-    ``checkpoint`` the file that ensembles resume from (see :func:`run_ensembles`). ``stop`` is
-    asked before every evaluation of search and sampling whether the time allowed is used up; what
-    is there by then is returned, with the status for it, and draws of the normal approximation
-    where there are no better ones. The curvature is measured whatever the time.
+    mixture that adapts to the posterior. Where that still fails its check (k-hat above 0.7, or 0.5
+    for a proposal that was adapted to draws; fewer effective draws of a mixture than ``count``),
+    and ``budget`` allows, it goes on with ensembles. What it became is said in the result.
+    ``optimum`` may be passed if it is known already, ``count`` is the number of draws, ``budget``
+    the evaluations that sampling may take, ``checkpoint`` the file that ensembles resume from (see
+    :func:`run_ensembles`). ``stop`` is asked before every evaluation of search and sampling whether
+    the time allowed is used up; what is there by then is returned, with the status for it, and
+    draws of the normal approximation where there are no better ones. The curvature is measured
+    whatever the time.
 
     Raises NotFiniteError (a ValueError) where the log-posterior is not finite at any start or
     beside the optimum, or so large that rounding hides its shape.
@@ -246,15 +246,15 @@ class _Run:
         said = f"k-hat {sampled.k_hat:.2f}"
         if sampled.k_hat > GOOD_K and escalate:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
-            rounds = min(MIXTURE_ROUNDS, (budget - sampled.evaluations) // self.count - 2)
-            if rounds > 0:
-                mixed = sample_by_mixture(
-                    target, sampled, proposal, self.count, self.rng, rounds, many
-                )
+            left = budget - sampled.evaluations
+            mixed = sample_by_mixture(target, sampled, proposal, self.count, self.rng, left, many)
+            if mixed is not None:
                 said += f", {mixed.k_hat:.2f} with an adapted mixture"
-                # Weights that passed are not refused by the stricter limit of a better proposal.
+                said += f" and {mixed.effective:.0f} of {mixed.wanted:.0f} effective draws"
+                # Weights that passed are not refused by the stricter limits of a better proposal.
                 passed = sampled.trusted and mixed.k_hat < sampled.k_hat
-                sampled = replace(mixed, limit=sampled.limit) if passed else mixed
+                limits = (sampled.limit, 0.0) if passed else (mixed.limit, mixed.wanted)
+                sampled = replace(mixed, limit=limits[0], wanted=limits[1])
         if sampled.trusted or not escalate:
             return self._weighed(sampled, said)
         left = budget - (self.counter.calls - first)

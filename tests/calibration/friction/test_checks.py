@@ -67,6 +67,12 @@ def test_static_below_coulomb_friction_is_named():
     assert "slower sweeps" in found.why
 
 
+def test_a_sign_that_changes_hardly_any_torque_is_no_negative_level():
+    """Viscous friction of -0.2 mN m s/rad, 5 sds below zero: 1 % of the drive."""
+    recording = friction_recording(Truth(viscous=-2e-4), np.random.default_rng(1), QUICK)
+    assert verdicts(recording, "coulomb+viscous")["physical"].status == "pass"
+
+
 def test_a_torque_of_the_wrong_sign_is_named():
     samples = friction_recording(Truth(), np.random.default_rng(4), QUICK).samples.copy()
     samples["motor_torque"] *= -1

@@ -61,8 +61,6 @@ Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 DRAWS = 2000
-STANDARD_BUDGET = 25_000
-"""Evaluations of the likelihood (0.2 ms each) that standard effort may take."""
 FELT_SDS = 5.0
 FEWEST_FELT_RAD = 0.02
 KNOTS, SPAN, DEEPEST = 5, 8.0, 0.99
@@ -294,7 +292,6 @@ def _infer(
         rng,
         count=DRAWS,
         optimum=fitted.optimum,
-        budget=STANDARD_BUDGET if effort == "standard" else None,
         checkpoint=checkpoint,
         stop=stop,
         progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),

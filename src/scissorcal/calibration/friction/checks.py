@@ -29,7 +29,8 @@ NEAR_REST = 0.05
 SLOWER = 2.0
 """From twice the rate that the encoder can tell, a sweep at half the speed is worth while."""
 NOTHING = 0.02
-"""Share of the drive's standard deviation below which Stribeck friction counts as absent."""
+"""Share of the drive's standard deviation below which friction counts as absent: a level, or what
+its sign changes."""
 
 
 def physical_verdict(experiment: FrictionExperiment, point: Array, share: float) -> Verdict:
@@ -39,7 +40,8 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
     without a sign of trouble. One step of least squares from the optimum ``point`` (p,), without
     that constraint and without priors, suspects it. Far from the optimum such a step is none of
     the law any more, so two searches that settle decide, with free signs and without: a level is
-    negative where the first explains the data better by CERTAIN standard deviations. Laws without
+    negative where the first explains the data better by CERTAIN standard deviations, and asks for a
+    torque that differs by NOTHING of the drive or more. Laws without
     viscous friction get it for both. ``share`` is the share of bins that are independent.
     """
     values = {name: float(value) for name, value in experiment.layout.natural(point).items()}
@@ -197,7 +199,11 @@ def _names(experiment: FrictionExperiment, values: Mapping[str, float]) -> list[
 def _settled(
     experiment: FrictionExperiment, rows: list[dict[str, float]], share: float
 ) -> list[_Level]:
-    """Negative levels of the best fit with free signs; none where one without is as good."""
+    """Negative levels of the best fit with free signs; none where one without is as good.
+
+    It is as good, too, where both ask for the same torque: what a law lacks is explained in part by
+    any freedom that it is given.
+    """
     weights = _student_weights(experiment, rows[0])
     held, free = (
         min(
@@ -209,7 +215,9 @@ def _settled(
     # Twice the gain of a likelihood whose noise is known from what the better fit leaves.
     count = share * len(experiment.observed)
     away = float(np.sqrt(max(count * np.log(held[0] / max(free[0], 1e-300)), 0.0)))
-    if away <= CERTAIN:
+    torques = [experiment.mean_at(_arrays(values)) for _, values in (held, free)]
+    felt = float(np.std(torques[1] - torques[0])) / float(np.std(experiment.observed))
+    if away <= CERTAIN or felt < NOTHING:
         return []
     below = [_Level(away, n, v, abs(v) / away) for n, v in free[1].items() if v < 0.0]
     return [level for level in below if level.remedy]

@@ -19,7 +19,7 @@ from scissorcal.calibration.between import (
 )
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate
-from scissorcal.calibration.friction.against_probe import inertia_verdict
+from scissorcal.calibration.friction.against_probe import inertia_verdict, with_pushed_inertia
 from scissorcal.calibration.friction.checks import (
     bandwidth_verdict,
     near_rest_verdict,
@@ -121,6 +121,7 @@ def fit_friction(
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
     posterior = widened(posterior, between, rng)
     swung = inertia_verdict(law, posterior.draws, recordings)
+    posterior, pushed = with_pushed_inertia(posterior, law, recordings, rng)
     usage = usage_of_windows(recordings, every, sensors.usable)
     drive = float(np.sqrt(np.mean(law.observed**2)))
     return assemble(
@@ -155,6 +156,7 @@ def fit_friction(
         extra_notes=(
             *sensors.notes,
             *_notes(every, windows, posterior, joint, cogging),
+            *((pushed,) if pushed else ()),
             *_symmetry_note(law, chosen),
             *draft_note(effort, every_law, laws),
             usage.sentence,
@@ -163,6 +165,7 @@ def fit_friction(
         extra_diagnostics={
             **_diagnostics(law, chosen, between, recordings),
             **(zero.as_dict() if zero else {}),
+            **({"inertia_of_probe": True} if pushed else {}),
         },
     )
 
