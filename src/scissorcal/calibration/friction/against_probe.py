@@ -28,7 +28,7 @@ def with_pushed_inertia(
     """The posterior with the inertia of the probe's pushes where steps hide how sweeps swing.
 
     Pushes begin at rest and are as large as the encoder needs. Behind coarse steps the blades of a
-    sweep swing by less than a step, and what moves them is taken for inertia: on 22 days on a rig
+    sweep swing by less than a step, and what moves them is taken for inertia: on 19 days on a rig
     of other construction with windows that much longer it came out up to 9.9 sds off, and that of
     the pushes at most 1.3. The second value says so; it is empty where nothing is replaced.
     """
