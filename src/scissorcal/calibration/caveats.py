@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.signals.window_length import LONG_WINDOWS
 
 FEW_COUNTS = 1.0
 """Encoder counts per sample of a closing stroke (median) below which an encoder is coarse."""
+
+LONG_WINDOWS = 2.0
+"""Lengthening of friction's windows from which its intervals are poorly calibrated."""
 
 RESPONSE = ("response_force", "response_exponent")
 

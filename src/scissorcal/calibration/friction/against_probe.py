@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.caveats import LONG_WINDOWS
 from scissorcal.calibration.friction.model import FrictionExperiment
-from scissorcal.calibration.signals.window_length import LONG_WINDOWS
 from scissorcal.inference.posterior import Posterior
 from scissorcal.recording.probe import Estimate, newest_probe
 from scissorcal.recording.recording import Recording
@@ -30,7 +30,7 @@ def with_pushed_inertia(
     Pushes begin at rest and are as large as the encoder needs. Behind coarse steps the blades of a
     sweep swing by less than a step, and what moves them is taken for inertia: on 19 days on a rig
     of other construction with windows that much longer it came out up to 9.9 sds off, and that of
-    the pushes at most 1.3. The second value says so; it is empty where nothing is replaced.
+    the pushes at most 1.3. The second value is a note on it, empty where nothing is replaced.
     """
     pushed = _pushed(law, recordings)
     if pushed is None or law.windows.lengthening < LONG_WINDOWS:

@@ -19,8 +19,6 @@ HALF_AT = 0.365
 ENCODER_SHARE = 2.5e-3
 """Largest share of the encoder's steps in the acceleration's mean square; a fitted inertia is too
 low by the same share."""
-LONG_WINDOWS = 2.0
-"""Lengthening from which a fitted inertia's interval is known to be too narrow."""
 LONGEST_S = 0.1
 """Windows are not lengthened beyond this."""
 TURN_S = 5e-3
