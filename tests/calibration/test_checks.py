@@ -12,6 +12,7 @@ from scissorcal.calibration.result import StrokeError
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.cli.fit_law import text
 from scissorcal.inference import Posterior, SearchStatus, infer
+from scissorcal.inference.status import SamplingStatus
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.workday.runs.fit import FitOutcome
@@ -60,7 +61,16 @@ def fitted(bins: Bins, twin: bool = False) -> tuple[FittedCandidate, Posterior]:
     return found, infer(problem, "draft", rng, optimum=found.optimum)
 
 
-def judged(bins: Bins, what="friction", contact=None, spoil=None, nuisance=(), error=0.05, **fit):
+def judged(
+    bins: Bins,
+    what="friction",
+    contact=None,
+    spoil=None,
+    nuisance=(),
+    error=0.05,
+    effort="draft",
+    **fit,
+):
     chosen, posterior = fitted(bins, **fit)
     diagnostics = {
         "observations": len(bins.rate),
@@ -77,7 +87,7 @@ def judged(bins: Bins, what="friction", contact=None, spoil=None, nuisance=(), e
     )
     met = np.full(len(bins.rate), np.nan) if contact is None else contact
     verdicts = trust_verdicts(
-        what, "draft", chosen, posterior, diagnostics, errors, nuisance, bins, met
+        what, effort, chosen, posterior, diagnostics, errors, nuisance, bins, met
     )
     return {verdict.check: verdict for verdict in verdicts}
 
@@ -86,6 +96,17 @@ def test_a_good_fit_fails_nothing():
     found = judged(motion())
     assert {v.status for v in found.values()} == {"pass", "not_evaluated"}
     assert [name for name, v in found.items() if v.status == "not_evaluated"] == ["k-hat"]
+
+
+def test_a_mixture_with_too_few_effective_draws_fails_without_a_limit_that_it_keeps():
+    def few(posterior, diagnostics):
+        said = "k-hat 0.60, 0.35 with an adapted mixture and 300 of 2000 effective draws"
+        status = SamplingStatus.HEAVY_WEIGHTS
+        return dataclasses.replace(posterior, k_hat=0.35, status=status, sentence=said), diagnostics
+
+    found = judged(motion(), spoil=few, effort="standard")["k-hat"]
+    assert (found.status, found.value, found.threshold) == ("fail", None, None)
+    assert "300 of 2000 effective draws" in found.why
 
 
 def test_parameters_that_act_alike_are_named_together():

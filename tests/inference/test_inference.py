@@ -15,7 +15,7 @@ from scissorcal.inference import (
     ljung_box,
     robust_covariance_of_scores,
 )
-from scissorcal.inference.importance import pooled, sample_by_importance
+from scissorcal.inference.importance import pooled, sample_by_importance, sample_by_mixture
 from scissorcal.inference.mixture import Mixture
 
 
@@ -138,6 +138,27 @@ def test_draws_of_several_proposals_are_weighed_as_those_of_their_mixture():
     assert both.effective > 2.0 * seen[0].effective
     with pytest.raises(ValueError, match="some have none"):
         pooled([replace(seen[0], proposal=None)])
+
+
+def test_a_mixture_is_drawn_from_until_as_many_draws_are_effective_as_were_asked_for():
+    """A bent ridge in 6 dimensions; with a budget for no further batch it is not trusted."""
+
+    def many(u):
+        return -0.5 * np.sum(u[:, 1:] ** 2, axis=1) - 2.0 * (u[:, 0] - u[:, 1] ** 2) ** 2
+
+    first = Mixture.of(np.ones(1), np.zeros((1, 6)), np.eye(6)[None])
+    found = []
+    for budget in (200_000, 14_000):
+        rng = np.random.default_rng(3)
+        begun = sample_by_importance(lambda u: float(many(u[None])[0]), first, 2000, rng, many=many)
+        given = (lambda u: 0.0, begun, first, 2000, rng, budget, many)
+        found.append(sample_by_mixture(*given))
+        assert found[-1].evaluations <= begun.evaluations + budget
+    enough, short = found
+    assert (enough.trusted, short.trusted) == (True, False)
+    assert enough.effective >= enough.wanted == 2000
+    assert short.k_hat <= short.limit, "it lacks draws alone"
+    assert sample_by_mixture(*given[:5], 4_000, many) is None
 
 
 def test_a_hopeless_proposal_is_said_to_be_one():
