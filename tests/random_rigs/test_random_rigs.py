@@ -128,6 +128,7 @@ def test_a_person_who_opens_where_asked_to_close_is_asked_again() -> None:
     assert is_fair(trial)
 
 
+@pytest.mark.slow
 def test_a_person_who_does_nothing_leads_to_no_accusation() -> None:
     trial = trial_of(healthy(STILL), follows=False)
     assert is_fair(trial)

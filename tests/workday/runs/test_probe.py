@@ -54,7 +54,7 @@ def test_an_old_probe_another_rig_and_another_sign_do_not_count(workspace: Works
     recipe = workspace.recipe()
     first = ensure_probed(workspace, virtual_rig(), recipe)
     said: list[str] = []
-    later = datetime.now(UTC) + timedelta(hours=5)
+    later = datetime.fromisoformat(first.made_at) + timedelta(hours=5)
     ensure_probed(workspace, virtual_rig(), recipe, say=said.append, now=later)
     assert "5.0 h old, and rig.probe.max_age_h allows 4 h" in said[0]
     _store(workspace, replace(first, motor_sign=-1))
