@@ -62,7 +62,7 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
     ),
     "fit finite": ("at most", "whether there are numbers at all: how many are missing"),
     "fit optimum": ("at least", f"{_SEARCH}: starts that ended there"),
-    "fit k-hat": ("at most", f"{_INTERVALS}: tail index of the importance weights"),
+    "fit k-hat": ("at most", f"{_INTERVALS}: tail index of the importance weights, enough draws"),
     "fit bounds": ("at most", f"{_SEARCH}: largest distance from a prior in its sds"),
     "fit identifiability": ("at most", f"{_DATA}: largest posterior sd over prior sd"),
     "fit null-directions": ("at most", f"{_DATA}: directions that are left to the prior"),

@@ -14,7 +14,9 @@ FEW_COUNTS = 1.0
 """Encoder counts per sample of a closing stroke (median) below which an encoder is coarse."""
 
 LONG_WINDOWS = 2.0
-"""Lengthening of friction's windows from which its intervals are poorly calibrated."""
+"""Lengthening of friction's windows from which sweeps do not show the inertia. Where a probe found
+it, the fit takes it from there, and says so in ``OF_PROBE`` of its diagnostics."""
+OF_PROBE = "inertia_of_probe"
 
 RESPONSE = ("response_force", "response_exponent")
 
@@ -82,7 +84,7 @@ def _coarse_words(fit: FitResult) -> str:
 
 
 def _long_windows(fit: FitResult) -> bool:
-    if fit.what == "cut" or fit.diagnostics.get("inertia_of_probe"):
+    if fit.what == "cut" or fit.diagnostics.get(OF_PROBE):
         return False
     return (_number(fit, "window_lengthening") or 1.0) >= LONG_WINDOWS
 
@@ -92,7 +94,7 @@ def _long_windows_words(fit: FitResult) -> str:
     return (
         f"The windows are {times:.2g} times longer because the encoder is coarse: on 20 simulated "
         "days with such windows, the 90 % intervals contained the inertia 10 times, which was 2 % "
-        "low. Use a finer encoder."
+        "low. Use a finer encoder, or probe the rig before the capture."
     )
 
 

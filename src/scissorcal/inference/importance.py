@@ -42,10 +42,10 @@ times longer than wide, a proposal that ended short of its ends had a k-hat of 0
 came out 0.3 sds too near; draws from beyond its ends see what it lacks."""
 
 MORE_BATCHES = 24
-"""How often a mixture is drawn from again, until its effective draws are as many as were asked for;
-with fewer, ensembles take its place. On four curved ridges in 2 to 14 dimensions (200 seeds each)
-25 of 207 mixtures trusted so had a quantile off by more than 0.3 sds. With a k-hat up to 0.5 and
-half as many effective draws it was 115 of 335, and 31 of 113 where a k-hat up to 0.3 was enough."""
+"""How often a mixture is drawn from again, at most, until its effective draws are as many as were
+asked for; with fewer it is not trusted. On four curved ridges in 2 to 14 dimensions (200 seeds
+each) 25 of 207 mixtures trusted so had a quantile off by more than 0.3 sds. With a k-hat up to 0.5
+and half as many effective draws it was 115 of 335, and 31 of 113 where 0.3 was enough."""
 
 ROUNDS = 4
 MIXTURE_ROUNDS = 5
@@ -196,7 +196,7 @@ def _adapted(
     fresh = _once(log_posteriors, judging, 2 * count, rng)
     for left in range(batches or 0, 0, -1):
         drawn = len(fresh.draws)
-        # effective draws of heavy weights come by leaps: half of what is wanted may still do
+        # they grow in jumps, so go on while half of what is wanted is expected
         hopeless = 2.0 * fresh.effective * (drawn + 2 * count * left) < count * drawn
         if fresh.k_hat > ADAPTED_LIMIT or fresh.effective >= count or hopeless:
             break

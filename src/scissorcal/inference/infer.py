@@ -24,6 +24,10 @@ Progress = Callable[[float, str], None]
 BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
 """Evaluations that sampling may take where the caller says nothing."""
 
+MIXTURE_TAKES = 15
+"""Evaluations, in the draws asked for, that a mixture is given at least: five rounds, the draws
+that judge it, and four more batches. Only what is left beside them is kept for ensembles."""
+
 LEAST_HELD = 1e-4
 """Curvature of a log-posterior, in units of the prior's width, below which nothing holds a point;
 a normal prior alone gives one."""
@@ -247,10 +251,13 @@ class _Run:
         if sampled.k_hat > GOOD_K and escalate:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
             left = budget - sampled.evaluations
+            after = left - fewest_evaluations(len(self.problem.names))
+            if after >= MIXTURE_TAKES * self.count:
+                left = after  # ensembles can follow
             mixed = sample_by_mixture(target, sampled, proposal, self.count, self.rng, left, many)
             if mixed is not None:
                 said += f", {mixed.k_hat:.2f} with an adapted mixture"
-                said += f" and {mixed.effective:.0f} of {mixed.wanted:.0f} effective draws"
+                said += f" and {mixed.effective:.0f} effective draws ({mixed.wanted:.0f} wanted)"
                 # Weights that passed are not refused by the stricter limits of a better proposal.
                 passed = sampled.trusted and mixed.k_hat < sampled.k_hat
                 limits = (sampled.limit, 0.0) if passed else (mixed.limit, mixed.wanted)
@@ -279,6 +286,8 @@ class _Run:
 
     def _weighed(self, sampled: Sampled, said: str) -> _Found:
         status = SamplingStatus.WEIGHED if sampled.trusted else SamplingStatus.HEAVY_WEIGHTS
+        if not sampled.trusted and sampled.k_hat <= sampled.limit:
+            status = SamplingStatus.TOO_FEW
         nothing = np.full(len(self.problem.names), np.nan)
         return _Found(
             draws=self.target.bent(sampled.resample(self.count, self.rng)),

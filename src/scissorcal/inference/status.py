@@ -68,6 +68,11 @@ class SamplingStatus(Enum):
         "A few draws carry most of the importance weight, so the intervals cannot be trusted: "
         "use thorough effort, record more varied data, or choose a simpler candidate model."
     )
+    TOO_FEW = (
+        "The mixture gave fewer effective draws than were asked for, so the intervals cannot be "
+        "trusted: use thorough effort, record more varied data, or choose a simpler candidate "
+        "model."
+    )
     CONVERGED = (
         "The ensembles agree and are long against their autocorrelation, so the draws are the "
         "posterior's."

@@ -1,19 +1,20 @@
 """The inertia of sweeps beside that of a probe's pushes."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
 
-from scissorcal.calibration.friction.against_probe import inertia_verdict, with_pushed_inertia
-from scissorcal.inference.posterior import Posterior
-from scissorcal.model.transforms import LOG
+from scissorcal.calibration import FitResult, fit_friction
+from scissorcal.calibration.caveats import LONG_WINDOWS, caveats_of
+from scissorcal.calibration.friction.against_probe import inertia_verdict
+from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.header import Joint
 from scissorcal.recording.probe import PROBE_KEY, Estimate, ProbeResult
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from tests.calibration.truth import QUICK, Truth, friction_recording
 
 PUSHED, SD = 4e-4, 0.04
 
@@ -34,7 +35,6 @@ def swept(inertia: float, lengthening: float, kind: str) -> tuple[SimpleNamespac
     logs += np.array([math.log(inertia), -4.0])
     layout = SimpleNamespace(
         names=("inertia", "coulomb"),
-        parameters=(SimpleNamespace(transform=LOG), SimpleNamespace(transform=LOG)),
         natural=lambda u: {"inertia": np.exp(u[:, 0])},
     )
     windows = SimpleNamespace(lengthening=lengthening)
@@ -45,22 +45,6 @@ def swept(inertia: float, lengthening: float, kind: str) -> tuple[SimpleNamespac
 def judged(inertia: float, *recordings: Recording, lengthening: float = 1.0, kind: str = "rotary"):
     law, draws = swept(inertia, lengthening, kind)
     return inertia_verdict(law, draws, recordings)  # type: ignore[arg-type]
-
-
-def pushed(inertia: float, *recordings: Recording, lengthening: float = 2.0, kind: str = "rotary"):
-    law, draws = swept(inertia, lengthening, kind)
-    posterior = cast(Posterior, Drawn(draws))
-    rng = np.random.default_rng(1)
-    found, note = with_pushed_inertia(posterior, law, recordings, rng)  # type: ignore[arg-type]
-    assert found.draws[:, 1] == pytest.approx(draws[:, 1], abs=0.0), "nothing else changes"
-    return np.exp(found.draws[:, 0]), note
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """The part of a posterior that is asked here."""
-
-    draws: np.ndarray
 
 
 NOW = "2026-11-28T00:00:00+00:00"
@@ -80,30 +64,58 @@ def test_the_verdict_names_both_and_what_to_do() -> None:
     assert "inertia of 800 +- 24 kg mm^2, the probe's pushes 400 +- 16 kg mm^2" in found.why
 
 
-def test_where_steps_hide_how_sweeps_swing_the_pushes_inertia_stands() -> None:
-    draws, note = pushed(2.0 * PUSHED, recording(NOW))
-    assert draws.mean() == pytest.approx(PUSHED, rel=0.01)
-    assert draws.std() == pytest.approx(SD * PUSHED, rel=0.1)
-    assert "pushes, 400 +- 16 kg mm^2" in note
-    assert "800 +- 24 kg mm^2" in note
-    assert judged(2.0 * PUSHED, recording(NOW), lengthening=2.0) is None
-
-
-def test_windows_that_are_long_enough_keep_the_sweeps_inertia() -> None:
-    draws, note = pushed(2.0 * PUSHED, recording(NOW), lengthening=1.8)
-    assert (draws.mean() == pytest.approx(2.0 * PUSHED, rel=0.01), note) == (True, "")
+def test_the_encoder_is_named_where_windows_had_to_be_longer() -> None:
+    found = judged(2.0 * PUSHED, recording(NOW), lengthening=1.8)
+    assert found.status == "fail"
+    assert "the encoder's steps hide how these sweeps swing" in found.why
 
 
 def test_the_newest_probe_counts() -> None:
     assert judged(PUSHED, recording(BEFORE, 8e-4), recording(NOW)).status == "pass"
-    assert pushed(PUSHED, recording(BEFORE, 8e-4), recording(NOW))[0].mean() == pytest.approx(
-        PUSHED, rel=0.01
-    )
 
 
-def test_without_a_probe_or_turning_blades_nothing_is_compared_or_replaced() -> None:
+def test_without_a_probe_or_turning_blades_nothing_is_compared() -> None:
     bare = Recording("friction", np.zeros(10, SAMPLE_DTYPE))
     assert judged(PUSHED, bare) is None
     assert judged(PUSHED, recording(NOW), kind="linear") is None
-    assert pushed(2.0 * PUSHED, bare)[1] == ""
-    assert pushed(2.0 * PUSHED, recording(NOW), kind="linear")[1] == ""
+
+
+COARSE_RAD = 2.0 * math.pi / 8192
+
+
+def swept_day(step_rad: float | None, probe: bool) -> FitResult:
+    """A fit of one recording of sweeps, draft; truth 2e-4 kg m^2, which the probe calls 4e-4."""
+    made = friction_recording(Truth(), np.random.default_rng(3), QUICK)
+    samples = made.samples.copy()
+    if step_rad is not None:
+        samples["opening"] = np.round(samples["opening"] / step_rad) * step_rad
+    device = recording(NOW).device if probe else {}
+    settings = FitFriction(rung="coulomb+viscous", critic=False)
+    day = (replace(made, samples=samples, device=device),)
+    return fit_friction(day, settings, effort="draft", rng=np.random.default_rng(0))
+
+
+def test_behind_coarse_steps_a_fit_takes_the_pushes_inertia() -> None:
+    alone, found = swept_day(COARSE_RAD, probe=False), swept_day(COARSE_RAD, probe=True)
+    assert found.diagnostics["window_lengthening"] >= LONG_WINDOWS
+    own, stated = alone.parameter("inertia"), found.parameter("inertia")
+    assert own.mean == pytest.approx(2e-4, rel=0.1)
+    assert stated.mean == pytest.approx(PUSHED, rel=0.01)
+    assert stated.sd == pytest.approx(SD * PUSHED, rel=0.1)
+    assert stated.believed
+    place = [one.name for one in found.parameters].index("inertia")
+    assert found.map_point[place] == pytest.approx(PUSHED)
+    others = np.arange(len(found.parameters)) != place
+    assert found.draws[:, others] == pytest.approx(alone.draws[:, others], abs=0.0)
+    assert found.series.predicted == pytest.approx(alone.series.predicted, abs=0.0), "of sweeps"
+    assert "the probe's pushes, 400 +- 16 kg mm^2" in found.notes[-1]
+    assert "inertia" not in [verdict.check for verdict in found.verdicts]
+    assert [one.parameters for one in caveats_of(alone)] == [("inertia",)]
+    assert caveats_of(found) == ()
+
+
+def test_a_fine_encoder_keeps_the_sweeps_inertia_and_compares() -> None:
+    found = swept_day(None, probe=True)
+    assert found.parameter("inertia").mean == pytest.approx(2e-4, rel=0.05)
+    (verdict,) = (one for one in found.verdicts if one.check == "inertia")
+    assert verdict.status == "fail"

@@ -68,9 +68,11 @@ def test_static_below_coulomb_friction_is_named():
 
 
 def test_a_sign_that_changes_hardly_any_torque_is_no_negative_level():
-    """Viscous friction of -0.2 mN m s/rad, 5 sds below zero: 1 % of the drive."""
+    """Viscous friction of -0.2 mN m s/rad, 7 sds below zero: 1 % of the drive."""
     recording = friction_recording(Truth(viscous=-2e-4), np.random.default_rng(1), QUICK)
-    assert verdicts(recording, "coulomb+viscous")["physical"].status == "pass"
+    found = verdicts(recording, "coulomb+viscous")["physical"]
+    assert found.status == "pass"
+    assert "negative levels, but asks for a torque that differs by 1.0% of the drive" in found.why
 
 
 def test_a_torque_of_the_wrong_sign_is_named():

@@ -117,6 +117,8 @@ def average(
         effective=min(richest.posterior.effective, poorer.posterior.effective),
         status=worst.posterior.status,
         sentence=worst.posterior.sentence,
+        effort_reached=worst.posterior.effort_reached,
+        ensembles=worst.posterior.ensembles,
         evaluations=richest.posterior.evaluations + poorer.posterior.evaluations,
     )
     return replace(richest, law=law, posterior=averaged)

@@ -41,15 +41,21 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
     that constraint and without priors, suspects it. Far from the optimum such a step is none of
     the law any more, so two searches that settle decide, with free signs and without: a level is
     negative where the first explains the data better by CERTAIN standard deviations, and asks for a
-    torque that differs by NOTHING of the drive or more. Laws without
-    viscous friction get it for both. ``share`` is the share of bins that are independent.
+    torque that differs by NOTHING of the drive or more. Laws without viscous friction get it for
+    both. ``share`` is the share of bins that are independent.
     """
     values = {name: float(value) for name, value in experiment.layout.natural(point).items()}
     rows = _rated(experiment, values)
     found = [level for row in rows for level in _freed(experiment, row, share)]
     suspected = [level for level in found if level.sds_below > CERTAIN]
-    negative = sorted(_settled(experiment, rows, share) if suspected else [])
+    settled, felt = _settled(experiment, rows, share) if suspected else ([], 0.0)
+    negative = sorted(settled) if felt >= NOTHING else []
     good = "No friction level is negative in an unconstrained fit, and the inertia is not."
+    if settled and not negative:
+        good = (
+            f"An unconstrained fit has negative levels, but asks for a torque that differs by "
+            f"{felt:.1%} of the drive alone: any freedom explains a part of what a law lacks."
+        )
     worst = {level.name: level for level in negative}.values()
     listed = ", ".join(f"{one.name} = {one.value:.2g} (sd {one.sd:.1g})" for one in worst)
     remedies = "; ".join(dict.fromkeys(one.remedy for one in worst))
@@ -198,11 +204,10 @@ def _names(experiment: FrictionExperiment, values: Mapping[str, float]) -> list[
 
 def _settled(
     experiment: FrictionExperiment, rows: list[dict[str, float]], share: float
-) -> list[_Level]:
-    """Negative levels of the best fit with free signs; none where one without is as good.
+) -> tuple[list[_Level], float]:
+    """Negative levels of the best fit with free signs, and by how much its torque differs.
 
-    It is as good, too, where both ask for the same torque: what a law lacks is explained in part by
-    any freedom that it is given.
+    The latter is a share of the drive's sd. There are none where a fit without is as good.
     """
     weights = _student_weights(experiment, rows[0])
     held, free = (
@@ -215,12 +220,12 @@ def _settled(
     # Twice the gain of a likelihood whose noise is known from what the better fit leaves.
     count = share * len(experiment.observed)
     away = float(np.sqrt(max(count * np.log(held[0] / max(free[0], 1e-300)), 0.0)))
+    if away <= CERTAIN:
+        return [], 0.0
     torques = [experiment.mean_at(_arrays(values)) for _, values in (held, free)]
     felt = float(np.std(torques[1] - torques[0])) / float(np.std(experiment.observed))
-    if away <= CERTAIN or felt < NOTHING:
-        return []
     below = [_Level(away, n, v, abs(v) / away) for n, v in free[1].items() if v < 0.0]
-    return [level for level in below if level.remedy]
+    return [level for level in below if level.remedy], felt
 
 
 def _student_weights(experiment: FrictionExperiment, values: Mapping[str, float]) -> Array:

@@ -19,7 +19,11 @@ from scissorcal.calibration.between import (
 )
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate
-from scissorcal.calibration.friction.against_probe import inertia_verdict, with_pushed_inertia
+from scissorcal.calibration.friction.against_probe import (
+    hidden_from_sweeps,
+    inertia_verdict,
+    with_pushed_inertia,
+)
 from scissorcal.calibration.friction.checks import (
     bandwidth_verdict,
     near_rest_verdict,
@@ -120,11 +124,11 @@ def fit_friction(
         posterior = opened(posterior, law, slow, chosen.held_out_rms, rng)
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
     posterior = widened(posterior, between, rng)
-    swung = inertia_verdict(law, posterior.draws, recordings)
-    posterior, pushed = with_pushed_inertia(posterior, law, recordings, rng)
+    swung = None if prior else inertia_verdict(law, posterior.draws, recordings)
+    unshown = ("inertia",) if hidden_from_sweeps(law, recordings) else ()
     usage = usage_of_windows(recordings, every, sensors.usable)
     drive = float(np.sqrt(np.mean(law.observed**2)))
-    return assemble(
+    fit = assemble(
         what="friction",
         effort=effort,
         posterior=posterior,
@@ -156,18 +160,18 @@ def fit_friction(
         extra_notes=(
             *sensors.notes,
             *_notes(every, windows, posterior, joint, cogging),
-            *((pushed,) if pushed else ()),
             *_symmetry_note(law, chosen),
             *draft_note(effort, every_law, laws),
             usage.sentence,
-            *(between.notes(NUISANCE) if between else (NOT_KNOWN,)),
+            *(between.notes((*NUISANCE, *unshown)) if between else (NOT_KNOWN,)),
         ),
         extra_diagnostics={
             **_diagnostics(law, chosen, between, recordings),
             **(zero.as_dict() if zero else {}),
-            **({"inertia_of_probe": True} if pushed else {}),
         },
     )
+    # A study of simulated data asks what sweeps tell: its recordings hold the rig's own probe.
+    return fit if prior else with_pushed_inertia(fit, law, recordings, rng)
 
 
 def friction_experiment(

@@ -32,7 +32,6 @@ def typical_values(friction: FitResult) -> dict[str, Array]:
     means = {p.name: np.asarray(p.mean) for p in (*friction.parameters, *friction.nuisance)}
     names = [p.name for p in friction.parameters]
     highest = {**means, **dict(zip(names, np.asarray(friction.map_point), strict=True))}
-    highest["inertia"] = means["inertia"]  # the mode is that of sweeps, even where a probe's stands
     draws = {name: friction.column(name) for name in names}
     middle = np.median([friction_and_offset(draws, centre, rate) for rate in RATES], axis=1)
 

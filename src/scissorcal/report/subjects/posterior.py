@@ -36,7 +36,7 @@ NINETY_PERCENT = 4.605
 """Squared radius that holds 90 % of a normal distribution in the plane."""
 
 MEANINGS = {
-    "k_hat": f"Tail of the importance weights: the draws can be used up to {K_HAT_LIMIT}.",
+    "k_hat": f"Tail of the importance weights: above {K_HAT_LIMIT} no draws can be used.",
     "effective_samples": "Number of independent draws that the posterior's are worth.",
     "evaluations": "Number of evaluations of the model.",
     "observations": "Number of bins in the likelihood.",
