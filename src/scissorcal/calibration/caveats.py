@@ -15,7 +15,7 @@ FEW_COUNTS = 1.0
 
 LONG_WINDOWS = 2.0
 """Lengthening of friction's windows from which sweeps do not show the inertia. Where a probe found
-it, the fit takes it from there, and says so in ``OF_PROBE`` of its diagnostics."""
+it, the fit takes it from there, and ``OF_PROBE`` stands in its diagnostics."""
 OF_PROBE = "inertia_of_probe"
 
 RESPONSE = ("response_force", "response_exponent")

@@ -114,15 +114,14 @@ def _simulated(study: Study, index: int, rng: np.random.Generator) -> dict[str, 
     ranks: list[int | None] = [None] * len(truths)
     for i, rank in zip(known, rank_among(drawn, truths[known], rng).tolist(), strict=True):
         ranks[i] = rank
-    k_hat = float(fit.diagnostics["k_hat"])
     return {
         "ranks": ranks,
         "truths": truths.tolist(),
         "law": fit.rung,
-        "k_hat": k_hat if np.isfinite(k_hat) else None,
         "effective": float(fit.diagnostics["effective_samples"]),
         "effort": fit.diagnostics["effort_reached"],
-        "settled": all(v.check != "optimum" or v.status != "fail" for v in fit.verdicts),
+        "trusted": _passes(fit, "k-hat"),
+        "settled": _passes(fit, "optimum"),
     }
 
 
@@ -215,12 +214,15 @@ def quantities(study: Study, points: Array) -> Array:
     return np.column_stack([natural, effort])
 
 
+def _passes(fit: FitResult, check: str) -> bool:
+    return all(verdict.check != check or verdict.status != "fail" for verdict in fit.verdicts)
+
+
 def _diagnostics(posterior: Posterior) -> dict[str, Any]:
-    k = posterior.k_hat
     return {
-        "k_hat": k if np.isfinite(k) else None,
         "effective": posterior.effective,
         "effort": posterior.effort_reached,
+        "trusted": posterior.effort_reached == "draft" or posterior.status.trusted,
         "settled": bool(posterior.optimum.success),
     }
 

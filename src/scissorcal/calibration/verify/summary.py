@@ -25,7 +25,6 @@ from scissorcal.calibration.verify.result import (
 )
 from scissorcal.calibration.verify.study import LEVELS, Record, Study
 from scissorcal.inference import gradient
-from scissorcal.inference.importance import K_HAT_LIMIT
 
 Array = NDArray[np.float64]
 
@@ -158,9 +157,7 @@ def _coverage(ranks: NDArray[np.int64], level: float, alpha: float) -> Coverage:
 
 
 def _unreliable(record: Record) -> bool:
-    k = record["k_hat"]
-    failed = record["effort"] == "standard" and (k is None or k >= K_HAT_LIMIT)
-    return failed or not record["settled"]
+    return not (record["trusted"] and record["settled"])
 
 
 def _halves_row(

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, str], None]
 
-ALGORITHM = 4
+ALGORITHM = 5
 """Raised whenever a fit of the same inputs would give other numbers."""
 
 CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")
