@@ -101,7 +101,7 @@ def test_a_good_fit_fails_nothing():
 def test_a_mixture_with_too_few_effective_draws_fails_without_a_limit_that_it_keeps():
     def few(posterior, diagnostics):
         said = "k-hat 0.60, 0.35 with an adapted mixture and 300 of 2000 effective draws"
-        status = SamplingStatus.HEAVY_WEIGHTS
+        status = SamplingStatus.TOO_FEW
         return dataclasses.replace(posterior, k_hat=0.35, status=status, sentence=said), diagnostics
 
     found = judged(motion(), spoil=few, effort="standard")["k-hat"]

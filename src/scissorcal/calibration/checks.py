@@ -12,6 +12,7 @@ from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior, SearchStatus
 from scissorcal.inference.importance import ADAPTED_LIMIT
 from scissorcal.inference.importance import K_HAT_LIMIT as K_HAT_LIMIT
+from scissorcal.inference.status import SamplingStatus
 from scissorcal.model.friction_terms import NEAR_REST
 from scissorcal.verdicts import Status, Verdict, judge, not_evaluated
 
@@ -98,14 +99,11 @@ def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:
         why = "Draft effort does not check the posterior's shape; use --effort standard."
         return not_evaluated(scope, "k-hat", why, K_HAT_LIMIT)
     status: Status = "pass" if posterior.status.trusted else "fail"
-    if posterior.ensembles:
-        # what decides then is in the sentence; k-hat is of a proposal that was not used
+    if posterior.ensembles or posterior.status is SamplingStatus.TOO_FEW:
+        # what decides then is in the sentence: k-hat is of a proposal that was not used, or passes
         return Verdict(scope, "k-hat", status, None, None, posterior.sentence)
-    exceeded = [limit for limit in LIMITS if k is not None and k > limit]
-    if status == "fail" and k is not None and not exceeded:
-        # too few effective draws, as the sentence says
-        return Verdict(scope, "k-hat", status, None, None, posterior.sentence)
-    limit = exceeded[0] if status == "fail" and exceeded else K_HAT_LIMIT
+    exceeded = [limit for limit in LIMITS if status == "fail" and k is not None and k > limit]
+    limit = exceeded[0] if exceeded else K_HAT_LIMIT
     return Verdict(scope, "k-hat", status, k, limit, posterior.sentence)
 
 

@@ -260,8 +260,7 @@ class _Run:
                 said += f" and {mixed.effective:.0f} effective draws ({mixed.wanted:.0f} wanted)"
                 # Weights that passed are not refused by the stricter limits of a better proposal.
                 passed = sampled.trusted and mixed.k_hat < sampled.k_hat
-                limits = (sampled.limit, 0.0) if passed else (mixed.limit, mixed.wanted)
-                sampled = replace(mixed, limit=limits[0], wanted=limits[1])
+                sampled = replace(mixed, limit=sampled.limit, wanted=0.0) if passed else mixed
         if sampled.trusted or not escalate:
             return self._weighed(sampled, said)
         left = budget - (self.counter.calls - first)

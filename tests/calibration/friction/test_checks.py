@@ -72,7 +72,7 @@ def test_a_sign_that_changes_hardly_any_torque_is_no_negative_level():
     recording = friction_recording(Truth(viscous=-2e-4), np.random.default_rng(1), QUICK)
     found = verdicts(recording, "coulomb+viscous")["physical"]
     assert found.status == "pass"
-    assert "negative levels, but asks for a torque that differs by 1.0% of the drive" in found.why
+    assert "negative levels, but its torque differs by only 1.0% of the drive" in found.why
 
 
 def test_a_torque_of_the_wrong_sign_is_named():

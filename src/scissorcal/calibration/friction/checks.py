@@ -53,8 +53,8 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
     good = "No friction level is negative in an unconstrained fit, and the inertia is not."
     if settled and not negative:
         good = (
-            f"An unconstrained fit has negative levels, but asks for a torque that differs by "
-            f"{felt:.1%} of the drive alone: any freedom explains a part of what a law lacks."
+            f"An unconstrained fit has negative levels, but its torque differs by only {felt:.1%} "
+            "of the drive: any freedom explains a part of what a law lacks."
         )
     worst = {level.name: level for level in negative}.values()
     listed = ", ".join(f"{one.name} = {one.value:.2g} (sd {one.sd:.1g})" for one in worst)
