@@ -60,14 +60,37 @@ def best_of(fitted: Sequence[FittedCandidate]) -> FittedCandidate:
     return max(fitted, key=lambda one: float(one.scores.sum()))
 
 
+def contenders(fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
+    """The candidates for which PSIS-LOO could speak, the best among them.
+
+    PSIS-LOO and fits without the strokes estimate the same log density of unseen strokes. It lies
+    about a nat a parameter below that of strokes that were fitted (Akaike 1974,
+    doi:10.1109/TAC.1974.1100705), and both estimates lie within as much of it again: one that fits
+    leave farther behind than the parameters of both candidates is rejected by either.
+    """
+    best = best_of(fitted)
+
+    def near(one: FittedCandidate) -> bool:
+        behind = float((best.scores - one.scores).sum()) * best.share
+        return behind < POSITIVE_EVIDENCE + len(one.optimum.point) + len(best.optimum.point)
+
+    return [one for one in fitted if near(one)]
+
+
 def _rows(
     fitted: Sequence[FittedCandidate], signal_rms: float, negligible: float = NEGLIGIBLE
 ) -> tuple[CandidateRow, ...]:
     best = best_of(fitted)
     accounts = [Account(np.stack([one.scores for one in fitted]) * best.share)]
     if len(fitted) > 1:
-        scores = np.stack([one.left_out.scores for one in fitted]) * best.share
-        accounts.append(Account(scores, np.stack([one.left_out.reliable for one in fitted])))
+        near = [id(one) for one in contenders(fitted)]
+        scores = np.full_like(accounts[0].scores, np.nan)
+        reliable = np.zeros(scores.shape, dtype=bool)
+        for index, one in enumerate(fitted):
+            if id(one) in near:
+                scores[index] = one.left_out.scores * best.share
+                reliable[index] = one.left_out.reliable
+        accounts.append(Account(scores, reliable))
     limit = (negligible * signal_rms) ** 2
     return compare(
         [one.name for one in fitted],
@@ -86,11 +109,12 @@ def candidate_rows(
     loo_k_hat. ``bic``, ``held_out_score`` and ``loo`` count only as many observations as are
     independent, the same share for every candidate. ``loo`` is the log density of all strokes, each
     by the posterior without it, ``loo_se`` its standard error over strokes, ``loo_k_hat`` the worst
-    stroke's tail index; they are NaN for a single candidate, as there is nothing to compare.
+    stroke's tail index; they are NaN for a single candidate, as there is nothing to compare, and for
+    those that are no :func:`contenders`.
     ``key`` and ``values`` (by name, at the best point) are what a candidate's law is drawn from.
     """
     share = best_of(fitted).share
-    compared = len(fitted) > 1
+    near = [id(one) for one in contenders(fitted)] if len(fitted) > 1 else []
     rows = []
     for row, one in zip(_rows(fitted, 0.0), fitted, strict=True):
         used = one.name == chosen.name
@@ -103,7 +127,7 @@ def candidate_rows(
                 "bic": -2 * one.log_likelihood * share + row.parameters * count,
                 "held_out_rms": one.held_out_rms,
                 "held_out_score": row.score,
-                **_loo(one, share if compared else float("nan")),
+                **_loo(one, share if id(one) in near else float("nan")),
                 "key": dict(one.candidate.key),
                 "values": {name: float(value) for name, value in natural.items()},
             }

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.comparison import best_of
+from scissorcal.calibration.comparison import best_of, contenders
 from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.calibration.psis_loo import DRAWS, LeftOut
 from scissorcal.calibration.result import Effort, Predictive
@@ -30,15 +30,16 @@ def predictive_of(
     effort: Effort,
     rng: np.random.Generator,
 ) -> Predictive:
-    """Replicate the data of a fit, and collect log-likelihoods by stroke of its candidates.
+    """Replicate the data of a fit, and collect log-likelihoods by stroke of its contenders.
 
     ``compared`` are the candidates that were compared, ``chosen`` is among them. ``predictions``
     (draws, k) are means by draws of the posterior at the points that ``thin`` selects; to some of
-    them a draw of the noise is added. Draft effort has no log-likelihoods.
+    them a draw of the noise is added. Those that are no :func:`~.comparison.contenders`, and draft effort, have no log-likelihoods.
     """
     own = next(one for one in compared if one.candidate is chosen.candidate)
     share = best_of(list(compared)).share
-    sampled = [] if effort == "draft" else [one for one in compared if len(one.left_out.densities)]
+    near = [] if effort == "draft" else contenders(compared)
+    sampled = [one for one in near if len(one.left_out.densities)]
     densities = np.zeros((RESAMPLED, len(np.unique(own.strokes)), len(sampled)))
     for index, one in enumerate(sampled):
         densities[:, :, index] = share * _resampled(one.left_out)
@@ -65,7 +66,7 @@ def _noise(fitted: FittedCandidate, count: int, rng: np.random.Generator) -> Arr
     likelihood, point = fitted.candidate.likelihood, fitted.optimum.point
     sd = np.exp(likelihood.normal(point)[1])
     noise = fit_ar(likelihood.residuals(point) / sd, fitted.series)
-    return np.stack([sd * noise.draw(fitted.series, rng) for _ in range(count)])
+    return sd * noise.draws(fitted.series, count, rng)
 
 
 def _resampled(left_out: LeftOut) -> Array:

@@ -38,19 +38,29 @@ class ArNoise:
         >>> round(float(e.std()), 1), round(noise.marginal_sd, 1)
         (2.3, 2.3)
         """
-        from scipy.signal import lfilter, lfiltic
+        return np.asarray(self.draws(series, 1, rng)[0])
 
-        innovations = rng.standard_normal(len(series)) * self.sd
+    def draws(self, series: Labels, count: int, rng: np.random.Generator) -> Array:
+        """Several draws of the noise at once, (count, n).
+
+        They solve one banded system: row t of it is e_t less its past within the run.
+        """
+        from scipy.linalg import solve_banded
+
+        innovations = rng.standard_normal((count, len(series))) * self.sd
         if self.order == 0:
             return innovations
-        a = np.concatenate([[1.0], -np.asarray(self.coefficients)])
-        root = _root(self._stationary())
-        drawn = np.empty(len(series))
-        for low, high in runs(series):
-            past = root @ rng.standard_normal(self.order)
-            state = lfiltic([1.0], a, past)
-            drawn[low:high] = lfilter([1.0], a, innovations[low:high], zi=state)[0]
-        return drawn
+        bounds = runs(series)
+        past = rng.standard_normal((count, len(bounds), self.order)) @ _root(self._stationary()).T
+        band = np.zeros((self.order + 1, len(series)))
+        band[0] = 1.0
+        for lag, coefficient in enumerate(self.coefficients, start=1):
+            for run, (low, high) in enumerate(bounds):
+                band[lag, low : max(high - lag, low)] = -coefficient
+                begun = min(lag, high - low)
+                before = past[:, run, lag - begun : lag][:, ::-1]
+                innovations[:, low : low + begun] += coefficient * before
+        return np.asarray(solve_banded((self.order, 0), band, innovations.T).T)
 
     @property
     def marginal_sd(self) -> float:

@@ -1,14 +1,16 @@
 """The law that is used: chosen among candidates, fitted with the noise that its residuals have."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.candidates import POSITIVE_EVIDENCE
 from scissorcal.calibration.comparison import NEGLIGIBLE, choose
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.friction.model import FrictionExperiment
+from scissorcal.calibration.friction.reversals import BUILD_UP, gain_of_build_up
 from scissorcal.inference import Stop, tails_of
 
 Progress = Callable[[float, str], None]
@@ -20,32 +22,56 @@ place of normal noise; milder tails are left to the widening by the scores."""
 
 def choose_law(
     laws: list[FrictionExperiment], lack_of_fit: float, stop: Stop | None, tell: Progress
-) -> tuple[list[FittedCandidate], FittedCandidate, FrictionExperiment]:
+) -> tuple[list[FittedCandidate], FittedCandidate, FrictionExperiment, tuple[str, ...]]:
     """Fit every candidate law and choose one.
 
-    The fits of all laws, that of the chosen one, and its design. The chosen law is fitted again
-    with a Student-t noise where its residuals have outliers; that fit takes the place of the first.
-    A share ``lack_of_fit`` of the drive that is stated as the law's error is what makes laws
-    differ, and residuals below it have no outliers.
+    The fits of all laws, that of the chosen one, its design, and notes on laws that were passed
+    over: those with build-up after reversals, where :func:`~.reversals.gain_of_build_up` is less
+    than evidence asks for. The chosen law is fitted again with a Student-t noise where its
+    residuals have outliers; that fit takes the place of the first. A share ``lack_of_fit`` of the
+    drive that is stated as the law's error is what makes laws differ, and residuals below it have
+    no outliers.
     """
     compared: list[FittedCandidate] = []
-    for index, law in enumerate(laws):
-        tell(0.6 * index / len(laws), f"friction: trying {law.name}")
+    by_name: dict[str, FittedCandidate] = {}
+    passed: dict[str, float] = {}
+    every, laws = laws, []
+    for index, law in enumerate(every):
+        plain = by_name.get(law.name.replace(BUILD_UP, ""))
+        if plain is not None and law.name not in by_name:
+            gain = gain_of_build_up(plain, law)
+            if gain < POSITIVE_EVIDENCE:
+                passed[law.name] = gain
+                continue
+        tell(0.6 * index / len(every), f"friction: trying {law.name}")
+        laws.append(law)
         compared.append(fit_candidate(law.candidate(law.observed), law.series, law.strokes, stop))
+        by_name[law.name] = compared[-1]
     drive = _rms(laws[0].observed)
     chosen = choose(compared, drive, lack_of_fit or NEGLIGIBLE)
     place = next(i for i, one in enumerate(compared) if one.candidate is chosen.candidate)
     law = replace(laws[place], share=chosen.candidate.share)
     likelihood, point = chosen.candidate.likelihood, chosen.optimum.point
     if _rms(likelihood.residuals(point)) < lack_of_fit * drive:
-        return compared, chosen, law
+        return compared, chosen, law, _notes(passed)
     tails = tails_of(likelihood.standardised(point), chosen.share)
     if tails > OUTLIERS:
-        return compared, chosen, law
+        return compared, chosen, law, _notes(passed)
     robust = replace(law, tails=tails).candidate(law.observed)
     again = fit_candidate(replace(robust, starts=point[None, :]), law.series, law.strokes)
     compared[place] = replace(again, equivalent=chosen.equivalent)
-    return compared, compared[place], law
+    return compared, compared[place], law, _notes(passed)
+
+
+def _notes(passed: Mapping[str, float]) -> tuple[str, ...]:
+    """Which laws were not fitted, and why."""
+    if not passed:
+        return ()
+    most = max(passed.values())
+    return (
+        f"Not fitted: {', '.join(passed)}. Build-up of friction after reversals would add "
+        f"{most:.1f} nats at most, and evidence asks for {POSITIVE_EVIDENCE:g}.",
+    )
 
 
 def _rms(values: NDArray[np.float64]) -> float:

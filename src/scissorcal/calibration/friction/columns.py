@@ -86,6 +86,30 @@ class FrictionBasis:
         """Friction, inertia, offset, lateness and cogging together (n,)."""
         return self._total(self.coefficients(values), values)
 
+    def lacking(self, values: Mapping[str, Array], length: float) -> Array:
+        """Dry friction that is missing after reversals (n,) if all of it builds up over ``length``.
+
+        Exact at that length, and far cheaper than the columns of its nodes.
+        """
+        known = {name: float(value) for name, value in values.items()}
+
+        def level(name: str) -> float:
+            side = side_of(name, known)
+            return 0.0 if side is None else known[side]
+
+        dry = np.zeros(len(self.windows.rate))
+        for term in self._dry:
+            names = term.names(symmetric=False)
+            for name, column in zip(names, self._levels_of((term,)), strict=True):
+                dry += level(name) * column
+        if _SCALED.name in known:
+            dry += known[_SCALED.name] * _SCALED.column(self.motion, known[SCALES[0]])
+        away = self.windows.opening - self._center
+        place = 1.0 + sum(
+            level(name) * away**power for power, name in enumerate(self._place, start=1)
+        )
+        return self.windows.average(self._late(length) * dry * place)
+
     def coupled(self, rate: int, length: int) -> Array:
         """What Stribeck friction still lacks after a reversal, at every other node of a scale."""
         if (rate, length) not in self._coupled:

@@ -115,7 +115,7 @@ def fit_friction(
     settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
     laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
-    compared, chosen, law = choose_law(laws, settings.lack_of_fit, stop, tell)
+    compared, chosen, law, passed = choose_law(laws, settings.lack_of_fit, stop, tell)
     infer_law = partial(infer, checkpoint=checkpoint, stop=stop, progress=_last_part(tell))
     problem = chosen.candidate.problem(law.series)
     posterior = infer_law(problem, effort, rng, optimum=chosen.optimum)
@@ -161,6 +161,7 @@ def fit_friction(
             *sensors.notes,
             *_notes(every, windows, posterior, joint, cogging),
             *_symmetry_note(law, chosen),
+            *passed,
             *draft_note(effort, every_law, laws),
             usage.sentence,
             *(between.notes((*NUISANCE, *unshown)) if between else (NOT_KNOWN,)),

@@ -159,10 +159,10 @@ def _scanned(problem: CandidateProblem) -> list[Array]:
         return []
     late = names.index("presliding_length")
     slow = names.index("stribeck_rate") if "stribeck_rate" in names else None
-    lengths = _grid(problem, late, basis.lag.spacing)
+    lengths = _scan(problem, late, basis.lag.spacing)
     rates: list[int | None] = [None]
     if slow is not None:
-        rates = list(_grid(problem, slow, basis.stribeck.spacing))
+        rates = list(_scan(problem, slow, basis.stribeck.spacing))
     found = []
     for rate, length in product(rates, lengths):
         cell: Cell = (() if rate is None else (rate,), (length,))
@@ -184,9 +184,16 @@ def _scanned(problem: CandidateProblem) -> list[Array]:
     return starts
 
 
-def _grid(problem: CandidateProblem, place: int, spacing: float) -> list[int]:
-    """Nodes over the prior of a scale's logarithm."""
-    middle, reach = problem.prior_mean[place], SCAN_REACH * problem.prior_sd[place]
+def _scan(problem: CandidateProblem, place: int, spacing: float) -> list[int]:
+    return scan_nodes(problem.prior_mean[place], problem.prior_sd[place], spacing)
+
+
+def scan_nodes(middle: float, sd: float, spacing: float) -> list[int]:
+    """Nodes over the prior of a scale's logarithm, of which mean and standard deviation are given.
+
+    ``spacing`` is the distance of nodes in the logarithm.
+    """
+    reach = SCAN_REACH * sd
     count = max(2, round(2 * reach / SCAN_STEP) + 1)
     logs = np.linspace(middle - reach, middle + reach, count)
     return list(np.unique(np.round(logs / spacing).astype(int)).tolist())
