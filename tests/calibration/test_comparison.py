@@ -109,7 +109,8 @@ def test_a_distinguishable_candidate_is_not_equivalent():
     assert chosen.name == "parabola"
     rows = candidate_rows(fitted, chosen)
     assert [row["equivalent"] for row in rows] == [False, True]
-    assert rows[1]["loo"] > rows[0]["loo"]
+    assert np.isfinite(rows[1]["loo"])
+    assert np.isnan(rows[0]["loo"])  # far behind: PSIS-LOO could not speak for it
     assert rows[1]["loo_se"] > 0
 
 

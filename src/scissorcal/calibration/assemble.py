@@ -47,6 +47,7 @@ def assemble(
     rng: np.random.Generator,
     critic: bool,
     usage: Usage,
+    brief: bool = False,
     load: Array | None = None,
     extra_verdicts: tuple[Verdict, ...] = (),
     extra_notes: tuple[str, ...] = (),
@@ -60,6 +61,7 @@ def assemble(
     common ones. ``critic``
     has the residuals searched for what the law lacks, unless the effort is draft; ``load`` (n,) is
     what the joint bore, where that was measured. ``usage`` says which samples the fit uses.
+    ``brief`` leaves out what only people read: replay and replicated data.
     """
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
     thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))
@@ -76,6 +78,19 @@ def assemble(
     trust = trust_verdicts(
         what, effort, chosen, posterior, diagnostics, held_out, nuisance, bins, contact
     )
+    for_people: dict[str, Any] = {}
+    if not brief:
+        for_people["replay"] = compare_with_replay(
+            chosen,
+            bins,
+            measured,
+            contact,
+            tuple(recording.source for recording in recordings),
+            refit=what == "cut" and effort != "draft",
+        )
+        for_people["predictive"] = predictive_of(
+            compared, chosen, predictions, thin, effort, rng.spawn(1)[0]
+        )
     return FitResult(
         what=what,
         effort=effort,
@@ -94,15 +109,7 @@ def assemble(
         notes=(*(note for recording in recordings for note in recording.notes), *extra_notes),
         selection=comparison_text(compared, chosen, bins, contact, joint),
         critic=critique.proposals,
-        replay=compare_with_replay(
-            chosen,
-            bins,
-            measured,
-            contact,
-            tuple(recording.source for recording in recordings),
-            refit=what == "cut" and effort != "draft",
-        ),
-        predictive=predictive_of(compared, chosen, predictions, thin, effort, rng.spawn(1)[0]),
+        **for_people,
         **tables,
     )
 

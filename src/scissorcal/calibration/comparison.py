@@ -1,6 +1,6 @@
 """Compare fitted candidates on hold-out strokes, in rows and in words, and say what to measure."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -61,20 +61,42 @@ def best_of(fitted: Sequence[FittedCandidate]) -> FittedCandidate:
 
 
 def contenders(fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
-    """The candidates for which PSIS-LOO could speak, the best among them.
+    """The candidates that come near the best (:func:`is_near`), the best among them.
 
-    PSIS-LOO and fits without the strokes estimate the same log density of unseen strokes. It lies
-    about a nat a parameter below that of strokes that were fitted (Akaike 1974,
-    doi:10.1109/TAC.1974.1100705), and both estimates lie within as much of it again: one that fits
-    leave farther behind than the parameters of both candidates is rejected by either.
+    PSIS-LOO could speak for these alone.
     """
     best = best_of(fitted)
+    most = len(best.optimum.point)
+    behind = [float((best.scores - one.scores).sum()) * best.share for one in fitted]
+    return [
+        one
+        for one, nats in zip(fitted, behind, strict=True)
+        if is_near(nats, len(one.optimum.point), most)
+    ]
 
-    def near(one: FittedCandidate) -> bool:
-        behind = float((best.scores - one.scores).sum()) * best.share
-        return behind < POSITIVE_EVIDENCE + len(one.optimum.point) + len(best.optimum.point)
 
-    return [one for one in fitted if near(one)]
+def names_of_contenders(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Names of the candidates that come near the best, from a fit's rows (:func:`candidate_rows`).
+
+    Those that are equivalent are among them.
+    """
+    best = min(rows, key=lambda row: float(row["behind"]))
+    return tuple(
+        str(row["name"])
+        for row in rows
+        if row["equivalent"]
+        or is_near(float(row["behind"]), int(row["parameters"]), int(best["parameters"]))
+    )
+
+
+def is_near(behind: float, parameters: int, of_best: int) -> bool:
+    """Whether another estimate of hold-out densities could reverse that of fits without strokes.
+
+    The log density of unseen strokes lies about a nat a parameter below that of strokes that were
+    fitted (Akaike 1974, doi:10.1109/TAC.1974.1100705), and estimates of it lie within as much of
+    it: a candidate that is farther behind than the parameters of both is rejected by either.
+    """
+    return behind < POSITIVE_EVIDENCE + parameters + of_best
 
 
 def _rows(

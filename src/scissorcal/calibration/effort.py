@@ -1,6 +1,6 @@
 """Which candidate models an effort fits: draft one, the others all of them."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Protocol, TypeVar
 
 from scissorcal.calibration.result import Effort
@@ -23,15 +23,17 @@ def candidates_for(
     candidates: Sequence[Candidate],
     last_chosen: str | None = None,
     default: str | None = None,
+    among: Container[str] = (),
 ) -> tuple[Candidate, ...]:
     """The candidates that are fitted at an effort, simplest first.
 
     Draft fits one: the only one that the recipe leaves, else the one that the last fit of the
     workspace chose (``last_chosen``, its :attr:`FitResult.rung`), else ``default``, else the last
-    of all, which is the richest. Standard and thorough compare all of them. A name that no
-    candidate has is passed over: the recipe may have changed since. ValueError where there is no
-    candidate.
+    of all, which is the richest. Standard and thorough compare all of them, or those that
+    ``among`` names, if any. A name that no candidate has is passed over: the recipe may have
+    changed since. ValueError where there is no candidate.
     """
+    candidates = [one for one in candidates if one.name in among] or candidates
     if not candidates:
         raise ValueError("The recipe allows no law, so there is no candidate model to fit.")
     if effort != "draft" or len(candidates) == 1:

@@ -34,7 +34,8 @@ def predictive_of(
 
     ``compared`` are the candidates that were compared, ``chosen`` is among them. ``predictions``
     (draws, k) are means by draws of the posterior at the points that ``thin`` selects; to some of
-    them a draw of the noise is added. Those that are no :func:`~.comparison.contenders`, and draft effort, have no log-likelihoods.
+    them a draw of the noise is added. Candidates that are no :func:`~.comparison.contenders`, and
+    draft effort, have no log-likelihoods.
     """
     own = next(one for one in compared if one.candidate is chosen.candidate)
     share = best_of(list(compared)).share

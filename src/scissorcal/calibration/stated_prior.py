@@ -19,13 +19,14 @@ class StatedPrior:
     What truths were drawn from must be the prior of the fits that are to find them. ``names`` (k,)
     go with ``mean`` (k,) and ``covariance`` (k, k); a law takes those that it has, and keeps its
     own prior for others. ``response`` is the family of a cut's response that the exponent and shape
-    are of.
+    are of. ``laws`` names those that are compared, all where there are none.
     """
 
     names: tuple[str, ...]
     mean: Array
     covariance: Array
     response: str = ""
+    laws: tuple[str, ...] = ()
 
     def of_response(self, family: str) -> "StatedPrior":
         """The prior for a law with another response, whose exponent means something else."""

@@ -52,11 +52,12 @@ def ljung_box(residuals: Array, series: Labels, lags: int = 20) -> Whiteness:
         return Whiteness(1.0, 1.0, 0.0)
     lags = min(lags, max(1, n // RESIDUALS_A_LAG), n - 1)
     longest = max(lags, min(n // 4, 2000))
-    correlations = np.array([_lagged(r, r, series, lag) for lag in range(1, lags + 1)]) / total
+    every = _autocovariances(r, series, longest) / total
+    correlations = every[1 : lags + 1]
     statistic = n * (n + 2) * np.sum(correlations**2 / (n - np.arange(1, lags + 1)))
     summed, lag = 0.0, 1
     while lag + 1 <= longest:
-        pair = float(_lagged(r, r, series, lag) + _lagged(r, r, series, lag + 1)) / total
+        pair = float(every[lag] + every[lag + 1])
         if pair <= 0:
             break
         summed += pair
@@ -102,6 +103,18 @@ def robust_covariance_of_scores(scores: Array, series: Labels) -> Array:
     scaled = long_run * np.outer(size[usable], size[usable])
     result[np.ix_(usable, usable)] = _positive(scaled)
     return result
+
+
+def _autocovariances(values: Array, series: Labels, longest: int) -> Array:
+    """Sums of products (longest + 1,) of values (n,) at lags 0 to ``longest`` within a series.
+
+    By the power spectrum, runs of one series being kept apart by as many zeros.
+    """
+    run = np.concatenate([[0], np.cumsum(np.diff(series) != 0)])
+    place = np.arange(len(values)) + run * longest
+    apart = np.zeros(1 << (int(place[-1]) + longest).bit_length())
+    apart[place] = values
+    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(apart)) ** 2, len(apart))[: longest + 1])
 
 
 def _lagged(a: Array, b: Array, series: Labels, lag: int) -> Array:

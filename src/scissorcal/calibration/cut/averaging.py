@@ -28,11 +28,11 @@ class AveragedLaw:
 
 @dataclass(frozen=True)
 class Inferred:
-    """A law's posterior, its draws widened by the budget of lack of fit."""
+    """A law's posterior, its draws widened by the budget of lack of fit (None: not at all)."""
 
     law: AveragedLaw
     posterior: Posterior
-    budget: Budget
+    budget: Budget | None
 
 
 def by_load(

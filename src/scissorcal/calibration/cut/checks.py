@@ -82,7 +82,7 @@ def cut_diagnostics(scouted: Scouted, design: CutExperiment) -> dict[str, Any]:
     }
 
 
-def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple[str, ...]:
+def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget | None) -> tuple[str, ...]:
     """Notes on the line of the teeth, unresolved strokes, and the budget of lack of fit."""
     notes = []
     line = scouted.accepted_line
@@ -102,6 +102,8 @@ def line_notes(scouted: Scouted, design: CutExperiment, budget: Budget) -> tuple
             "the encoder is too coarse to show whether they move back. The fit uses the teeth of "
             "these strokes, not their mean torque. Use faster strokes or a finer encoder."
         )
+    if budget is None:
+        return tuple(notes)
     names = design.layout.names
     shown = [
         f"{name} {sd:.2%}"

@@ -138,7 +138,8 @@ def fit_cut(
     friction, this fit fails too. ``checkpoint`` is a file from which an interrupted thorough fit
     continues. ``last_chosen`` is the law that draft effort fits where the recipe allows several,
     ``stop`` says whether the time limit is reached. ``prior`` replaces the recipe's in a study of
-    simulated data. Raises InputError where the blades hardly touched the material, a value is no
+    simulated data, which goes without the verdicts of this fit alone and without a budget of lack
+    of fit. Raises InputError where the blades hardly touched the material, a value is no
     measurement, or a stroke is a copy of another.
     """
     tell = progress or (lambda done, sentence: None)
@@ -146,7 +147,7 @@ def fit_cut(
     data = _Data.of(recordings, recipe, friction, edge, prior)
     _refuse_no_contact(data)
     allowed = allowed_laws(recipe)
-    laws = candidates_for(effort, allowed, last_chosen)
+    laws = candidates_for(effort, allowed, last_chosen, among=prior.laws if prior else ())
     tell(0.05, "cut: finding where cracks rest and run")
     scouted = _scouted(data, laws)
     compared = _fit_laws(scouted, data, laws, tell, stop)
@@ -155,7 +156,8 @@ def fit_cut(
     def infer_one(law: AveragedLaw) -> Inferred:
         tell(0.5, f"cut: inferring {law.fitted.candidate.name}")
         first = law is laws_used[0]
-        return _infer(law, recipe, effort, rng, tell, checkpoint if first else None, stop)
+        share = None if prior else 0.01 * recipe.fit.cut.lack_of_fit_percent
+        return _infer(law, share, effort, rng, tell, checkpoint if first else None, stop)
 
     inferred = average(laws_used, infer_one, rng)
     notes = (*load_note(laws_used), *draft_note(effort, allowed, laws))
@@ -278,13 +280,14 @@ def _fit_laws(
 
 def _infer(
     law: AveragedLaw,
-    recipe: Recipe,
+    share: float | None,
     effort: Effort,
     rng: np.random.Generator,
     tell: Progress,
     checkpoint: Path | None,
     stop: Stop | None,
 ) -> Inferred:
+    """The posterior of a law, widened by ``share`` of lack of fit; a study has none to state."""
     fitted, design = law.fitted, law.design
     posterior = infer(
         fitted.candidate.problem(design.series),
@@ -296,7 +299,8 @@ def _infer(
         stop=stop,
         progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
     )
-    share = 0.01 * recipe.fit.cut.lack_of_fit_percent
+    if share is None:
+        return Inferred(law, posterior, None)
     budget = budget_of(design, fitted.optimum.point, posterior.covariance, share)
     return Inferred(law, replace(posterior, draws=budget.widen(posterior.draws, rng)), budget)
 
@@ -316,6 +320,14 @@ def _assembled(
     recordings, point = data.recordings, chosen.optimum.point
     between = compare_cuts(design, point, recordings, rng)
     usage = usage_of_segments(recordings, scouted.segments)
+    verdicts: tuple[Verdict, ...] = ()
+    if data.known.prior is None:
+        verdicts = (
+            *cut_verdicts(data.friction, edge_verdicts, scouted, data.sensors, recordings),
+            scatter_verdict(design, point, data.recipe.fit.cut.priors.noise_scale),
+            *((data.broken.verdict("fit.cut"),) if data.broken.interrupted else ()),
+            *((between.verdict(),) if between else ()),
+        )
     return assemble(
         what="cut",
         effort=effort,
@@ -333,12 +345,8 @@ def _assembled(
         rng=rng,
         critic=data.recipe.fit.cut.critic,
         usage=usage,
-        extra_verdicts=(
-            *cut_verdicts(data.friction, edge_verdicts, scouted, data.sensors, recordings),
-            scatter_verdict(design, point, data.recipe.fit.cut.priors.noise_scale),
-            *((data.broken.verdict("fit.cut"),) if data.broken.interrupted else ()),
-            *((between.verdict(),) if between else ()),
-        ),
+        brief=data.known.prior is not None,
+        extra_verdicts=verdicts,
         extra_notes=(
             *data.sensors.notes,
             *line_notes(scouted, design, inferred.budget),

@@ -197,18 +197,42 @@ def _power_law(
     exact = [geometry.depth_and_lever(geometry.edge, p.opening, p.place - p.advance) for p in pulls]
     slopes = [geometry.slope(p.opening, p.place - p.advance) for p in pulls]
 
-    def misfit(u: Array) -> Array:
-        rows = [u[2:] / 3.0, (u[1:2] - np.log(median_exponent)) / log_sd_exponent]
+    def rows(u: Array) -> tuple[list[Array], list[Array]]:
+        """Residuals and, of each, derivatives by log force, log exponent and the pull's place."""
+        exponent = np.exp(u[1])
+        left, slopes_of = [], []
         for pull, (depth, lever), slope, move in zip(pulls, exact, slopes, u[2:], strict=True):
-            inside = np.maximum(depth - slope * move * PLACE_M * cuts, 0.0)
-            force = np.exp(u[0]) * (inside / geometry.reference_m) ** np.exp(u[1])
-            rows.append((force * lever - pull.torque) / noise)
-        return np.concatenate(rows)
+            by_move = -slope * PLACE_M * cuts
+            inside = np.maximum(depth + by_move * move, 0.0)
+            torque = np.exp(u[0]) * (inside / geometry.reference_m) ** exponent * lever
+            held = np.where(inside > 0.0, inside, geometry.reference_m)
+            by_log = torque * exponent * np.log(held / geometry.reference_m)
+            by_place = np.where(inside > 0.0, torque * exponent / held * by_move, 0.0)
+            left.append((torque - pull.torque) / noise)
+            slopes_of.append(np.column_stack([torque, by_log, by_place]) / noise)
+        return left, slopes_of
+
+    def misfit(u: Array) -> Array:
+        prior = [u[2:] / 3.0, (u[1:2] - np.log(median_exponent)) / log_sd_exponent]
+        return np.concatenate([*prior, *rows(u)[0]])
+
+    def jacobian(u: Array) -> Array:
+        found = np.zeros((len(misfit(u)), len(u)))
+        count = len(pulls)
+        found[:count, 2:] = np.eye(count) / 3.0
+        found[count, 1] = 1.0 / log_sd_exponent
+        first = count + 1
+        for place, block in enumerate(rows(u)[1], start=2):
+            found[first : first + len(block), [0, 1, place]] = block
+            first += len(block)
+        return found
 
     lever = float(np.median([lever[0] for _, lever in exact]))
     starts = [np.log([max(size / lever, 1e-6), n]) for n in (0.7, 1.5, 3.0)]
     starts = [np.concatenate([start, np.zeros(len(pulls))]) for start in starts]
-    fits = [least_squares(misfit, start, loss="soft_l1", max_nfev=40) for start in starts]
+    fits = [
+        least_squares(misfit, start, jac=jacobian, loss="soft_l1", max_nfev=40) for start in starts
+    ]
     best = min(fits, key=lambda fit: float(fit.cost))
     return float(np.exp(best.x[0])), float(np.exp(best.x[1]))
 

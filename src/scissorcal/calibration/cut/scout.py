@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.geometry import Geometry, Running
 from scissorcal.calibration.cut.guess import (
     CoarseEncoderError,
     Guess,
@@ -86,19 +86,15 @@ def scout(
     little of it, MisfitError where the law is nowhere near the data.
     """
     materials = tuple(known.material(motion) for motion in motions)
-    exponent = recipe.fit.cut.response_exponent
-    guess = first_guess(
-        motions,
-        materials,
-        find_runs(motions),
-        geometry,
-        cuts=recipe.scene.cut,
-        median_exponent=exponent.median,
-        log_sd_exponent=exponent.log_sd,
-    )
-    values = _values_of(guess, fracture)
+    rounds = [(False, False), (True, recipe.fit.cut.load_share != "none")]
+    known_point = _known_point(known, recipe, geometry, fracture)
+    if known_point is None:
+        guess = _guessed(motions, materials, recipe, geometry)
+        values = _values_of(guess, fracture)
+    else:
+        (values, guess), rounds = known_point, rounds[1:]
     evaluations = 0
-    for unseen, loaded in ((False, False), (True, recipe.fit.cut.load_share != "none")):
+    for unseen, loaded in rounds:
         law = CutLaw("power", fracture, loaded=loaded)
         for _ in range(ROUNDS if loaded else 1):
             at = (motions, materials, geometry.at(values), guess, known.noise, known.stroke_sd)
@@ -117,6 +113,36 @@ def scout(
     if fracture != "rippled" or not segments.stretches:
         return found
     return _with_line(found, design, optimum, recipe, known, geometry)
+
+
+def _guessed(
+    motions: tuple[PathMotion, ...],
+    materials: tuple[Material, ...],
+    recipe: Recipe,
+    geometry: Geometry,
+) -> Guess:
+    exponent = recipe.fit.cut.response_exponent
+    return first_guess(
+        motions,
+        materials,
+        find_runs(motions),
+        geometry,
+        cuts=recipe.scene.cut,
+        median_exponent=exponent.median,
+        log_sd_exponent=exponent.log_sd,
+    )
+
+
+def _known_point(
+    known: KnownFriction, recipe: Recipe, geometry: Geometry, fracture: str
+) -> tuple[dict[str, float], Guess] | None:
+    """Where a study of simulated data begins: at the mean of its truths, if that is a power law."""
+    if known.prior is None or known.prior.response != "power":
+        return None
+    law = CutLaw("power", fracture)
+    layout = known.prior.layout(cut_layout(recipe, law, (known.closing_sd, known.opening_sd)))
+    values = {name: float(value) for name, value in layout.natural(layout.mean).items()}
+    return values, guess_at({**law.key, **geometry_of(recipe, geometry.belief.edge)}, values)
 
 
 def refuse_coarse(segments: Segments) -> None:
@@ -168,9 +194,11 @@ def make_experiment(
 
 
 def tooth_periods(
-    geometry: Geometry, response: Response, values: Mapping[str, Any], opening: Array
+    geometry: Geometry, response: Response, values: Mapping[str, Any], view: Running
 ) -> tuple[Array, Array]:
     """Logarithm of the teeth's period (rad) and mean torque (N m) of a running crack, (k,) each.
+
+    ``view`` is :meth:`~.geometry.Geometry.running` at k openings.
 
     The crack starts at the indentation d_c of the energy J and stops at d_l of kappa J. From one
     start to the next the opening falls by p with d_c(theta - p / 2) - d_l(theta + p / 2) =
@@ -180,7 +208,6 @@ def tooth_periods(
 
     n the response's exponent at d_c. Against a crack stepped exactly it is right to 0.02 %.
     """
-    view = geometry.running(opening)
     moving, energy = geometry.moving_blades, float(values["fracture_energy"])
     kappa = float(values["kappa"])
     peak = energy / (moving * np.maximum(view.slope, 1e-6))
@@ -257,7 +284,7 @@ def _line(
 ) -> Line | None:
     response = response_from(design.key, {k: np.asarray(v) for k, v in found.values.items()})
     rows = [
-        tooth_periods(geometry, response, found.values, _middles(found, index))
+        tooth_periods(geometry, response, found.values, geometry.running(_middles(found, index)))
         for index in range(len(found.segments.stretches))
     ]
     gain = 1.0 + float(found.values.get("load_share", 0.0))
@@ -285,11 +312,11 @@ def _kappa_at(
     response = Response(
         "power", values["response_force"], values["response_exponent"], geometry.reference_m
     )
-    opening = np.concatenate([_middles(found, index) for index in stretches])[::7]
+    view = geometry.running(np.concatenate([_middles(found, index) for index in stretches])[::7])
     misses = []
     for kappa in KAPPAS:
         tried = {**values, "kappa": kappa, "fracture_energy": 2.0 * mean / (1.0 + kappa)}
-        logs, _ = tooth_periods(geometry, response, tried, opening)
+        logs, _ = tooth_periods(geometry, response, tried, view)
         misses.append(abs(float(logs.mean()) - log_period))
     kappa = float(KAPPAS[int(np.argmin(misses))])
     return {"kappa": kappa, "fracture_energy": 2.0 * mean / (1.0 + kappa)}

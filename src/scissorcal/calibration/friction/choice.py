@@ -10,10 +10,14 @@ from scissorcal.calibration.candidates import POSITIVE_EVIDENCE
 from scissorcal.calibration.comparison import NEGLIGIBLE, choose
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.friction.model import FrictionExperiment
-from scissorcal.calibration.friction.reversals import BUILD_UP, gain_of_build_up
-from scissorcal.inference import Stop, tails_of
+from scissorcal.calibration.friction.search import scan_nodes
+from scissorcal.inference import Stop, gradient, tails_of
 
+Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
+
+BUILD_UP = " + presliding"
+"""What the name of a law with build-up after reversals has more than the same law without."""
 
 OUTLIERS = 4.0
 """Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
@@ -26,7 +30,7 @@ def choose_law(
     """Fit every candidate law and choose one.
 
     The fits of all laws, that of the chosen one, its design, and notes on laws that were passed
-    over: those with build-up after reversals, where :func:`~.reversals.gain_of_build_up` is less
+    over: those with build-up after reversals, where :func:`gain_of_build_up` is less
     than evidence asks for. The chosen law is fitted again with a Student-t noise where its
     residuals have outliers; that fit takes the place of the first. A share ``lack_of_fit`` of the
     drive that is stated as the law's error is what makes laws differ, and residuals below it have
@@ -74,5 +78,37 @@ def _notes(passed: Mapping[str, float]) -> tuple[str, ...]:
     )
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def gain_of_build_up(plain: FittedCandidate, rich: FrictionExperiment) -> float:
+    """Log density (nats) that build-up after reversals can add to a fitted law at most.
+
+    ``rich`` is the law of ``plain`` with build-up, over the same windows. At each length of the
+    scan the score test of Rao (1948, doi:10.1017/S0305004100023987) is taken for the share of dry
+    friction that builds up, all parameters of the plain law being free within their priors: half
+    the squared score over its variance, 0 where the share would be negative. The likelihood is
+    quadratic in the share, but for the shift of the law's own levels, so that this is what the fit
+    would gain on the data it is made of; unseen strokes gain less.
+    """
+    candidate, point = plain.candidate, plain.optimum.point
+    residuals = candidate.likelihood.residuals
+    left = residuals(point)
+    slopes = -gradient(residuals, point, 1e-3 * candidate.layout.sd)
+    weight = plain.share * np.exp(-2.0 * point[-1])
+    free = np.any(slopes != 0.0, axis=0)
+    slopes = slopes[:, free]
+    precision = weight * slopes.T @ slopes + candidate.prior_precision[np.ix_(free, free)]
+    values = candidate.layout.natural(point)
+    place = rich.layout.names.index("presliding_length")
+    middle, sd = rich.layout.mean[place], rich.layout.sd[place]
+    best = 0.0
+    for node in scan_nodes(middle, sd, rich.basis.lag.spacing):
+        column = rich.basis.lacking(values, rich.basis.lag.scale_of(node))
+        score = -weight * float(column @ left)
+        shared = weight * slopes.T @ column
+        variance = weight * float(column @ column) - shared @ np.linalg.solve(precision, shared)
+        if score > 0.0 and variance > 0.0:
+            best = max(best, 0.5 * score**2 / float(variance))
+    return best
+
+
+def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))

@@ -97,8 +97,9 @@ def fit_friction(
     fitted each by itself, and draws widened by what they differ in.
 
     ``checkpoint`` is a file from which an interrupted thorough fit goes on, ``last_chosen`` the law
-    of draft effort where the recipe leaves several, ``prior`` that of a study of simulated data;
-    ``stop`` says whether the time is used up. Raises InputError where there is too little motion, a
+    of draft effort where the recipe leaves several, ``prior`` that of a study of simulated data,
+    which goes without the verdicts and diagnostics of this fit alone; ``stop`` says whether the
+    time is used up. Raises InputError where there is too little motion, a
     value is no measurement, or a stroke is a copy of another.
     """
     tell = progress or (lambda done, sentence: None)
@@ -114,7 +115,8 @@ def fit_friction(
     slow = SlowFriction.of(recordings, windows.bins, settings)
     settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
-    laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind]))
+    near = prior.laws if prior else ()
+    laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind], near))
     compared, chosen, law, passed = choose_law(laws, settings.lack_of_fit, stop, tell)
     infer_law = partial(infer, checkpoint=checkpoint, stop=stop, progress=_last_part(tell))
     problem = chosen.candidate.problem(law.series)
@@ -124,10 +126,24 @@ def fit_friction(
         posterior = opened(posterior, law, slow, chosen.held_out_rms, rng)
     between = compare_recordings(law, chosen.optimum.point, recordings, rng)
     posterior = widened(posterior, between, rng)
-    swung = None if prior else inertia_verdict(law, posterior.draws, recordings)
     unshown = ("inertia",) if hidden_from_sweeps(law, recordings) else ()
     usage = usage_of_windows(recordings, every, sensors.usable)
-    drive = float(np.sqrt(np.mean(law.observed**2)))
+    verdicts: tuple[Verdict, ...] = ()
+    if prior is None:
+        swung = inertia_verdict(law, posterior.draws, recordings)
+        drive = float(np.sqrt(np.mean(law.observed**2)))
+        verdicts = (
+            physical_verdict(law, chosen.optimum.point, chosen.share),
+            start_verdict(law, chosen.optimum.point),
+            near_rest_verdict(law, posterior.draws),
+            *((swung,) if swung else ()),
+            _bandwidth(again, law, chosen, posterior, effort),
+            sensors.verdict,
+            *((broken.verdict("fit.friction"),) if broken.interrupted else ()),
+            *((steady.verdict(),) if steady.rows else ()),
+            *zero_verdicts("fit.friction", zero, recordings, drive),
+            *((between.verdict(),) if between else ()),
+        )
     fit = assemble(
         what="friction",
         effort=effort,
@@ -145,18 +161,8 @@ def fit_friction(
         rng=rng,
         critic=settings.critic,
         usage=usage,
-        extra_verdicts=(
-            physical_verdict(law, chosen.optimum.point, chosen.share),
-            start_verdict(law, chosen.optimum.point),
-            near_rest_verdict(law, posterior.draws),
-            *((swung,) if swung else ()),
-            _bandwidth(again, law, chosen, posterior, effort),
-            sensors.verdict,
-            *((broken.verdict("fit.friction"),) if broken.interrupted else ()),
-            *((steady.verdict(),) if steady.rows else ()),
-            *zero_verdicts("fit.friction", zero, recordings, drive),
-            *((between.verdict(),) if between else ()),
-        ),
+        brief=prior is not None,
+        extra_verdicts=verdicts,
         extra_notes=(
             *sensors.notes,
             *_notes(every, windows, posterior, joint, cogging),
@@ -167,7 +173,7 @@ def fit_friction(
             *(between.notes((*NUISANCE, *unshown)) if between else (NOT_KNOWN,)),
         ),
         extra_diagnostics={
-            **_diagnostics(law, chosen, between, recordings),
+            **({} if prior else _diagnostics(law, chosen, between, recordings)),
             **(zero.as_dict() if zero else {}),
         },
     )

@@ -1,12 +1,13 @@
 """Simulators: raw recordings of known parameters, and the whole fit of them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.comparison import names_of_contenders
 from scissorcal.calibration.cut import fit_cut
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path import torque_noise_of
@@ -51,7 +52,10 @@ class Simulator(Protocol):
 
 @dataclass(frozen=True)
 class FrictionSimulator:
-    """Empty sweeps of a rig with other friction (see :class:`Simulator`)."""
+    """Empty sweeps of a rig with other friction (see :class:`Simulator`).
+
+    ``contenders`` are the laws that a refit compares.
+    """
 
     motions: tuple[Motion, ...]
     settings: FitFriction
@@ -60,6 +64,7 @@ class FrictionSimulator:
     rung: str
     torque_noise: TorqueNoise
     stroke_sd: float
+    contenders: tuple[str, ...]
 
     @property
     def noise(self) -> str:
@@ -81,7 +86,12 @@ class FrictionSimulator:
     ) -> FitResult:
         """The whole fit: sensors, windows, cogging, model comparison, posterior."""
         return fit_friction(
-            data, self.settings, effort=effort, rng=rng, last_chosen=self.rung, prior=prior
+            data,
+            self.settings,
+            effort=effort,
+            rng=rng,
+            last_chosen=self.rung,
+            prior=replace(prior, laws=self.contenders),
         )
 
     @property
@@ -91,7 +101,10 @@ class FrictionSimulator:
 
 @dataclass(frozen=True)
 class CutSimulator:
-    """Cuts through other material along the same motion (see :class:`Simulator`)."""
+    """Cuts through other material along the same motion (see :class:`Simulator`).
+
+    ``contenders`` are the laws that a refit compares.
+    """
 
     motions: tuple[Motion, ...]
     recipe: Recipe
@@ -100,6 +113,7 @@ class CutSimulator:
     layout: Layout
     structure: Mapping[str, Any]
     rung: str
+    contenders: tuple[str, ...]
 
     @property
     def noise(self) -> str:
@@ -130,7 +144,7 @@ class CutSimulator:
             rng=rng,
             edge=self.edge,
             last_chosen=self.rung,
-            prior=prior,
+            prior=replace(prior, laws=self.contenders),
         )
 
 
@@ -150,6 +164,7 @@ def friction_simulator(
         rung=fit.rung,
         torque_noise=torque_noise_of(fit.diagnostics),
         stroke_sd=_finite(fit.diagnostics.get("stroke_offset_sd_Nm", 0.0)),
+        contenders=names_of_contenders(fit.rungs),
     )
 
 
@@ -168,7 +183,8 @@ def cut_simulator(
     cut = recipe.fit.cut.model_copy(update={"critic": False})
     quiet = recipe.model_copy(update={"fit": recipe.fit.model_copy(update={"cut": cut})})
     motions = motion_of(recordings, KnownFriction.of(friction).inertia)
-    return CutSimulator(motions, quiet, friction, edge, layout, dict(fit.structure), fit.rung)
+    near = names_of_contenders(fit.rungs)
+    return CutSimulator(motions, quiet, friction, edge, layout, dict(fit.structure), fit.rung, near)
 
 
 def noise_in_words(noise: TorqueNoise, stroke_sd: float, unit: str) -> str:
