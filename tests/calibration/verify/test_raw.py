@@ -92,7 +92,7 @@ def test_another_materials_parameters_and_teeth_are_recovered(day: Day, load_sha
     kappas = []
     for seed in (5, 6, 7, 8):
         rng = np.random.default_rng(seed)
-        made = simulate_cut(motion_of((day.cuts,), known.inertia), truth, rng)
+        made = simulate_cut(motion_of((day.cuts,), known.inertia, known.noise.white_Nm), truth, rng)
         fit = fit_cut(made, recipe, day.friction, effort="standard", rng=rng)
         assert not [note for note in fit.notes if "Kappa is poorly determined" in note]
         for name, value in wanted.items():

@@ -31,6 +31,10 @@ from scissorcal.recording.recording import Recording
 
 Array = NDArray[np.float64]
 
+UNSEEN = 0.1
+"""Part of the torque's noise that accelerations may be which no encoder shows, in a simulated
+sweep: all simulations repeat it."""
+
 
 class Simulator(Protocol):
     """Data of known parameters, and the whole fit of them. Picklable, for worker processes.
@@ -155,14 +159,14 @@ def friction_simulator(
 
     ``layout`` is that of its design; noise and the offsets of strokes are those that it measured.
     """
-    inertia = fit.parameter("inertia").mean
+    noise = torque_noise_of(fit.diagnostics)
     return FrictionSimulator(
-        motions=motion_of(recordings, inertia),
+        motions=motion_of(recordings, fit.parameter("inertia").mean, UNSEEN * noise.white_Nm),
         settings=settings.model_copy(update={"critic": False}),
         layout=layout,
         structure=dict(fit.structure),
         rung=fit.rung,
-        torque_noise=torque_noise_of(fit.diagnostics),
+        torque_noise=noise,
         stroke_sd=_finite(fit.diagnostics.get("stroke_offset_sd_Nm", 0.0)),
         contenders=names_of_contenders(fit.rungs),
     )
@@ -182,8 +186,14 @@ def cut_simulator(
     """
     cut = recipe.fit.cut.model_copy(update={"critic": False})
     quiet = recipe.model_copy(update={"fit": recipe.fit.model_copy(update={"cut": cut})})
-    motions = motion_of(recordings, KnownFriction.of(friction).inertia)
-    near = names_of_contenders(fit.rungs)
+    known = KnownFriction.of(friction)
+    # Accelerations cancel in means over a way, so that they may be as large as the noise.
+    motions = motion_of(recordings, known.inertia, known.noise.white_Nm)
+    # Truths are of the fit's law: an average with its twin would have another prior than they.
+    own = bool(fit.structure.get("load_share", False))
+    near = names_of_contenders(
+        [row for row in fit.rungs if bool(row["key"].get("load_share", False)) == own]
+    )
     return CutSimulator(motions, quiet, friction, edge, layout, dict(fit.structure), fit.rung, near)
 
 

@@ -188,14 +188,18 @@ def _half(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _whole(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
-    """Sensitivities of the fit's own posterior to the powers of its prior and likelihood."""
+    """Sensitivities of the fit's own posterior to the powers of its prior and likelihood.
+
+    What other measurements told of a parameter (the zero of a sensor, in idle seconds) is no prior
+    that a recipe states, and keeps its weight.
+    """
     experiment = study.experiment
     rung = replace(experiment.candidate(experiment.observed), starts=study.start[None, :])
     posterior = infer(rung.problem(experiment.series), study.effort, rng, count=study.draws)
     shown = quantities(study, posterior.draws)
-    wanted = study.wanted
-    away = (posterior.draws - rung.prior_mean)[:, wanted]
-    own = rung.prior_precision[np.ix_(wanted, wanted)]
+    stated = [i for i in study.wanted if not experiment.layout.parameters[i].believed]
+    away = (posterior.draws - rung.prior_mean)[:, stated]
+    own = rung.prior_precision[np.ix_(stated, stated)]
     log_prior = -0.5 * np.einsum("ni,ij,nj->n", away, own, away)
     every = posterior.draws - rung.prior_mean
     whole_prior = -0.5 * np.einsum("ni,ij,nj->n", every, rung.prior_precision, every)

@@ -30,7 +30,7 @@ def recording():
 
 @pytest.fixture(scope="module")
 def motion(recording):
-    return motion_of((recording,), INERTIA)[0]
+    return motion_of((recording,), INERTIA, 1e-3)[0]
 
 
 def test_labels_times_and_resolutions_are_kept(recording, motion):

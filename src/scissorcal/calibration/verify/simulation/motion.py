@@ -13,9 +13,10 @@ from scissorcal.recording.resolution import resolution_of
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-PATH_SD = 2.0
-"""Standard deviation in samples of a Gaussian that removes the rest of the encoder's steps, whose
-accelerations would appear in the simulated torque."""
+MOVED_HZ = 15.0
+"""Motion up to here is kept however coarse an encoder is: excitations of the inertia end here."""
+HALF_SD = 0.1325
+"""Standard deviation of a Gaussian times the frequency at which it passes 1 / sqrt(2)."""
 SLEDGE_SD = 10.0
 REST_S = 0.005
 """A joint that moves less than one encoder step in this time is nearly at rest."""
@@ -77,14 +78,23 @@ class Motion:
         return replace(self.recording, samples=samples)
 
 
-def motion_of(recordings: tuple[Recording, ...], inertia: float) -> tuple[Motion, ...]:
+def motion_of(
+    recordings: tuple[Recording, ...], inertia: float, unseen_Nm: float
+) -> tuple[Motion, ...]:
     """The smooth motion of recordings, from :func:`~scissorcal.calibration.cut.path.path_motion`.
 
-    ``inertia`` (kg m^2) is used to smooth the path.
+    ``inertia`` (kg m^2) is used to smooth the path. The most probable path keeps errors of the
+    encoder's size, step / sqrt(12). Their accelerations times the inertia would be a torque that
+    every simulation repeats and no encoder shows, so motion is kept up to the frequency at which
+    that torque is as large as a noise of ``unseen_Nm`` (N m) a sample: it grows with the
+    frequency's square.
     """
     found: dict[int, list[SmoothPiece]] = {index: [] for index in range(len(recordings))}
     for motion in path_motion(recordings, inertia):
-        found[motion.recording].append(_piece(motion, recordings[motion.recording]))
+        shown = unseen_Nm * np.sqrt(12.0) / (inertia * motion.resolution)
+        kept_Hz = max(float(np.sqrt(shown)) / (2.0 * np.pi), MOVED_HZ)
+        smoothing = HALF_SD / kept_Hz / motion.tick_s
+        found[motion.recording].append(_piece(motion, recordings[motion.recording], smoothing))
     return tuple(
         Motion(
             recording,
@@ -97,7 +107,7 @@ def motion_of(recordings: tuple[Recording, ...], inertia: float) -> tuple[Motion
     )
 
 
-def _piece(motion: PathMotion, recording: Recording) -> SmoothPiece:
+def _piece(motion: PathMotion, recording: Recording, smoothing: float) -> SmoothPiece:
     span = slice(motion.start, motion.start + len(motion.opening))
     load = np.zeros(len(motion.opening))
     if not np.isnan(recording.handle_radius_m):
@@ -105,7 +115,7 @@ def _piece(motion: PathMotion, recording: Recording) -> SmoothPiece:
         load = recording.handle_radius_m * force
     return SmoothPiece(
         start=motion.start,
-        opening=_smoothed(motion.opening, PATH_SD),
+        opening=_smoothed(motion.opening, smoothing),
         advance=_smoothed(motion.advance, SLEDGE_SD),
         load=load,
         stroke=_held(motion.stroke),
