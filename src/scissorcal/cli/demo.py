@@ -10,6 +10,7 @@ from scissorcal.cli.output import Answer, command, table
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
+    from scissorcal.calibration.verify.result import VerifyResult
     from scissorcal.workday.demo.day import DemoResult
 
 _ANSWERS = {True: "yes", False: "no", None: "-"}
@@ -28,9 +29,13 @@ def demo(
         Literal["draft", "standard", "thorough"] | None,
         typer.Option(help="Effort of the fits; the recipe's if not given."),
     ] = None,
+    fits: Annotated[
+        int,
+        typer.Option(min=0, help="Fits to simulated data that verify each fit; 0 for none."),
+    ] = 40,
     seed: Seed = 0,
 ) -> Answer:
-    """Run the whole day on a virtual rig: capture, fit, report, package, render.
+    """Run the whole day on a virtual rig: capture, fit, verify, report, package, render.
 
     Time is virtual: the demo runs as fast as the computer can. Each seed draws another specimen,
     which the fits do not see; the result compares estimates with the truth.
@@ -52,7 +57,9 @@ def demo(
     recipe_path(recipe)
     made = demo_folder(folder)
     with progress() as tell:
-        found = run_demo(made, recipe_name=recipe, seed=seed, effort=effort, progress=tell)
+        found = run_demo(
+            made, recipe_name=recipe, seed=seed, effort=effort, fits=fits, progress=tell
+        )
     result = {
         "workspace": found.workspace,
         "specimen": found.specimen,
@@ -74,6 +81,14 @@ def demo(
             for row in found.geometry
         ],
         "share_inside": found.share_inside,
+        "verified": [
+            {
+                "what": check.what,
+                "fits": check.calibration.fits if check.calibration else 0,
+                "passed": not any(verdict.status == "fail" for verdict in check.verdicts),
+            }
+            for check in found.verified
+        ],
         "torque_error": found.torque_error,
         "rendering": found.rendering,
     }
@@ -100,6 +115,7 @@ def _text(found: "DemoResult") -> str:
         table(rows, right=[2, 3, 4, 5]),
         "",
         f"{sum(inside)} of {len(inside)} intervals (90 %) contain the truth",
+        *(_verified(check) for check in found.verified),
         f"torque error of the package {100 * found.torque_error:.2f} % (rms over the scene)",
         f"rendered {found.rendering.strokes} strokes in {found.rendering.seconds:.1f} s",
         found.rendering.admission.summary,
@@ -107,6 +123,18 @@ def _text(found: "DemoResult") -> str:
         f"report: {_shown(found.workspace / 'report' / 'report.html')}",
     ]
     return "\n".join(lines)
+
+
+def _verified(check: "VerifyResult") -> str:
+    failed = [verdict.check for verdict in check.verdicts if verdict.status == "fail"]
+    outcome = f"failed: {', '.join(failed)}" if failed else "passed"
+    if check.calibration is None:
+        return f"{check.what}: trust check {outcome}"
+    shares = [one.share for row in check.calibration.quantities for one in row.coverage[1:]]
+    return (
+        f"{check.what}: trust check {outcome}; in {check.calibration.fits} fits to simulated data "
+        f"the 90 % intervals contain the truth in {min(shares):.0%} to {max(shares):.0%}"
+    )
 
 
 def _shown(path: Path) -> Path:

@@ -39,7 +39,7 @@ class VerifySettings:
     """What is checked: how many simulated ``fits``, drawn from which prior (see `make_study`)."""
 
     checks: "tuple[Check, ...]" = CHECKS
-    fits: int = 200
+    fits: int = 100
     prior: "PriorKind" = "local"
     spread: float = 3.0
     seed: int = 0
