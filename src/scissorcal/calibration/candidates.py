@@ -92,18 +92,30 @@ def compare(
 
 
 def comparison_sentence(rows: Sequence[CandidateRow], units: str) -> str:
-    """Say which candidate is used, and which others the hold-out ``units`` do not reject."""
+    """Say which candidate is used, and which others the hold-out ``units`` do not reject.
+
+    "Do not distinguish" is said of differences below ``POSITIVE_EVIDENCE`` alone.
+    """
     (chosen,) = (row for row in rows if row.chosen)
     if len(rows) == 1:
         return f"{chosen.name} is the only candidate."
-    others = [row.name for row in rows if row.equivalent and not row.chosen]
+    near = [row for row in rows if row.equivalent]
+    others = [row.name for row in near if not row.chosen]
     if not others:
         return f"{chosen.name} is used: every other candidate predicts hold-out {units} worse."
     also = f"The others are {', '.join(others)}."
     if len(others) == 1:
         also = f"The other is {others[0]}."
-    count = f"{len(others) + 1} candidates that hold-out {units} do not distinguish from the best"
-    if chosen.parameters > min(row.parameters for row in rows if row.equivalent):
+    count = f"{len(near)} candidates that hold-out {units} do not distinguish from the best"
+    behind = [row for row in near if row.behind >= POSITIVE_EVIDENCE]
+    if behind:
+        count = f"{len(near)} candidates near the best"
+        also += "".join(
+            f" {row.name} is {row.behind:.0f} nats behind the best, with a standard error of "
+            f"{row.behind_se:.0f} over {units}."
+            for row in behind
+        )
+    if chosen.parameters > min(row.parameters for row in near):
         return f"{chosen.name} is used, one of {count}, though not the simplest (see notes). {also}"
     return f"{chosen.name} is used: the simplest of {count}. {also}"
 

@@ -19,8 +19,10 @@ FALSE_ALARM = 1e-4
 BACKGROUND = 40
 """Frequencies on either side, in units of the resolution, whose median is the background."""
 MEDIAN_OF_EXPONENTIAL = float(np.log(2.0))
-MARGIN = 1.5
-"""Factor on the threshold for what the background's own estimate may be wrong by."""
+MARGIN = 3.0
+"""Factor on the threshold for what is left of other structure: turns at equal places and counts
+that beat with the ticks gave a line of up to 2.8 times the noise's threshold, by which two halves
+agreed, in 5 of 475 simulated recordings without cogging."""
 FINER = 8
 SLOWEST = 0.1
 STEADY = 0.7
