@@ -37,6 +37,9 @@ class StrokeSums(Protocol):
     def log_likelihood(self, u: Array) -> float:
         """Log-likelihood at ``u`` (p,)."""
 
+    def log_likelihoods(self, points: Array) -> Array:
+        """Log-likelihoods (k,) at points (k, p)."""
+
     def slope(self, u: Array) -> Array:
         """Its derivative (p,)."""
 
@@ -92,6 +95,15 @@ class CandidateProblem(Problem):
             self.tally()
         total = self.share * self.reduced.log_likelihood(point)
         return total if np.isfinite(total) else -np.inf
+
+    def log_likelihoods(self, points: Array) -> Array:
+        """Those of points (k, p), shape (k,)."""
+        if self.reduced is None:
+            return super().log_likelihoods(points)
+        if self.tally is not None:
+            self.tally(len(points))
+        totals = self.share * self.reduced.log_likelihoods(points)
+        return np.where(np.isfinite(totals), totals, -np.inf)
 
 
 @dataclass(frozen=True)

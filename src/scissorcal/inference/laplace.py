@@ -194,8 +194,6 @@ def laplace(problem: Problem, shape: Shape, spread: Array | None) -> Laplace:
         return total if np.isfinite(total) else -np.inf
 
     def log_posteriors(points: Array) -> Array:
-        if problem.log_posterior_many is None:
-            return np.array([log_posterior(u) for u in points])
         inside = np.all((points >= problem.lower) & (points <= problem.upper), axis=1)
         heights = np.full(len(points), -np.inf)
         if np.any(inside):

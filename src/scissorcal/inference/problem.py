@@ -45,8 +45,8 @@ class Problem:
 
     ``shear`` are coordinates in which a known ridge is straight; samplers work in them.
 
-    ``tally`` is called before each likelihood that a subclass works out without its terms, so that
-    counters see it too.
+    ``tally`` is called before likelihoods that a subclass works out without their terms, with their
+    number if they are several, so that counters see them too.
     """
 
     names: tuple[str, ...]
@@ -66,7 +66,7 @@ class Problem:
     log_posterior_many: Callable[[Array], Array] | None = None
     smooth: bool = False
     shear: Shear | None = None
-    tally: Callable[[], None] | None = None
+    tally: Callable[..., None] | None = None
 
     def __post_init__(self) -> None:
         if self.log_posterior_many is not None and self.share != 1.0:

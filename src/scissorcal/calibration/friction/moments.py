@@ -136,6 +136,18 @@ class ReducedLaw:
         """Log-likelihood at ``u`` (p,), up to a constant."""
         return float(-0.5 * self.squares(u) * np.exp(-2.0 * u[-1]) - self.counted * u[-1])
 
+    def log_likelihoods(self, points: Array) -> Array:
+        """Log-likelihoods (k,) at points (k, p), up to the same constant."""
+        squares = np.empty(len(points))
+        cells = [self.cell_at(u) for u in points]
+        for cell in dict.fromkeys(cells):
+            here = [k for k, other in enumerate(cells) if other == cell]
+            factors, products = self.factors(points[here], cell), self.summed(cell)
+            found = np.einsum("kq,kq->k", factors @ products, factors)
+            squares[here] = np.maximum(found, LEAST * products[0, 0])
+        size = points[:, -1]
+        return np.asarray(-0.5 * squares * np.exp(-2.0 * size) - self.counted * size)
+
     def squares(self, u: Array) -> float:
         """Sum of squared residuals at ``u`` (p,)."""
         cell = self.cell_at(u)
