@@ -119,7 +119,7 @@ class FirstRig:
 class SecondRig:
     """The rig of another construction, which shares no code with the product."""
 
-    def __init__(self, material: str, seed: int) -> None:
+    def __init__(self, material: str, seed: int, preset: Any = None) -> None:
         from tests.second_rig import capture, presets
 
         self._capture = capture
@@ -131,7 +131,7 @@ class SecondRig:
             exponent=drawn.exponent * _within(rng, 0.15),
             fracture_energy_N=drawn.fracture_energy_N * _within(rng),
         )
-        rig = presets.fine(sheet)
+        rig = (preset or presets.fine)(sheet)
         friction = rig.mechanism.friction
         friction = replace(
             friction,
@@ -139,15 +139,15 @@ class SecondRig:
             coulomb_closing_Nm=friction.coulomb_closing_Nm * _within(rng),
             stribeck_Nm=friction.stribeck_Nm * _within(rng),
         )
-        self._rig = replace(rig, mechanism=replace(rig.mechanism, friction=friction))
-        self.recipe = presets.recipe_for(self._rig)
-        self.identity = capture.identity_of(self._rig)
+        self.rig = replace(rig, mechanism=replace(rig.mechanism, friction=friction))
+        self.recipe = presets.recipe_for(self.rig)
+        self.identity = capture.identity_of(self.rig)
         self._rng = rng.spawn(1)[0]
 
     def capture(self, kind: Kind, recipe: Recipe) -> Recording:
         """Drive the rig along the product's plan."""
         take = self._capture.capture_friction if kind == "friction" else self._capture.capture_cut
-        recording, _ = take(self._rig, recipe, self._rng)
+        recording, _ = take(self.rig, recipe, self._rng)
         return recording
 
 

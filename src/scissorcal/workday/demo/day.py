@@ -238,6 +238,11 @@ def torque_error(package: "ModelPackage", specimen: "Specimen", recipe: "Recipe"
     return float(np.sqrt(np.mean(difference**2) / np.mean(size[counts] ** 2)))
 
 
+def specimen_of(recipe: "Recipe", seed: int) -> "Specimen":
+    """The specimen that a day of a seed captures."""
+    return _drawn(recipe, seed)[0]
+
+
 def _drawn(recipe: "Recipe", seed: int) -> tuple["Specimen", list["np.random.Generator"]]:
     """The specimen of a seed, and streams of noise for its captures and for rendering."""
     import numpy as np
