@@ -128,9 +128,9 @@ def candidate_rows(
     loo_k_hat. ``bic``, ``held_out_score`` and ``loo`` count only as many observations as are
     independent, the same share for every candidate. ``loo`` is the log density of all strokes, each
     by the posterior without it, ``loo_se`` its standard error over strokes, ``loo_k_hat`` the worst
-    stroke's tail index; they are NaN for a single candidate, as there is nothing to compare, and for
-    those that are no :func:`contenders`.
-    ``key`` and ``values`` (by name, at the best point) are what a candidate's law is drawn from.
+    stroke's tail index. They are NaN for a single candidate, as there is nothing to compare, and
+    for those that are no :func:`contenders`. ``key`` and ``values`` (by name, at the best point)
+    are what a candidate's law is drawn from.
     """
     share = best_of(fitted).share
     near = [id(one) for one in contenders(fitted)] if len(fitted) > 1 else []

@@ -52,8 +52,8 @@ def text(outcome: "FitOutcome") -> str:
     said += outcome.state.notes
     if outcome.state.state == "unverified":
         said.append(
-            f"unverified: 'scissorcal verify {fitted.words}' checks in about a minute whether these "
-            "intervals hold."
+            f"unverified: 'scissorcal verify {fitted.words}' checks in about a minute whether "
+            "these intervals hold."
         )
     return "\n".join(line for line in said if line)
 
