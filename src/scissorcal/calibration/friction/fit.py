@@ -122,7 +122,8 @@ def fit_friction(
     if prior is None:  # a study simulates the law itself
         posterior = with_lack_of_fit(posterior, law, settings.lack_of_fit, rng)
         posterior = opened(posterior, law, slow, chosen.held_out_rms, rng)
-    between = compare_recordings(law, chosen.optimum.point, recordings, rng)
+    usual = settings.between_recordings
+    between = compare_recordings(law, chosen.optimum.point, recordings, usual, rng)
     posterior = widened(posterior, between, rng)
     swung = None if prior else inertia_verdict(law, posterior.draws, recordings)
     unshown = ("inertia",) if hidden_from_sweeps(law, recordings) else ()
