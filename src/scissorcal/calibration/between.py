@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.caveats import NEXT_RECORDING
 from scissorcal.calibration.checks import HELD_OUT_LIMIT
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.friction.model import FrictionExperiment
@@ -119,9 +120,16 @@ class BetweenRecordings:
         names = self.layout.names
         return {
             "between_recordings_sd": dict(zip(names, self.typical_sd.tolist(), strict=True)),
+            NEXT_RECORDING: dict(zip(names, self._natural_sd().tolist(), strict=True)),
             "between_recordings_z": dict(zip(names, self.largest_z.tolist(), strict=True)),
             "left_out_recordings": [vars(error) for error in self.errors],
         }
+
+    def _natural_sd(self) -> Array:
+        """The median sd between recordings (p,) in the parameters' units."""
+        centre = self.points.mean(axis=0)
+        ends = self.layout.columns(np.stack([centre - self.typical_sd, centre + self.typical_sd]))
+        return np.asarray(0.5 * (ends[1] - ends[0]))
 
     def notes(self, nuisance: tuple[str, ...]) -> tuple[str, ...]:
         """Which parameters differ by recording and by how much, in one sentence."""

@@ -46,7 +46,7 @@ from scissorcal.calibration.friction.slow_friction import (
     opened,
     with_probed,
 )
-from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.result import Effort, FitResult, FittedParameter, in_words
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.idle import idle_noise
 from scissorcal.calibration.signals.interruptions import interruptions
@@ -313,10 +313,10 @@ def _notes(
             "below fit.friction.cutoff_Hz, to keep the steps from biasing the inertia."
         )
     if "delay" in posterior.names:
-        delays = posterior.draws[:, posterior.names.index("delay")]
+        delays = 1e3 * posterior.draws[:, posterior.names.index("delay")]
         notes.append(
-            f"The torque is measured {delays.mean() * 1e3:.3f} ms after the opening "
-            f"(sd {delays.std(ddof=1) * 1e3:.3f} ms); the fit corrects for it."
+            "The torque is measured after the opening, by "
+            f"{in_words(**FittedParameter.summary_of(delays))} ms; the fit corrects for it."
         )
     return (*notes, *cogging_notes(cogging, posterior, joint))
 
