@@ -283,9 +283,12 @@ class Predictive:
     (draws, strokes, candidates) those of all that were compared; None at draft effort. They are
     multiplied by ``independent_share``, the share of points that are independent, the same for all
     candidates of a fit, and relative to ``log_likelihood_reference`` (strokes,), each stroke's
-    largest value, since their level depends on the unit of torque. Their draws are those of a
-    posterior whose likelihood is taken to such a power
-    (:func:`scissorcal.calibration.psis_loo.leave_strokes_out`), not the rows of ``posterior``.
+    largest value, since their level depends on the unit of torque. ``log_likelihood_draws`` (draws,
+    parameters), columns in the order of ``parameters``, in SI, are the draws of the chosen
+    candidate at which they hold, row by row: equally weighted draws of the posterior whose
+    likelihood is taken to such a power
+    (:func:`scissorcal.calibration.psis_loo.leave_strokes_out`). The draws of the result are of
+    another, which is wider by what recordings differ in and by what the law lacks.
     """
 
     torque: Annotated[
@@ -297,6 +300,10 @@ class Predictive:
     ]
     log_likelihood_reference: Annotated[Array, Stored(("stroke",), "/reference", "log_likelihood")]
     independent_share: float
+    log_likelihood_draws: Annotated[
+        Array | None, by_name("/log_likelihood_posterior", "parameters")
+    ] = None
+    parameters: tuple[str, ...] = ()
     candidates: tuple[str, ...] = ()
     candidate_log_likelihoods: Annotated[
         Array | None, Stored(("chain", "draw", "stroke"), "/candidates", columns="candidates")
