@@ -21,12 +21,18 @@ OF_PROBE = "inertia_of_probe"
 
 NEXT_RECORDING = "next_recording_sd"
 """Diagnostic of fits of several recordings: sd between recordings by parameter, in its unit."""
+ON_RECORD = "next_recording_sd_on_record"
+"""The same of an earlier fit of several recordings, beside a fit of one."""
 COLUMN = "next recording"
 NOT_KNOWN = "not known"
 ONE_RECORDING = (
     "One recording does not show how far the next would differ, and the intervals do not include "
-    "it. Masses from two recordings of one positioning system (EMPS) were five "
-    "standard deviations apart. Record again after a new set-up."
+    "it: masses from two recordings of one positioning system (EMPS) were five standard deviations "
+    "apart. Record again after a new set-up."
+)
+EARLIER = (
+    "The intervals are of one recording; a second may differ by more, as earlier fits of several "
+    f"recordings found ({COLUMN})."
 )
 
 RESPONSE = ("response_force", "response_exponent")
@@ -72,9 +78,10 @@ def caveats_by_parameter(fit: FitResult) -> Mapping[str, tuple[str, ...]]:
 def next_recording_sd(fit: FitResult, parameter: FittedParameter) -> float | None:
     """Standard deviation, in the parameter's unit, by which single recordings differ from the fit.
 
-    None where the recordings of the fit do not show it, as one alone never does.
+    By the recordings of the fit, else by those of an earlier one; None where neither shows it.
     """
-    found = fit.diagnostics.get(NEXT_RECORDING) or {}
+    known = fit.diagnostics
+    found = known.get(NEXT_RECORDING) or known.get(ON_RECORD) or {}
     sd = found.get(parameter.name)
     return None if sd is None else float(sd)
 
@@ -82,12 +89,16 @@ def next_recording_sd(fit: FitResult, parameter: FittedParameter) -> float | Non
 def next_recording_words(fit: FitResult, parameter: FittedParameter) -> str:
     """The same for a table: what a new recording's value lies within, or that it is not known."""
     sd = next_recording_sd(fit, parameter)
-    return NOT_KNOWN if sd is None else f"+- {sd:.2g}"
+    if sd is None:
+        return NOT_KNOWN
+    return f"+- {sd:.2g}" if fit.diagnostics.get(NEXT_RECORDING) else f"(+- {sd:.2g})"
 
 
 def next_recording_sentence(fit: FitResult) -> str:
     """What stands below the table of parameters; empty where the recordings show the size."""
-    return "" if fit.diagnostics.get(NEXT_RECORDING) else ONE_RECORDING
+    if fit.diagnostics.get(NEXT_RECORDING):
+        return ""
+    return EARLIER if fit.diagnostics.get(ON_RECORD) else ONE_RECORDING
 
 
 def _concerns(row: _Row, name: str) -> bool:
