@@ -90,10 +90,10 @@ def between_groups(
 def one_normal(variances: Array) -> Array:
     """Standard deviations (p,) of the normals whose 90 % intervals are those of mixtures.
 
-    ``variances`` (n, p) are those of n equally likely normals about one centre. With two or three
-    groups their scatter is known within a factor of ten, and the mixture over it has 2 % of its
-    draws beyond ten times its own half-width: tails of the prior, which no group has shown. A
-    normal of the same interval keeps what is promised, and its moments agree with its quantiles.
+    ``variances`` (n, p) are those of n equally likely normals about one centre. Two groups say so
+    little of their scatter that the sd of the mixture over it is one to six times its 90 %
+    half-width: it follows tails of the prior, which no group has shown. A normal of the same
+    interval keeps what is promised, and its moments agree with its quantiles.
 
     >>> one_normal(np.full((8, 1), 4.0)).round(6)
     array([2.])

@@ -74,7 +74,7 @@ def _refuse_two_rigs(recordings: tuple[Recording, ...]) -> None:
         first, second, *_ = reversed(seen.values())
         raise InputError(
             f"{first} and {second} are of two rigs, and one fit is of one rig: fit the recordings "
-            "of each rig in a workspace of its own, or exclude those of one."
+            "of each rig in another workspace, or exclude those of one."
         )
 
 
