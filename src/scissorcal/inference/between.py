@@ -91,7 +91,7 @@ def one_normal(variances: Array) -> Array:
     """Standard deviations (p,) of the normals whose 90 % intervals are those of mixtures.
 
     ``variances`` (n, p) are those of n equally likely normals about one centre. Two groups say so
-    little of their scatter that the sd of the mixture over it is one to six times its 90 %
+    little of their scatter that the sd of the mixture over it is up to seven times its 90 %
     half-width: it follows tails of the prior, which no group has shown. A normal of the same
     interval keeps what is promised, and its moments agree with its quantiles.
 
