@@ -7,10 +7,15 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult, fit_friction, friction_experiment
+from scissorcal.calibration.between import BetweenRecordings
+from scissorcal.calibration.caveats import next_recording_sd, next_recording_sentence
+from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.verify.check import assess, make_study, tasks_of
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.calibration.verify.simulator import friction_simulator
 from scissorcal.calibration.verify.study import run
+from scissorcal.model.transforms import LOG
+from scissorcal.package.build import pick_draws
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.friction.test_fit import emps
@@ -124,6 +129,79 @@ def test_one_recording_says_that_more_is_not_known(alone: FitResult):
     assert "between_recordings_sd" not in alone.diagnostics
     why = next(v.why for v in halves(recordings(Truth()), alone).verdicts if v.check == "halves")
     assert "the variation between recordings is unknown" in why
+
+
+def tails(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Half-width over sd, and the farthest draw in robust sds, by column."""
+    q05, q16, q50, q84, q95 = np.quantile(draws, [0.05, 0.16, 0.5, 0.84, 0.95], axis=0)
+    over = 0.5 * (q95 - q05) / draws.std(axis=0, ddof=1)
+    return over, np.abs(draws - q50).max(axis=0) / (0.5 * (q84 - q16))
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_draws_of_several_recordings_have_the_tails_of_a_normal(count: int) -> None:
+    """Before, the farthest of 2,000 draws lay 10 to 150 robust sds away, and few made the sd."""
+    fit = fitted(recordings(*[Truth()] * count))
+    for draws in (fit.draws, pick_draws(fit, None, np.random.default_rng(1))["draws/cut.npy"]):
+        over, farthest = tails(draws)
+        assert np.all((over > 1.4) & (over < 1.9))
+        assert np.all(farthest < 8.0)
+    assert all(parameter.moments for parameter in fit.parameters)
+
+
+def test_the_size_between_recordings_stands_beside_the_parameter(alone: FitResult) -> None:
+    fit = fitted(recordings(Truth(), dataclasses.replace(Truth(), inertia=2.2e-4)))
+    seen = next_recording_sd(fit, fit.parameter("inertia"))
+    assert seen is not None
+    assert 0.5e-5 < seen < 4e-5
+    assert next_recording_sentence(fit) == ""
+    assert next_recording_sd(alone, alone.parameter("inertia")) is None
+    assert "One recording does not show" in next_recording_sentence(alone)
+
+
+def between_of(sd: np.ndarray) -> BetweenRecordings:
+    """Two recordings that determine two parameters to 1 %, with draws of what they scatter by."""
+    layout = Layout(tuple(Parameter(n, "1", LOG, 0.0, 3.0, "a parameter") for n in ("a", "b")))
+    precisions = np.stack([np.array([[1e4, 4e3], [4e3, 1e4]])] * 2)
+    return BetweenRecordings(
+        layout, np.zeros((2, 2)), precisions, np.eye(2) / 9.0, sd, np.zeros(2), ()
+    )
+
+
+def test_draws_stay_where_recordings_do_not_scatter() -> None:
+    draws = np.random.default_rng(1).standard_normal((50, 2)) ** 3
+    still = between_of(np.full((10, 2), 1e-9))
+    np.testing.assert_allclose(still.widened(draws, np.random.default_rng(2)), draws, atol=1e-7)
+
+
+def test_draws_are_widened_by_the_interval_over_all_scatters() -> None:
+    """Half of the scatters 1 %, half 10 %: of the mean over two 90 % lie within 9.97 %.
+
+    That is where 0.5 (2 F(x / 0.0100) - 1) + 0.5 (2 F(x / 0.0711) - 1) = 0.9, with the variances
+    (0.01^2 + 0.01^2 / (1 - 0.16)) / 2 and so for 0.1; 0.9 needs F(x / 0.0711) = 0.9.
+    """
+    sd = np.tile([[0.01, 0.01], [0.1, 0.1]], (20, 1))
+    between = between_of(sd)
+    pooled = np.linalg.inv(between.precisions.sum(axis=0) + between.prior)
+    rng = np.random.default_rng(3)
+    draws = rng.multivariate_normal(np.zeros(2), pooled, 40_000)
+    found = between.widened(draws, rng)
+    low, high = np.quantile(found, [0.05, 0.95], axis=0)
+    wide = np.sqrt((0.1**2 + 1e-4 / (1.0 - 0.16)) / 2.0)
+    assert 0.5 * (high - low) == pytest.approx(1.2816 * wide, rel=0.02)
+    over, farthest = tails(found)
+    assert over == pytest.approx(1.645, rel=0.02)
+    assert np.all(farthest < 6.0)
+
+
+def test_the_recipe_states_the_usual_size() -> None:
+    """With 0.1 % two recordings that agree widen less than with 10 %."""
+    given = recordings(Truth(), Truth())
+    near, far = (
+        fitted(given, FitFriction(**{**SETTINGS.model_dump(), "between_recordings_percent": size}))
+        for size in (0.1, 10.0)
+    )
+    assert near.parameter("inertia").sd < 0.9 * far.parameter("inertia").sd
 
 
 def test_the_jackknife_on_a_true_law_agrees_with_the_fit():

@@ -83,3 +83,43 @@ def test_a_fit_without_its_trust_check_is_unverified():
     outcome = FitOutcome("cut", fitted(), Path("cut.nc"), (), False, UNVERIFIED)
     assert "unverified: 'scissorcal verify cut'" in text(outcome)
     assert "unverified" not in text(replace(outcome, state=StepState("fit cut", "done", "")))
+
+
+def test_what_one_recording_does_not_show_stands_beside_the_interval():
+    fit = fitted()
+    outcome = FitOutcome("cut", fit, Path("cut.nc"), (), False, UNVERIFIED)
+    assert "One recording does not show how far the next would differ" in text(outcome)
+    assert text(outcome).count("not known") == len(fit.parameters) + len(fit.derived)
+    assert all(row["next_recording_sd"] is None for row in parameter_facts(outcome))
+    panel = parameters_panel(fit, "cut")
+    assert "One recording does not show" in panel.sentence
+    assert all(str(row.value("next recording")) == "not known" for row in panel.rows)
+
+
+def test_the_size_that_recordings_showed_stands_beside_the_interval():
+    sizes = {parameter.name: 0.0123 for parameter in fitted().parameters}
+    for key, shown in (("next_recording_sd", "+- 0.012"), ("next_recording_sd_on_record", "(+- ")):
+        plain = fitted()
+        fit = replace(plain, diagnostics={**plain.diagnostics, key: sizes})
+        outcome = FitOutcome("cut", fit, Path("cut.nc"), (), False, UNVERIFIED)
+        assert shown in text(outcome)
+        assert "One recording does not show" not in text(outcome)
+        assert parameter_facts(outcome)[0]["next_recording_sd"] == 0.0123
+    assert "earlier fits of several" in text(outcome)
+
+
+def test_moments_that_follow_a_tail_are_not_printed():
+    """The first parameter has an sd of twice its half-width."""
+    plain = fitted()
+    first, *others = plain.parameters
+    wide = replace(first, sd=2.0 * (first.q95 - first.q05))
+    fit = replace(plain, parameters=(wide, *others))
+    outcome = FitOutcome("cut", fit, Path("cut.nc"), (), False, UNVERIFIED)
+    assert first.moments == (first.mean, first.sd)
+    assert wide.moments is None
+    assert f"{wide.sd:.4g}" not in text(outcome)
+    assert f"{wide.q50:.4g} (median)" in text(outcome)
+    assert (parameter_facts(outcome)[0]["mean"], parameter_facts(outcome)[0]["sd"]) == (None, None)
+    row = parameters_panel(fit, "cut").row(wide.name)
+    assert str(row.value("mean")) == "see the median"
+    assert wide.words == f"{wide.q50:.2g} ({wide.q05:.2g} to {wide.q95:.2g})"

@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scissorcal.calibration import FitResult, fit_friction, load_fit, save
+from scissorcal.calibration import (
+    FitResult,
+    fit_friction,
+    friction_experiment,
+    load_fit,
+    save,
+)
 from scissorcal.calibration.predictive import REPLICATES, _rounded
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
@@ -103,6 +109,24 @@ def test_replicates_have_the_spread_and_autocorrelation_of_the_residuals(
     assert noise.std(axis=1).mean() == pytest.approx(observed.std(), rel=0.1)
     neighbours = [float(np.corrcoef(e[1:], e[:-1])[0, 1]) for e in (observed, *noise)]
     assert np.mean(neighbours[1:]) == pytest.approx(neighbours[0], abs=0.1)
+
+
+def test_log_likelihoods_are_those_of_the_draws_beside_them(data: Any, fitted: FitResult) -> None:
+    """Evaluated again at every tenth stored draw, stroke by stroke, with the law of the fit."""
+    recording = repeated(np.random.default_rng(1))
+    settings = FitFriction(rung="coulomb+viscous", critic=False)
+    design = friction_experiment((recording,), settings, fitted)
+    problem = design.candidate(design.observed).problem(design.series)
+    found, likelihood = fitted.predictive, data.log_likelihood.torque.values[0]
+    assert found is not None
+    group = data.log_likelihood_posterior
+    assert list(group.data_vars) == list(found.parameters) == list(design.layout.names)
+    for row in range(0, len(likelihood), 10):
+        values = {name: float(group[name].values[0, row]) for name in found.parameters}
+        terms = problem.log_likelihood_terms(design.layout.unconstrained(values))
+        by_stroke = np.array([terms[design.strokes == label].sum() for label in found.stroke])
+        expected = found.independent_share * by_stroke - found.log_likelihood_reference
+        np.testing.assert_allclose(likelihood[row], expected, rtol=1e-6, atol=1e-3)
 
 
 def test_loo_by_arviz_agrees_with_the_fit_s_own(data: Any, fitted: FitResult) -> None:

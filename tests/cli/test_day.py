@@ -43,7 +43,8 @@ def test_the_day_from_captures_to_package(
     names = [parameter["name"] for parameter in result["parameters"]]
     assert names[:2] == ["inertia", "offset"]
     assert names[-3:] == ["response_force", "response_exponent", "fracture_energy"]
-    keys = ["name", "unit", "mean", "sd", "q05", "q50", "q95", "identifiability", "caveats"]
+    keys = ["name", "unit", "mean", "sd", "q05", "q50", "q95", "identifiability"]
+    keys += ["next_recording_sd", "caveats"]
     assert all(list(parameter) == keys for parameter in result["parameters"])
     assert [fit["cached"] for fit in result["fits"]] == [False, False]
     assert fitted.envelope["files"] == [str(recorded.fit_path(w)) for w in ("friction", "cut")]

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import norm
 
-from scissorcal.inference.between import between_groups
+from scissorcal.inference.between import between_groups, one_normal
 
 P, OWN_SD, SCALE = 4, 0.005, 0.02
 
@@ -58,3 +61,30 @@ def test_equal_seeds_give_equal_draws_and_many_alike_groups_shrink_the_scatter()
     ]
     assert np.array_equal(runs[0].sd, runs[1].sd)
     assert np.all(np.median(runs[0].sd, axis=0) < OWN_SD)
+
+
+def test_equal_variances_are_their_own_normal() -> None:
+    assert one_normal(np.array([[4.0, 9.0]] * 3)) == pytest.approx([2.0, 3.0])
+
+
+@given(
+    sds=st.lists(st.floats(1e-4, 1e3), min_size=1, max_size=20),
+    scale=st.floats(1e-6, 1e6),
+)
+def test_one_normal_has_the_interval_of_the_mixture(sds: list[float], scale: float) -> None:
+    """90 % of the mixture lies within 1.645 of its standard deviations, in any unit."""
+    sd = np.array(sds)
+    (found,) = one_normal((sd**2)[:, None])
+    inside = np.mean(2.0 * norm.cdf(norm.ppf(0.95) * found / sd) - 1.0)
+    assert inside == pytest.approx(0.9, abs=1e-6)
+    assert one_normal(((scale * sd) ** 2)[:, None])[0] == pytest.approx(scale * found, rel=1e-6)
+
+
+def test_groups_that_differ_by_nothing_have_a_finite_scatter() -> None:
+    """Exact and equal estimates: no draw of tau beyond what a half-normal of the slab reaches."""
+    means = np.zeros((2, P))
+    precision = np.stack([np.eye(P) / 1e-6**2] * 2)
+    rng = np.random.default_rng(6)
+    found = between_groups(means, precision, np.full(P, SCALE), np.eye(P) / 8, rng)
+    assert found.sd.max() < 5.0 * 10.0 * SCALE
+    assert np.all(np.median(found.sd, axis=0) < 0.2 * SCALE)

@@ -54,6 +54,11 @@ def known_friction(truth: Truth, recording: Recording | None = None, seed: int =
     return _known(friction_fit(), values, structure, recording, seed)
 
 
+def _normal(name: str, value: float) -> FittedParameter:
+    sd = SPREAD * abs(value)
+    return FittedParameter(name, "1", value, sd, value - 1.645 * sd, value, value + 1.645 * sd, 0.1)
+
+
 def _known(
     fit: FitResult,
     values: dict[str, float],
@@ -64,10 +69,7 @@ def _known(
     point = np.array(list(values.values()))
     rng = np.random.default_rng(seed)
     draws = point * (1.0 + SPREAD * rng.normal(size=(DRAWS, len(point))))
-    parameters = tuple(
-        FittedParameter(name, "1", value, SPREAD * value, value, value, value, 0.1)
-        for name, value in values.items()
-    )
+    parameters = tuple(_normal(name, value) for name, value in values.items())
     sources = fit.sources
     if recording is not None:
         sources = (f"{recording.source} sha256:{recording.content_hash}",)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.caveats import NEXT_RECORDING
 from scissorcal.calibration.checks import HELD_OUT_LIMIT
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.friction.model import FrictionExperiment
@@ -15,7 +16,7 @@ from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.calibration.friction.search import search, search_from
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference import Posterior, infer
-from scissorcal.inference.between import BROAD, between_groups
+from scissorcal.inference.between import BROAD, between_groups, one_normal
 from scissorcal.model.transforms import LOG
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, judge, not_evaluated
@@ -24,9 +25,6 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-SCALE = 0.02
-"""Usual size of a difference between recordings: 2 % of what has a logarithm, else this share of
-the prior's standard deviation."""
 FEWEST_BINS = 100
 """Moving bins from which a recording is fitted by itself."""
 MISFIT = 1.5
@@ -92,17 +90,24 @@ class BetweenRecordings:
     def widened(self, draws: Array, rng: np.random.Generator) -> Array:
         """Widen draws (n, p) of the pooled parameters to those of the mean over recordings.
 
-        Given the scatter tau, the covariance of that mean exceeds the pooled one. Each draw takes
-        one tau and normal noise of the difference, so that without scatter it stays where it is,
-        whatever shape the posterior has. The centre stays the pooled one: where recordings say
+        Given the scatter tau, the covariance of that mean exceeds the pooled one. Draws get normal
+        noise of the difference: its correlations are those given the median tau, its standard
+        deviations those of the normals with the 90 % intervals of all tau
+        (:func:`~scissorcal.inference.between.one_normal`). Without scatter draws stay where they
+        are, whatever shape the posterior has. The centre stays the pooled one: where recordings say
         little by themselves, their own estimates would move it farther than they know.
         """
-        covariance = self._given(np.concatenate([np.zeros((1, self.sd.shape[1])), self.sd]))
-        values, vectors = np.linalg.eigh(covariance[1:] - covariance[0])
-        root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-        pick = rng.integers(len(self.sd), size=len(draws))
-        noise = np.einsum("nij,nj->ni", root[pick], rng.standard_normal(draws.shape))
-        return np.asarray(draws + noise)
+        pooled, typical = self._given(np.stack([np.zeros(len(self.prior)), self.typical_sd]))
+        wanted = one_normal(np.diagonal(self._given(self.sd), axis1=1, axis2=2))
+        stretch = wanted / np.sqrt(np.diag(typical))
+        values, vectors = np.linalg.eigh(typical * np.outer(stretch, stretch) - pooled)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        return np.asarray(draws + rng.standard_normal(draws.shape) @ root.T)
+
+    @property
+    def typical_sd(self) -> Array:
+        """Median (p,) of the standard deviation between recordings."""
+        return np.asarray(np.median(self.sd, axis=0))
 
     def _given(self, tau: Array) -> Array:
         """Covariance (k, p, p) of the mean over recordings given scatters ``tau`` (k, p)."""
@@ -114,12 +119,17 @@ class BetweenRecordings:
         """Plain numbers by parameter and by recording, for the fit's file."""
         names = self.layout.names
         return {
-            "between_recordings_sd": dict(
-                zip(names, np.median(self.sd, axis=0).tolist(), strict=True)
-            ),
+            "between_recordings_sd": dict(zip(names, self.typical_sd.tolist(), strict=True)),
+            NEXT_RECORDING: dict(zip(names, self._natural_sd().tolist(), strict=True)),
             "between_recordings_z": dict(zip(names, self.largest_z.tolist(), strict=True)),
             "left_out_recordings": [vars(error) for error in self.errors],
         }
+
+    def _natural_sd(self) -> Array:
+        """The median sd between recordings (p,) in the parameters' units."""
+        centre = self.points.mean(axis=0)
+        ends = self.layout.columns(np.stack([centre - self.typical_sd, centre + self.typical_sd]))
+        return np.asarray(0.5 * (ends[1] - ends[0]))
 
     def notes(self, nuisance: tuple[str, ...]) -> tuple[str, ...]:
         """Which parameters differ by recording and by how much, in one sentence."""
@@ -168,13 +178,15 @@ def compare_recordings(
     design: FrictionExperiment,
     point: Array,
     recordings: tuple[Recording, ...],
+    usual: float,
     rng: np.random.Generator,
 ) -> BetweenRecordings | None:
     """Fit every recording by itself and by the others; None where fewer than two can be.
 
-    ``design`` is the chosen law over all recordings, with normal noise, and ``point`` (p,) its
-    optimum. The prior, which all share, is taken out of the recordings' estimates before they are
-    compared (see :func:`scissorcal.inference.between.between_groups`).
+    ``design`` is the chosen law over all recordings, with normal noise, ``point`` (p,) its optimum,
+    ``usual`` the share by which recordings usually differ. The prior, which all share, is taken out
+    of the recordings' estimates before they are compared (see
+    :func:`scissorcal.inference.between.between_groups`).
     """
     every = design.candidate(design.observed)
     law, problem = every.reduced, every.problem(design.series)
@@ -189,7 +201,7 @@ def compare_recordings(
         return np.asarray(search_from(replace(problem, reduced=left), point).point)
 
     return gather_recordings(
-        design, design.bins.recording, point, recordings, FitsApart(own, others), rng
+        design, design.bins.recording, point, recordings, FitsApart(own, others), usual, rng
     )
 
 
@@ -199,11 +211,13 @@ def gather_recordings(
     point: Array,
     recordings: tuple[Recording, ...],
     fits: FitsApart,
+    usual: float,
     rng: np.random.Generator,
 ) -> BetweenRecordings | None:
     """Compare a law's fits to single recordings; None where fewer than two can be fitted.
 
-    ``index`` (n,) is the recording of each bin, ``point`` (p,) the optimum over all of them.
+    ``index`` (n,) is the recording of each bin, ``point`` (p,) the optimum over all of them,
+    ``usual`` the share by which recordings usually differ.
     """
     labels = [
         int(label) for label in np.unique(index) if np.count_nonzero(index == label) >= FEWEST_BINS
@@ -224,7 +238,7 @@ def gather_recordings(
         reached = (fits.others(here), point, own.optimum.point)
         errors.append(_error(design, recordings[label].source, here, reached))
     scatter = between_groups(
-        np.stack(estimates), np.stack(precisions), _scales(design.layout), prior, rng
+        np.stack(estimates), np.stack(precisions), usual_sd(design.layout, usual), prior, rng
     )
     return BetweenRecordings(
         layout=design.layout,
@@ -309,8 +323,13 @@ def _without_prior(own: Posterior, likelihood: Array, prior: Array, prior_mean: 
     return np.asarray(np.linalg.solve(held, pulled + BROAD * prior @ own.optimum.point))
 
 
-def _scales(layout: Layout) -> Array:
-    return np.array([SCALE * (1.0 if p.transform == LOG else p.sd) for p in layout.parameters])
+def usual_sd(layout: Layout, share: float) -> Array:
+    """Standard deviations (p,) between recordings that differ by ``share``.
+
+    It is the share of what has a logarithm, else of the prior's standard deviation, both in
+    unconstrained coordinates.
+    """
+    return np.array([share * (1.0 if p.transform == LOG else p.sd) for p in layout.parameters])
 
 
 def _largest_z(points: Array, covariances: Array) -> Array:

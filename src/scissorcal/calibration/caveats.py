@@ -1,14 +1,15 @@
 """Parameters whose intervals are known to be poorly calibrated for a kind of data: one table.
 
 A row stands for a coverage that was measured on rigs with known truth (docs/uncertainty.md), or for
-a parameter that data of the kind cannot identify. A measured improvement removes its row.
+a parameter that data of the kind cannot identify. A measured improvement removes its row. What no
+interval holds, by how much one more recording would differ, stands beside each.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.result import FitResult, FittedParameter
 
 FEW_COUNTS = 1.0
 """Encoder counts per sample of a closing stroke (median) below which an encoder is coarse."""
@@ -17,6 +18,22 @@ LONG_WINDOWS = 2.0
 """Lengthening of friction's windows from which sweeps do not show the inertia. Where a probe found
 it, the fit takes it from there, and ``OF_PROBE`` stands in its diagnostics."""
 OF_PROBE = "inertia_of_probe"
+
+NEXT_RECORDING = "next_recording_sd"
+"""Diagnostic of fits of several recordings: sd between recordings by parameter, in its unit."""
+ON_RECORD = "next_recording_sd_on_record"
+"""The same of an earlier fit of several recordings, beside a fit of one."""
+COLUMN = "next recording"
+NOT_KNOWN = "not known"
+ONE_RECORDING = (
+    "One recording does not show how far the next would differ, and the intervals do not include "
+    "it: masses from two recordings of one positioning system (EMPS) were five standard deviations "
+    "apart. Record again after a new set-up."
+)
+EARLIER = (
+    "The intervals are of one recording; a second may differ by more, as earlier fits of several "
+    f"recordings found ({COLUMN})."
+)
 
 RESPONSE = ("response_force", "response_exponent")
 
@@ -56,6 +73,32 @@ def caveats_by_parameter(fit: FitResult) -> Mapping[str, tuple[str, ...]]:
         for name in caveat.parameters:
             found[name] = (*found.get(name, ()), caveat.sentence)
     return found
+
+
+def next_recording_sd(fit: FitResult, parameter: FittedParameter) -> float | None:
+    """Standard deviation, in the parameter's unit, by which single recordings differ from the fit.
+
+    By the recordings of the fit, else by those of an earlier one; None where neither shows it.
+    """
+    known = fit.diagnostics
+    found = known.get(NEXT_RECORDING) or known.get(ON_RECORD) or {}
+    sd = found.get(parameter.name)
+    return None if sd is None else float(sd)
+
+
+def next_recording_words(fit: FitResult, parameter: FittedParameter) -> str:
+    """The same for a table: what a new recording's value lies within, or that it is not known."""
+    sd = next_recording_sd(fit, parameter)
+    if sd is None:
+        return NOT_KNOWN
+    return f"+- {sd:.2g}" if fit.diagnostics.get(NEXT_RECORDING) else f"(+- {sd:.2g})"
+
+
+def next_recording_sentence(fit: FitResult) -> str:
+    """What stands below the table of parameters; empty where the recordings show the size."""
+    if fit.diagnostics.get(NEXT_RECORDING):
+        return ""
+    return EARLIER if fit.diagnostics.get(ON_RECORD) else ONE_RECORDING
 
 
 def _concerns(row: _Row, name: str) -> bool:

@@ -43,14 +43,18 @@ def predictive_of(
     sampled = [one for one in near if len(one.left_out.densities)]
     densities = np.zeros((RESAMPLED, len(np.unique(own.strokes)), len(sampled)))
     for index, one in enumerate(sampled):
-        densities[:, :, index] = share * _resampled(one.left_out)
+        densities[:, :, index] = share * one.left_out.densities[_resampled(one.left_out)]
     reference = densities.max(axis=(0, 2)) if sampled else np.zeros(densities.shape[1])
     densities -= reference[:, None]
+    layout = own.candidate.layout
+    points = layout.columns(own.left_out.points[_resampled(own.left_out)]) if sampled else None
     means = predictions[:: max(1, len(predictions) // REPLICATES)]
     return Predictive(
         torque=_rounded(means + _noise(own, len(means), rng)[:, thin]),
         stroke=np.unique(own.strokes),
         log_likelihood=densities[:, :, sampled.index(own)] if own in sampled else None,
+        log_likelihood_draws=points if own in sampled else None,
+        parameters=layout.names,
         log_likelihood_reference=reference,
         independent_share=share,
         candidates=tuple(one.name for one in sampled),
@@ -70,11 +74,11 @@ def _noise(fitted: FittedCandidate, count: int, rng: np.random.Generator) -> Arr
     return sd * noise.draws(fitted.series, count, rng)
 
 
-def _resampled(left_out: LeftOut) -> Array:
-    """Log-likelihoods (RESAMPLED, strokes) at equally weighted draws, by systematic resampling."""
+def _resampled(left_out: LeftOut) -> NDArray[np.int64]:
+    """Rows (RESAMPLED,) of equally weighted draws, by systematic resampling."""
     weights = np.cumsum(np.exp(left_out.log_weights))
     places = (np.arange(RESAMPLED) + 0.5) / RESAMPLED * weights[-1]
-    return np.asarray(left_out.densities[np.searchsorted(weights, places)])
+    return np.asarray(np.searchsorted(weights, places))
 
 
 def _rounded(values: Array) -> NDArray[np.float32]:

@@ -26,8 +26,8 @@ class LeftOut:
     """Log density (strokes,) of each stroke without it, and the tail index k-hat of its weights.
 
     ``evaluations`` counts those of the likelihood. ``densities`` (draws, strokes) are
-    log-likelihoods at draws whose posterior weights have the logarithms ``log_weights`` (draws,);
-    both are empty where no draw could be used.
+    log-likelihoods at ``points`` (draws, p), unconstrained, whose posterior weights have the
+    logarithms ``log_weights`` (draws,); all are empty where no draw could be used.
 
     Densities count all bins in full; who compares them multiplies by the share of bins that are
     independent.
@@ -38,6 +38,7 @@ class LeftOut:
     evaluations: int = 0
     densities: Array = field(default_factory=lambda: np.zeros((0, 0)))
     log_weights: Array = field(default_factory=lambda: np.zeros(0))
+    points: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def reliable(self) -> NDArray[np.bool_]:
@@ -71,7 +72,7 @@ def leave_strokes_out(
 
     counter = Counter()
     problem = counter.over(problem)
-    tried: list[tuple[float, Array, Array]] = []
+    tried: list[tuple[float, Array, Array, Array]] = []
     centre, covariance = point, _inverse(share * information + prior_precision)
     for _ in range(ROUNDS):
         draws, log_density = _around(centre, covariance)
@@ -82,7 +83,7 @@ def leave_strokes_out(
         tempered = share * densities[usable]
         every = log_prior[usable] + tempered.sum(axis=1) - log_density[usable]
         weights, k_hat = _smoothed(every[None, :])
-        tried.append((float(k_hat[0]), every, tempered))
+        tried.append((float(k_hat[0]), every, tempered, draws[usable]))
         if k_hat[0] < GOOD:
             break
         shares = np.exp(weights[0])
@@ -92,11 +93,11 @@ def leave_strokes_out(
     if not tried:
         nothing = np.full(len(labelled), np.nan), np.full(len(labelled), np.inf)
         return LeftOut(*nothing, counter.calls)
-    _, every, tempered = min(tried, key=lambda one: one[0])
+    _, every, tempered, points = min(tried, key=lambda one: one[0])
     weights, k_hats = _smoothed((every[:, None] - tempered).T)
     scores = np.asarray(logsumexp(weights + tempered.T, axis=1)) / share
     whole, _ = _smoothed(every[None, :])
-    return LeftOut(scores, k_hats, counter.calls, tempered / share, whole[0])
+    return LeftOut(scores, k_hats, counter.calls, tempered / share, whole[0], points)
 
 
 def _inverse(precision: Array) -> Array:

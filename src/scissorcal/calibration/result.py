@@ -83,6 +83,34 @@ class Result:
         return f"<{type(self).__name__} {'; '.join(word for word in words if word)}>"
 
 
+NEAREST, FARTHEST = 1.2816, 1.9600
+"""Distances from a normal's mean, in standard deviations, beyond which 10 % and 2.5 % lie: twice
+and half of what lies beyond an end of a 90 % interval."""
+
+
+def moments_agree(mean: float, sd: float, q05: float, q95: float) -> bool:
+    """Whether mean and sd say of a posterior what its 5 and 95 % quantiles say.
+
+    They do where a normal of these moments has between half and twice of 5 % beyond each quantile.
+    Long tails and skewed posteriors fail, as an sd then follows draws that no interval reaches.
+
+    >>> moments_agree(0.0, 1.0, -1.64, 1.64), moments_agree(0.0, 1.0, -0.5, 0.5)
+    (True, False)
+    """
+    return all(NEAREST * sd <= end <= FARTHEST * sd for end in (mean - q05, q95 - mean))
+
+
+def in_words(mean: float, sd: float, q05: float, q50: float, q95: float) -> str:
+    """Mean and sd for a sentence; the quantiles alone where moments do not agree with them.
+
+    >>> in_words(0.09, 0.01, 0.075, 0.09, 0.105), in_words(0.09, 0.03, 0.075, 0.081, 0.105)
+    ('0.09 (sd 0.01)', '0.081 (0.075 to 0.1)')
+    """
+    if moments_agree(mean, sd, q05, q95):
+        return f"{mean:.2g} (sd {sd:.1g})"
+    return f"{q50:.2g} ({q05:.2g} to {q95:.2g})"
+
+
 @dataclass(frozen=True)
 class FittedParameter:
     """One parameter with its marginal posterior, in ``unit``.
@@ -110,13 +138,28 @@ class FittedParameter:
         mean, sd = float(draws.mean()), float(draws.std(ddof=1))
         return {"mean": mean, "sd": sd, "q05": q05, "q50": q50, "q95": q95}
 
+    @property
+    def moments(self) -> tuple[float, float] | None:
+        """Mean and sd for people to read; None where they do not agree with the quantiles."""
+        told = moments_agree(self.mean, self.sd, self.q05, self.q95)
+        return (self.mean, self.sd) if told else None
+
+    @property
+    def words(self) -> str:
+        """The value for a sentence, without its unit; see :func:`in_words`."""
+        return in_words(self.mean, self.sd, self.q05, self.q50, self.q95)
+
     def as_dict(self) -> dict[str, Any]:
-        """Give the parameter as the plain object that ``--json`` prints."""
+        """Give the parameter as the plain object that ``--json`` prints.
+
+        ``mean`` and ``sd`` are None where they do not agree with the quantiles.
+        """
+        mean, sd = self.moments or (None, None)
         return {
             "name": self.name,
             "unit": self.unit,
-            "mean": self.mean,
-            "sd": self.sd,
+            "mean": mean,
+            "sd": sd,
             "q05": self.q05,
             "q50": self.q50,
             "q95": self.q95,
@@ -240,9 +283,12 @@ class Predictive:
     (draws, strokes, candidates) those of all that were compared; None at draft effort. They are
     multiplied by ``independent_share``, the share of points that are independent, the same for all
     candidates of a fit, and relative to ``log_likelihood_reference`` (strokes,), each stroke's
-    largest value, since their level depends on the unit of torque. Their draws are those of a
-    posterior whose likelihood is taken to such a power
-    (:func:`scissorcal.calibration.psis_loo.leave_strokes_out`), not the rows of ``posterior``.
+    largest value, since their level depends on the unit of torque. ``log_likelihood_draws`` (draws,
+    parameters), columns in the order of ``parameters``, in SI, are the draws of the chosen
+    candidate at which they hold, row by row: equally weighted draws of the posterior whose
+    likelihood is taken to such a power
+    (:func:`scissorcal.calibration.psis_loo.leave_strokes_out`). The draws of the result are of
+    another, which is wider by what recordings differ in and by what the law lacks.
     """
 
     torque: Annotated[
@@ -254,6 +300,10 @@ class Predictive:
     ]
     log_likelihood_reference: Annotated[Array, Stored(("stroke",), "/reference", "log_likelihood")]
     independent_share: float
+    log_likelihood_draws: Annotated[
+        Array | None, by_name("/log_likelihood_posterior", "parameters")
+    ] = None
+    parameters: tuple[str, ...] = ()
     candidates: tuple[str, ...] = ()
     candidate_log_likelihoods: Annotated[
         Array | None, Stored(("chain", "draw", "stroke"), "/candidates", columns="candidates")

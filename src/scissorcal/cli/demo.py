@@ -100,7 +100,8 @@ def _text(found: "DemoResult") -> str:
     for row in found.judged:
         parameter = row.parameter
         truth = "-" if row.truth is None else f"{row.truth:.4g}"
-        estimate = [f"{value:.4g}" for value in (parameter.mean, parameter.q05, parameter.q95)]
+        centre = parameter.moments[0] if parameter.moments else parameter.q50
+        estimate = [f"{value:.4g}" for value in (centre, parameter.q05, parameter.q95)]
         rows.append([parameter.name, parameter.unit, truth, *estimate, _ANSWERS[row.inside]])
     for seen in found.geometry:
         reach = 1.6449 * seen.sd

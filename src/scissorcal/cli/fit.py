@@ -98,8 +98,8 @@ def fit(
     Example:
       $ scissorcal fit friction
       friction: stribeck + angle, symmetric (standard)
-      parameter        unit            mean         sd        5 %       95 %  identifiability
-      inertia          kg m^2     0.0002109  2.253e-06  0.0002072  0.0002144             0.00
+      parameter  unit         mean         sd        5 %       95 %  next recording  identif...
+      inertia    kg m^2  0.0002109  2.253e-06  0.0002072  0.0002144       not known       0.00
       ...
       $ scissorcal fit friction
       friction: nothing changed since the last fit; stribeck + angle, symmetric is as it was

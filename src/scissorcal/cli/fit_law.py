@@ -64,36 +64,60 @@ def _reported(outcome: "FitOutcome") -> "tuple[FittedParameter, ...]":
 
 def parameter_facts(outcome: "FitOutcome") -> list[dict[str, object]]:
     """Parameters as ``--json`` prints them, each with what is known to be poor about it."""
-    from scissorcal.calibration.caveats import caveats_by_parameter
+    from scissorcal.calibration.caveats import (
+        NEXT_RECORDING,
+        caveats_by_parameter,
+        next_recording_sd,
+    )
 
-    known = caveats_by_parameter(outcome.result)
+    fit = outcome.result
+    known = caveats_by_parameter(fit)
     return [
-        {**parameter.as_dict(), "caveats": list(known.get(parameter.name, ()))}
+        {
+            **parameter.as_dict(),
+            NEXT_RECORDING: next_recording_sd(fit, parameter),
+            "caveats": list(known.get(parameter.name, ())),
+        }
         for parameter in _reported(outcome)
     ]
 
 
 def _shown(outcome: "FitOutcome") -> str:
     """The table of parameters, and below it which of their intervals are known to be poor."""
-    from scissorcal.calibration.caveats import caveats_of
+    from scissorcal.calibration.caveats import caveats_of, next_recording_sentence
 
-    known = caveats_of(outcome.result)
+    fit = outcome.result
+    known = caveats_of(fit)
     marked = {name for caveat in known for name in caveat.parameters}
-    lines = [parameter_table(_reported(outcome), marked)]
+    lines = [parameter_table(fit, _reported(outcome), marked), next_recording_sentence(fit)]
     lines += [f"* {', '.join(caveat.parameters)}: {caveat.sentence}" for caveat in known]
-    return "\n".join(lines)
+    return "\n".join(line for line in lines if line)
 
 
 def parameter_table(
-    parameters: "tuple[FittedParameter, ...]", marked: "Collection[str]" = ()
+    fit: "FitResult", parameters: "tuple[FittedParameter, ...]", marked: "Collection[str]" = ()
 ) -> str:
-    """Set out fitted parameters for people; those that are ``marked`` get an asterisk."""
-    rows = [["parameter", "unit", "mean", "sd", "5 %", "95 %", "identifiability"]]
+    """Set out parameters of a fit for people; those that are ``marked`` get an asterisk.
+
+    Where mean and sd do not agree with the quantiles, the median stands in their place.
+    """
+    from scissorcal.calibration.caveats import COLUMN, next_recording_words
+
+    rows = [["parameter", "unit", "mean", "sd", "5 %", "95 %", COLUMN, "identifiability"]]
     for parameter in parameters:
-        numbers = (parameter.mean, parameter.sd, parameter.q05, parameter.q95)
+        mean, sd = f"{parameter.q50:.4g} (median)", "-"
+        if parameter.moments:
+            mean, sd = (f"{number:.4g}" for number in parameter.moments)
         rows.append(
-            [f"{parameter.name} *" if parameter.name in marked else parameter.name, parameter.unit]
-            + [f"{number:.4g}" for number in numbers]
-            + [f"{parameter.identifiability:.2f}"]
+            [
+                f"{parameter.name} *" if parameter.name in marked else parameter.name,
+                parameter.unit,
+                mean,
+                sd,
+                f"{parameter.q05:.4g}",
+                f"{parameter.q95:.4g}",
+                next_recording_words(fit, parameter),
+                f"{parameter.identifiability:.2f}",
+            ]
         )
-    return table(rows, right=range(2, 7))
+    return table(rows, right=range(2, 8))

@@ -11,6 +11,7 @@ from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
+    from scissorcal.calibration.friction.predict import Band
     from scissorcal.workday.runs.predict import PredictionOutcome
 
 
@@ -41,15 +42,17 @@ def predict(
     a recording, or a table with the columns time_s and opening_rad (opening_m for a linear joint)
     as export writes it; efforts in it are compared and not used, but for the driven end's torque.
 
-    The band is calibrated on strokes (or whole recordings, where there are two or more) that were
-    left out of the fit, and the answer states which. Friction at rest is not predicted.
+    The band is calibrated on strokes (or whole recordings, where there are nine or more) that were
+    left out of the fit, and the answer states which, and how much wider it is for a whole new
+    recording. Friction at rest is not predicted.
 
     \b
     Example:
       $ scissorcal predict friction captures/friction-20261122T091500Z.mcap --plot torque.svg
       friction: coulomb + viscous, symmetric, over 21.6 s of motion
       90% band: +- 0.00184 N m
-      A measured sample of a new stroke, made as those of the fit were, lies in the band with ...
+      90% of the samples of a new stroke, recorded like those of the fit, lie in the band: its ...
+      new recording: may lie outside; one recording does not show how far
       measured: 93.1% of 4316 samples in the band, rms error 0.00121 N m
       torque.svg
     """
@@ -90,7 +93,7 @@ def _text(what: str, outcome: "PredictionOutcome") -> str:
     if band.resting is not None and band.resting != band.moving:
         width += f", {band.resting:.3g} {unit} near rest"
     head = f"{what}: {outcome.rung}, over {_moving_s(outcome):.1f} s of motion"
-    lines = [head, width, band.sentence]
+    lines = [head, width, band.sentence, _new_recording(band, unit)]
     inside = _number(found.share_inside)
     if inside is None:
         lines.append("measured: this file holds no effort to compare with")
@@ -103,6 +106,16 @@ def _text(what: str, outcome: "PredictionOutcome") -> str:
             f"{found.rms_error:.3g} {unit}"
         )
     return "\n".join([*lines, *(str(path) for path in outcome.files)])
+
+
+def _new_recording(band: "Band", unit: str) -> str:
+    """What a whole new recording may differ by, beside the band of a new stroke."""
+    if band.new_recording is None:
+        return "new recording: may lie outside; one recording does not show how far"
+    return (
+        f"new recording: +- {band.new_recording:.3g} {unit}, by {band.recordings} recordings that "
+        "were left out"
+    )
 
 
 def _moving_s(outcome: "PredictionOutcome") -> float:

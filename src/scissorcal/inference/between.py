@@ -20,6 +20,10 @@ SLAB = 10.0
 """Size of a difference that nobody would call small, in units of the scale."""
 FREE = 0.5
 """Prior probability that a parameter's scatter is of that size, whatever the others do."""
+LEVEL = 0.9
+"""Probability of the interval by which a scatter that is not known is replaced by one normal."""
+BISECTIONS = 50
+"""Halvings of an interval, down to rounding."""
 BROAD = 1e-4
 """Share of the prior's precision that a group's estimate keeps where its data are silent."""
 
@@ -45,14 +49,15 @@ def between_groups(
     likelihood alone. Its true values are normal about the population's, independently by parameter:
 
         theta_r ~ N(theta, diag(tau^2)),
-        tau_j ~ C+(0, g scale_j) or N+(0, (SLAB scale_j)^2), evenly,  g ~ C+(0, 1).
+        tau_j ~ N+(0, (g scale_j)^2) or N+(0, (SLAB scale_j)^2), evenly,  g ~ C+(0, 1) up to 10.
 
     Groups mostly agree, by a size g that all parameters share (Carvalho, Polson and Scott 2010,
     doi:10.1093/biomet/asq017), and where one parameter does not, it alone is let go. Its prior is
-    then flat up to the slab's size, which leaves few groups the wide tails that they must have
+    then flat up to the slab's size, which leaves few groups the wide intervals that they must have
     (Gelman 2006, doi:10.1214/06-BA117A); with two groups nothing but the slab bounds tau from
-    above. ``prior`` (p, p) is the precision of the parameters' own prior, which holds what a
-    group's data leave open. Gibbs sampling over grids of tau, with theta_r integrated out.
+    above. Every moment of tau is finite, as both priors are half-normal. ``prior`` (p, p) is the
+    precision of the parameters' own prior, which holds what a group's data leave open. Gibbs
+    sampling over grids of tau, with theta_r integrated out.
 
     ValueError where an estimate is not finite, or a scale not above zero.
     """
@@ -80,6 +85,29 @@ def between_groups(
         if sweep >= BURN:
             kept.append((state.tau.copy(), state.theta.copy()))
     return Between(*(np.concatenate(parts) for parts in zip(*kept, strict=True)))
+
+
+def one_normal(variances: Array) -> Array:
+    """Standard deviations (p,) of the normals whose 90 % intervals are those of mixtures.
+
+    ``variances`` (n, p) are those of n equally likely normals about one centre. Two groups say so
+    little of their scatter that the sd of the mixture over it is up to seven times its 90 %
+    half-width: it follows tails of the prior, which no group has shown. A normal of the same
+    interval keeps what is promised, and its moments agree with its quantiles.
+
+    >>> one_normal(np.full((8, 1), 4.0)).round(6)
+    array([2.])
+    """
+    from scipy.special import erf, ndtri
+
+    reach = float(ndtri(0.5 + 0.5 * LEVEL))
+    sd = np.sqrt(np.maximum(variances, np.finfo(float).tiny))
+    low, high = reach * sd.min(axis=0), reach * sd.max(axis=0)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        inside = np.mean(erf(middle / (np.sqrt(2.0) * sd)), axis=0)
+        low, high = np.where(inside < LEVEL, middle, low), np.where(inside < LEVEL, high, middle)
+    return np.asarray(0.5 * (low + high) / reach)
 
 
 @dataclass
@@ -143,9 +171,13 @@ def _move_common(state: _State, scale: Array, rng: np.random.Generator) -> None:
 
 def _log_prior(sd: Array, common: Array) -> Array:
     """Log density of the logarithm of a standard deviation ``sd``, in units of its scale."""
-    near = 2.0 / np.pi * (sd / common) / (1.0 + (sd / common) ** 2)
-    far = np.sqrt(2.0 / np.pi) * sd / SLAB * np.exp(-0.5 * (sd / SLAB) ** 2)
-    return np.asarray(np.log((1.0 - FREE) * near + FREE * far))
+    near, far = _half_normal(sd / common), _half_normal(sd / SLAB)
+    return np.asarray(np.log(np.maximum((1.0 - FREE) * near + FREE * far, np.finfo(float).tiny)))
+
+
+def _half_normal(sd: Array) -> Array:
+    """Density of the logarithm of a half-normal variable of scale 1."""
+    return np.asarray(np.sqrt(2.0 / np.pi) * sd * np.exp(-0.5 * sd**2))
 
 
 def _drawn(log: Array, rng: np.random.Generator) -> NDArray[np.int64]:

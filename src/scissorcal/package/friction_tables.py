@@ -147,14 +147,14 @@ def cut_left_out(
     if rendered:
         return (
             "fit.cut, load_share: friction of the pivot that grows with the cut's torque, by "
-            f"{share.mean:.2g} (sd {share.sd:.1g}) of it, is rendered with the material's torque, "
+            f"{share.words} of it, is rendered with the material's torque, "
             "as closing blades feel it. Opening blades, over cracks at rest, feel up to "
             f"{2.0 * most / (1.0 + most) * scene_torque:.2g} N m too much.",
         )
     return (
         f"fit.cut, load_share: up to {most * scene_torque:.2g} N m at the scene's "
         f"{scene_torque:.2g} N m are not rendered: friction of the pivot that grows with the cut's "
-        f"torque, by {share.mean:.2g} (sd {share.sd:.1g}) of it. Compare rendered torque with the "
+        f"torque, by {share.words} of it. Compare rendered torque with the "
         "material's own, not with the motor's.",
     )
 

@@ -29,6 +29,11 @@ Range = Annotated[tuple[Finite, Finite], Strict(False)]
 Length_mm = Annotated[float, Field(gt=0, le=1000, allow_inf_nan=False)]
 """No blade, handle or contact of scissors is longer than a metre: beyond it a unit went wrong."""
 
+BETWEEN_percent = 2.0
+"""Usual difference between recordings of one rig. Two of one positioning system gave
+masses 1.5 % apart (EMPS; decision 075)."""
+Between_percent = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+
 Thickness_mm = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Speed_rad_per_s = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
 Speed_mm_per_s = Annotated[float, Field(gt=0, le=500, allow_inf_nan=False)]

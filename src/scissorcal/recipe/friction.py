@@ -7,7 +7,15 @@ from typing import Annotated, Literal
 from pydantic import Field, Strict
 
 from scissorcal.model.friction_terms import CANDIDATES, TERMS, law_names
-from scissorcal.recipe.fields import Count, Length_mm, OneOf, SlidingSpeeds, Speeds
+from scissorcal.recipe.fields import (
+    BETWEEN_percent,
+    Between_percent,
+    Count,
+    Length_mm,
+    OneOf,
+    SlidingSpeeds,
+    Speeds,
+)
 from scissorcal.recipe.priors import JointPriors, Section
 
 FrictionRung = Annotated[str, OneOf(*law_names())]
@@ -50,6 +58,12 @@ class FrictionLaws(Section):
     adopt: Annotated[tuple[FrictionTerm, ...], Strict(False)] = ()
     cutoff_Hz: Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False)] = 75.0
     critic: bool = True
+    between_recordings_percent: Between_percent = BETWEEN_percent
+
+    @property
+    def between_recordings(self) -> float:
+        """Usual difference between recordings, as a share."""
+        return 0.01 * self.between_recordings_percent
 
 
 class FitFriction(FrictionLaws):
@@ -59,6 +73,8 @@ class FitFriction(FrictionLaws):
     the windows, over which data and law are averaged alike, pass half; they are longer where the
     encoder is too coarse for that.
     ``critic`` searches the residuals for terms that the law lacks (not at draft effort).
+    ``between_recordings_percent`` is by how much two recordings of one rig usually differ: the
+    scale of the prior of their scatter, which counts from two recordings on.
     """
 
     priors: JointPriors = JointPriors()

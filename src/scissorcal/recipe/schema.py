@@ -14,6 +14,8 @@ from pydantic import Field, Strict, model_validator
 
 from scissorcal.recipe.edge import Edge as Edge
 from scissorcal.recipe.fields import (
+    BETWEEN_percent,
+    Between_percent,
     Count,
     Finite,
     Length_mm,
@@ -263,6 +265,8 @@ class FitCut(Section):
     ``load_share`` does the same for friction of the pivot that grows with the cut's torque.
     ``lack_of_fit_percent`` is by how much the law may be wrong in each kind of segment (loading,
     unloading, running, teeth) without the data showing it; it widens every interval.
+    ``between_recordings_percent`` is by how much two recordings of one material usually differ, as
+    for ``fit.friction``.
     """
 
     response: Literal["auto", "power", "exponential", "spline", "auto+spline"] = "auto"
@@ -276,7 +280,13 @@ class FitCut(Section):
     rate_damping_s_per_m: LogNormalPrior = LogNormalPrior(median=3.0, factor_90=20.0)
     toughness_J_per_m2: LogNormalPrior | None = None
     critic: bool = True
+    between_recordings_percent: Between_percent = BETWEEN_percent
     priors: CutPriors = CutPriors()
+
+    @property
+    def between_recordings(self) -> float:
+        """Usual difference between recordings, as a share."""
+        return 0.01 * self.between_recordings_percent
 
 
 class FitCamera(Section):

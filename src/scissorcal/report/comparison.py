@@ -36,6 +36,8 @@ COMPARISON_FORMAT: ComparisonFormat = "scissorcal-comparison/2"
 
 NOTABLE_SD = 3.0
 """A value has changed where two differ by more than this, in standard deviations."""
+REACH = 2.0 * 1.6449
+"""Length of a normal's 90 % interval, in standard deviations."""
 NOTABLE_SHARE = 0.1
 """Or, where no standard deviation is stated, by more than this share of the larger."""
 MOST_ROWS = 60
@@ -138,9 +140,11 @@ def compare_rows(one: Panel, other: Panel) -> Panel | None:
     every = one.id.endswith("-parameters")
     for a in one.rows:
         b = other.row(a.name)
-        for x in a.values if b is not None else ():
-            y = b.value(x.name) if b is not None else None
-            if y is None or (every and x.name != "mean"):
+        if b is None:
+            continue
+        for x in (_centre(a),) if every else a.values:
+            y = _centre(b) if every else b.value(x.name if x else "")
+            if x is None or y is None:
                 continue
             compared += 1
             name = a.name if every else f"{a.name}: {x.name}"
@@ -189,6 +193,16 @@ def _unlike(first: ReportDocument, a: FitOrigin, second: ReportDocument, b: FitO
         names.append({row.name for row in panel.rows} if panel else set())
     alone = sorted(names[0] ^ names[1])
     return [f"only one of the {a.fit} fits has the parameters {', '.join(alone)}"] if alone else []
+
+
+def _centre(row: Row) -> Value | None:
+    """A parameter's mean, or its median where only quantiles are stated, with an sd."""
+    mean, median = row.value("mean"), row.value("median, 90 %")
+    if mean is None or mean.number is not None or median is None:
+        return mean
+    if median.low is None or median.high is None:
+        return median
+    return replace(median, sd=float(median.high - median.low) / REACH)
 
 
 def _changed(name: str, x: Value, y: Value) -> Row:

@@ -13,7 +13,7 @@ from scissorcal.errors import InputError, MissingError
 from scissorcal.files import discard_folder, part_of, put_beside, rename_folder
 from scissorcal.identity import file_digest
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.steps import BY_NAME, steps_of
+from scissorcal.workday.steps import BY_NAME, Step, steps_of
 
 if TYPE_CHECKING:
     from scissorcal.calibration.result import Result
@@ -86,6 +86,23 @@ def versions(engine: Engine, what: str = "") -> tuple[Version, ...]:
         found += [version for version in kept if version.name not in in_use]
     engine.index.save()
     return tuple(sorted(found, key=lambda version: (version.time_utc, version.name), reverse=True))
+
+
+def scatter_on_record(engine: Engine, step: Step) -> dict[str, float]:
+    """The sd between recordings by parameter, as the newest version of a law's fit has it.
+
+    Empty where no version had several recordings that could be compared.
+    """
+    from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD
+    from scissorcal.calibration.store import load_fit
+
+    for version in versions(engine, step.what):
+        with contextlib.suppress(InputError):  # a version that is damaged shows nothing
+            known = load_fit(version.path).diagnostics
+            found = known.get(NEXT_RECORDING) or known.get(ON_RECORD)
+            if found:
+                return {str(name): float(value) for name, value in found.items()}
+    return {}
 
 
 def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:

@@ -33,9 +33,34 @@ def test_an_empty_recording_is_named(recording):
         refuse_unsound((replace(recording, samples=recording.samples[:0]),))
 
 
-def test_a_recording_twice_is_a_copy(recording):
-    with pytest.raises(InputError, match=r"stroke 0 of friction\.mcap is a copy of stroke 0"):
+def test_a_recording_twice_is_named(recording):
+    with pytest.raises(
+        InputError, match=r"friction\.mcap and friction\.mcap are the same recording"
+    ):
         refuse_unsound((recording, recording))
+
+
+def test_a_log_without_strokes_twice_is_named(recording):
+    samples = recording.samples.copy()
+    samples["stroke"] = -1
+    log = replace(recording, samples=samples, strokes=(), source="log.csv")
+    refuse_unsound((log,))
+    with pytest.raises(InputError, match=r"again\.csv and log\.csv are the same recording"):
+        refuse_unsound((log, replace(log, source="again.csv")))
+
+
+def test_recordings_of_two_rigs_are_named(recording):
+    shifted = recording.samples.copy()
+    shifted["motor_torque"] += 1e-4
+    rigs = [{"name": "bench", "serial": serial} for serial in ("A1", "B2")]
+    first = replace(recording, device=rigs[0])
+    other = replace(recording, samples=shifted, device=rigs[1], source="other.mcap")
+    with pytest.raises(InputError) as told:
+        refuse_unsound((first, other))
+    assert "friction.mcap (bench, serial number A1) and other.mcap" in str(told.value)
+    assert "two rigs" in str(told.value)
+    refuse_unsound((first, replace(other, device=rigs[0])))
+    refuse_unsound((first, replace(other, device={})))
 
 
 def test_a_stroke_twice_is_a_copy(recording):

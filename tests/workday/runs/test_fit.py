@@ -6,9 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD
+from scissorcal.cli.fit_law import text
 from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.plan import Plan, make_plan
+from scissorcal.workday.recordings import exclude_recording
 from scissorcal.workday.runs.fit import fit_workspace, load_result
 from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.workspace import Workspace
@@ -73,6 +76,22 @@ def test_a_new_recording_makes_the_fit_stale_and_the_next_fit_takes_it(copied: W
     assert not outcome.cached
     assert len(outcome.result.sources) == 2
     assert states(make_plan(copied))["fit friction"] == "unverified"
+
+
+def test_a_fit_of_one_recording_takes_the_scatter_of_an_earlier_fit_of_two(
+    copied: Workspace,
+) -> None:
+    """It stands in brackets beside the intervals, also when the fit is made again."""
+    again = record_friction(copied, seed=2)
+    (two,) = fit_workspace(copied, ("friction",))
+    seen = two.result.diagnostics[NEXT_RECORDING]
+    exclude_recording(copied, again.name, "a loose screw")
+    for force in (False, True):
+        (one,) = fit_workspace(copied, ("friction",), force=force)
+        assert len(one.result.sources) == 1
+        assert NEXT_RECORDING not in one.result.diagnostics
+        assert one.result.diagnostics[ON_RECORD] == seen
+    assert f"(+- {seen['inertia']:.2g})" in text(one)
 
 
 def test_a_changed_setting_of_the_fit_makes_it_stale(copied: Workspace) -> None:

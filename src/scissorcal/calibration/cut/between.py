@@ -24,13 +24,15 @@ def compare_cuts(
     design: CutExperiment,
     point: Array,
     recordings: tuple[Recording, ...],
+    usual: float,
     rng: np.random.Generator,
 ) -> BetweenRecordings | None:
     """Fit every recording alone, and from the others; None where fewer than two can be fitted.
 
     ``design`` is the law over all recordings, ``point`` (p,) its optimum, from which each search
-    begins. No two recordings share a sheet, so that segments belong to one each. The line of the
-    teeth is left out, since it is one number for all recordings.
+    begins, ``usual`` the share by which recordings usually differ. No two recordings share a sheet,
+    so that segments belong to one each. The line of the teeth is left out, since it is one number
+    for all recordings.
     """
     design = replace(design, likelihood=replace(design.likelihood, line=None), _last={})
     rung = replace(design.candidate(design.observed), starts=point[None, :])
@@ -43,7 +45,7 @@ def compare_cuts(
         return find_optimum(rung.problem(design.series, ~here)).point
 
     return gather_recordings(
-        design, design.bins.recording, point, recordings, FitsApart(own, others), rng
+        design, design.bins.recording, point, recordings, FitsApart(own, others), usual, rng
     )
 
 

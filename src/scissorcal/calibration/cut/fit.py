@@ -318,7 +318,8 @@ def _assembled(
     """The result, with the differences between recordings in its posterior."""
     chosen, design = inferred.law.fitted, inferred.law.design
     recordings, point = data.recordings, chosen.optimum.point
-    between = compare_cuts(design, point, recordings, rng)
+    usual = data.recipe.fit.cut.between_recordings
+    between = compare_cuts(design, point, recordings, usual, rng)
     usage = usage_of_segments(recordings, scouted.segments)
     verdicts: tuple[Verdict, ...] = ()
     if data.known.prior is None:

@@ -229,7 +229,7 @@ def _load(
     share = next((p for p in fit.nuisance if p.name == "load_share"), None)
     if share is not None:
         said = (
-            f"the pivot's load-dependent friction is {share.mean:.2g} (sd {share.sd:.1g}) of the "
+            f"the pivot's load-dependent friction is {share.words} of the "
             "cut's torque. A package that renders friction renders it with the material's torque, "
             "as closing blades feel it."
         )

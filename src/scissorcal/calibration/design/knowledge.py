@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.between import SCALE
+from scissorcal.calibration.between import usual_sd
 from scissorcal.calibration.design.information import Information
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference.between import BROAD
-from scissorcal.model.transforms import LOG
+from scissorcal.recipe.fields import BETWEEN_percent
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,8 @@ class Knowledge:
     ``recordings`` hold what each recording told so far, ``common`` what is told once by all (the
     line of the teeth). ``error_shares`` are the relative errors of the law that the recipe allows,
     by kind of segment. ``between`` (p,) are standard deviations from recording to recording, which
-    count from the second recording on, as in the fit.
+    count from the second recording on, as in the fit; ``usual_scatter`` is their share where no fit
+    tells them.
     """
 
     layout: Layout
@@ -36,6 +37,7 @@ class Knowledge:
     common: Information | None = None
     error_shares: Mapping[str, float] = field(default_factory=dict)
     between: Array | None = None
+    usual_scatter: float = 0.01 * BETWEEN_percent
 
     def plus(self, told: Information, *, new_recording: bool = False) -> "Knowledge":
         """Knowledge after strokes that tell so much, in the last recording or in a new one."""
@@ -69,9 +71,7 @@ class Knowledge:
         """Scatter between recordings (p,): as fitted, or its usual size where nothing tells it."""
         if self.between is not None:
             return self.between
-        return np.array(
-            [SCALE * (1.0 if p.transform == LOG else p.sd) for p in self.layout.parameters]
-        )
+        return usual_sd(self.layout, self.usual_scatter)
 
     @property
     def shares_of_prior(self) -> dict[str, float]:

@@ -87,6 +87,7 @@ def fitted_friction(
         design.prior_precision,
         _by_recording(told, owners, len(point)),
         between=_between(design.layout, fit),
+        usual_scatter=recipe.fit.friction.between_recordings,
     )
     known = KnownFriction.of(fit, recipe.fit.cut.priors)
     zero_sd = zeros[0] if zeros else None
@@ -155,7 +156,12 @@ def expected_friction(recipe: Recipe) -> FrictionState:
         opening_sd=floor,
         stroke_sd=floor,
     )
-    knowledge = Knowledge(layout, layout.mean, friction_precision(layout))
+    knowledge = Knowledge(
+        layout,
+        layout.mean,
+        friction_precision(layout),
+        usual_scatter=settings.between_recordings,
+    )
     return FrictionState(knowledge, structure, noise, floor, zero_sd, known)
 
 
@@ -189,9 +195,14 @@ def expected_cut(
         "running",
     )
     shares = dict.fromkeys(kinds, share)
-    return CutState(
-        Knowledge(whole, whole.mean, prior, error_shares=shares), structure, law, geometry
+    knowledge = Knowledge(
+        whole,
+        whole.mean,
+        prior,
+        error_shares=shares,
+        usual_scatter=recipe.fit.cut.between_recordings,
     )
+    return CutState(knowledge, structure, law, geometry)
 
 
 def sharing_of(recipe: Recipe, friction: FrictionState, cut: CutState) -> Sharing:
@@ -234,6 +245,7 @@ def _cut_state(
         line_information(design, point),
         error_shares(design, point, 0.01 * recipe.fit.cut.lack_of_fit_percent),
         between=between,
+        usual_scatter=recipe.fit.cut.between_recordings,
     )
     return CutState(knowledge, design.key, design.law, design.likelihood.geometry)
 

@@ -46,7 +46,7 @@ from scissorcal.calibration.friction.slow_friction import (
     opened,
     with_probed,
 )
-from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.result import Effort, FitResult, FittedParameter, in_words
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.idle import idle_noise
 from scissorcal.calibration.signals.interruptions import interruptions
@@ -124,7 +124,8 @@ def fit_friction(
     if prior is None:  # a study simulates the law itself
         posterior = with_lack_of_fit(posterior, law, settings.lack_of_fit, rng)
         posterior = opened(posterior, law, slow, chosen.held_out_rms, rng)
-    between = compare_recordings(law, chosen.optimum.point, recordings, rng)
+    usual = settings.between_recordings
+    between = compare_recordings(law, chosen.optimum.point, recordings, usual, rng)
     posterior = widened(posterior, between, rng)
     unshown = ("inertia",) if hidden_from_sweeps(law, recordings) else ()
     usage = usage_of_windows(recordings, every, sensors.usable)
@@ -319,10 +320,10 @@ def _notes(
             "below fit.friction.cutoff_Hz, to keep the steps from biasing the inertia."
         )
     if "delay" in posterior.names:
-        delays = posterior.draws[:, posterior.names.index("delay")]
+        delays = 1e3 * posterior.draws[:, posterior.names.index("delay")]
         notes.append(
-            f"The torque is measured {delays.mean() * 1e3:.3f} ms after the opening "
-            f"(sd {delays.std(ddof=1) * 1e3:.3f} ms); the fit corrects for it."
+            "The torque is measured after the opening, by "
+            f"{in_words(**FittedParameter.summary_of(delays))} ms; the fit corrects for it."
         )
     return (*notes, *cogging_notes(cogging, posterior, joint))
 

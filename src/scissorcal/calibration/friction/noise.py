@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.cogging import Cogging
 from scissorcal.calibration.friction.model import FrictionExperiment
+from scissorcal.calibration.result import FittedParameter, in_words
 from scissorcal.calibration.signals.segments import stretches
 from scissorcal.calibration.signals.torque_noise import TorqueNoise, torque_noise
 from scissorcal.calibration.signals.weak_form import Windows
@@ -106,7 +107,7 @@ def cogging_notes(cogging: Cogging, posterior: Posterior, joint: Joint) -> tuple
     columns = [posterior.names.index(f"cogging_{wave}") for wave in ("cos", "sin")]
     size = np.hypot(*posterior.draws[:, columns].T)
     return (
-        f"Cogging of {size.mean():.2g} {joint.effort_unit} (sd {size.std(ddof=1):.1g}) repeats "
+        f"Cogging of {in_words(**FittedParameter.summary_of(size))} {joint.effort_unit} repeats "
         f"{cogging.periods_per_turn:.1f} times a turn of the opening (power {cogging.power:.0f} "
         f"times the noise, limit {cogging.threshold:.0f}). The fit removes it; it belongs to the "
         "rig, so packages do not render it.",

@@ -1,5 +1,6 @@
 """Predictions of a friction fit for new motion, with a band calibrated on hold-out data."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -30,9 +31,12 @@ class Band:
 
     A sample, taken at random from a new ``unit`` that is drawn as the ``count`` hold-out ones were,
     lies within ``moving`` of its prediction with probability ``level``; ``resting`` is the same
-    where the direction of motion is not certain, None where nothing is predicted there. Half-widths
-    are in the effort's unit. ``conformal`` says whether the promise rests on exchangeable units
-    alone; else it also takes their errors for normal, since too few were held out.
+    where the direction of motion is not certain, None where nothing is predicted there. A new
+    stroke is one of the fit's own recordings, or of one like them; ``new_recording`` is the
+    half-width (moving) where the whole recording is new, by what ``recordings`` differ in, and None
+    where there is one. Half-widths are in the effort's unit. ``calibrated`` says whether the errors
+    on hold-out units alone give the width; else too few were held out, and their errors are also
+    taken for normal.
     """
 
     level: float
@@ -40,17 +44,16 @@ class Band:
     count: int
     moving: float
     resting: float | None
-    conformal: bool
+    calibrated: bool
+    recordings: int = 1
+    new_recording: float | None = None
 
     @property
     def sentence(self) -> str:
         """What the band promises, in one sentence."""
-        ground = (
-            f"its width is from the errors on {self.count} hold-out {self.unit}s"
-            if self.conformal
-            else f"its width is from the errors on {self.count} hold-out {self.unit}s, widened by "
-            "Student's t because these are few"
-        )
+        ground = f"its width is from the errors on {self.count} hold-out {self.unit}s"
+        if not self.calibrated:
+            ground += ", widened by Student's t because these are few"
         return (
             f"{self.level:.0%} of the samples of a new {self.unit}, recorded like those of the "
             f"fit, lie in the band: {ground}."
@@ -93,18 +96,21 @@ class Prediction:
 def effort_band(design: FrictionExperiment, fit: FitResult, level: float = 0.9) -> Band:
     """Calibrate the band of a friction fit's effort on what the law had not seen.
 
-    ``design`` is the fit's own (:func:`scissorcal.calibration.friction.model`). Whole
-    recordings are left out one at a time where there are two or more, else whole strokes; the law
-    is fitted to the others and its errors taken on the one left out. Raises InputError where there
-    is one stroke only.
+    ``design`` is the fit's own (:func:`scissorcal.calibration.friction.model`). Whole strokes are
+    left out one at a time, or whole recordings where there are enough of them; the law is fitted to
+    the others and its errors taken on the one left out. Raises InputError where there is one stroke
+    only.
     """
     folds = _Folds.of(design, fit)
-    errors = np.full(len(design.observed), np.nan)
-    for label in folds.labels:
-        here = folds.index == label
-        errors[here] = (design.observed - design.mean(folds.without(label)))[here]
-    width, conformal = half_width(errors, folds.index, level, folds.freedom())
-    return Band(level, folds.unit, len(folds.labels), width, None, conformal)
+    return _band(
+        folds,
+        design.strokes,
+        design.bins.recording,
+        lambda point: design.observed - design.mean(point),
+        np.ones(len(design.observed), dtype=bool),
+        level,
+        folds.freedom(),
+    )
 
 
 def load_band(
@@ -120,20 +126,19 @@ def load_band(
     separate half-width.
     """
     windows = two_ended(fit, recordings, cutoff_Hz)
-    folds, solver = _Folds.of(design, fit), LoadSolver(fit, windows)
+    solver = LoadSolver(fit, windows)
     assert windows.load is not None
-    measured, moving = windows.average(windows.load), windows.bins.moving
-    index = windows.bins.recording if folds.unit == "recording" else _carried(design, windows)
-    errors = np.full(len(measured), np.nan)
-    for label in folds.labels:
-        here = index == label
-        errors[here] = (solver(design.layout.natural(folds.without(label))) - measured)[here]
-    known = np.isfinite(errors)
-    freedom = float(len(folds.labels))
-    width, conformal = half_width(errors[known & moving], index[known & moving], level, freedom)
-    still = known & ~moving
-    resting = half_width(errors[still], index[still], level, freedom)[0] if still.any() else width
-    return Band(level, folds.unit, len(folds.labels), width, max(resting, width), conformal)
+    measured = windows.average(windows.load)
+    folds = _Folds.of(design, fit)
+    return _band(
+        folds,
+        _carried(design, windows),
+        windows.bins.recording,
+        lambda point: solver(design.layout.natural(point)) - measured,
+        windows.bins.moving,
+        level,
+        float(len(folds.recordings)),
+    )
 
 
 def predict_effort(
@@ -182,85 +187,139 @@ def predict_far_load(
 def half_width(errors: Array, units: Integers, level: float, freedom: float) -> tuple[float, bool]:
     """Half-width that holds a random sample of a new unit with probability ``level``.
 
-    ``errors`` and ``units`` (n,). Every unit has a mass of 1 / (K + 1), shared evenly by its
-    samples, and as much lies at infinity; the quantile of absolute errors under that mass holds for
-    exchangeable units whatever their distribution (Dunn, Wasserman and Ramdas 2023,
-    doi:10.1080/01621459.2022.2060112, method of pooled cumulative distributions as weighted by Lee,
-    Barber and Willett, arXiv:2306.06342; for fits without the unit, Barber et al. 2021,
-    doi:10.1214/20-AOS1965, if the fit hardly depends on one unit). Where K is too small for
-    ``level`` the quantile of the K units is multiplied by that of Student's t with ``freedom``
-    degrees over the normal one, and is at least that t times the units' rms error. The second
-    result says which: True for the former.
+    ``errors`` and ``units`` (n,). Each of the K units has the same mass, shared evenly by its
+    samples. The half-width is the quantile of absolute errors at
+
+        level (1 + rho / K),  rho = mean over units of (c_k - level)^2 / (level (1 - level)),
+
+    where c_k is the share of a unit's samples within the quantile at ``level``. Where all units are
+    alike, rho is 0: their samples are as many trials. Where each is held as a whole or not at all,
+    rho is 1, and the quantile is that of conformal prediction, which holds for exchangeable units
+    whatever their distribution (Dunn, Wasserman and Ramdas 2023,
+    doi:10.1080/01621459.2022.2060112). Where K / (K + 1) is below ``level`` no quantile of so few
+    need hold it: the one at ``level`` is multiplied by that of Student's t with ``freedom`` degrees
+    over the normal one, and is at least that t times the units' rms error. The second result says
+    which: True for the former.
     """
     from scipy.stats import norm, t
 
-    labels, place, counts = np.unique(units, return_inverse=True, return_counts=True)
+    labels, unit, counts = np.unique(units, return_inverse=True, return_counts=True)
     size = np.abs(errors)
     order = np.argsort(size, kind="stable")
-    mass = np.cumsum(1.0 / counts[place][order]) / len(labels)
-    conformal = len(labels) / (len(labels) + 1) >= level - 1e-12
-    wanted = level * (len(labels) + 1) / len(labels) if conformal else level
-    place_of = min(int(np.searchsorted(mass, wanted - 1e-9)), len(size) - 1)
-    found = float(size[order][place_of])
-    if conformal:
-        return found, True
+    size, unit, count = size[order], unit[order], len(labels)
+    mass = 1.0 / (counts[unit] * count)
+    found = _quantile(size, mass, level)
+    if enough(count, level):
+        held = count * np.bincount(unit, mass * (size <= found), count)
+        rho = min(float(np.mean((held - level) ** 2)) / (level * (1.0 - level)), 1.0)
+        return _quantile(size, mass, min(level * (1.0 + rho / count), 1.0)), True
     tail = 0.5 + 0.5 * level
     student = float(t.ppf(tail, max(freedom, 1.0)))
-    rms = float(np.sqrt(np.mean(np.bincount(place, size**2) / counts)))
+    rms = float(np.sqrt(np.sum(mass * size**2)))
     return max(found * student / float(norm.ppf(tail)), rms * student), False
+
+
+def enough(count: int, level: float) -> bool:
+    """Whether so many units can show what holds ``level`` of the next one.
+
+    >>> enough(9, 0.9), enough(8, 0.9)
+    (True, False)
+    """
+    return count / (count + 1) >= level - 1e-12
+
+
+def _quantile(ascending: Array, mass: Array, level: float) -> float:
+    place = int(np.searchsorted(np.cumsum(mass), level - 1e-9))
+    return float(ascending[min(place, len(ascending) - 1)])
+
+
+def _band(
+    folds: "_Folds",
+    strokes: Integers,
+    recordings: Integers,
+    errors: Callable[[Array], Array],
+    moving: Mask,
+    level: float,
+    freedom: float,
+) -> Band:
+    """The band of windows (n,) in ``strokes`` and ``recordings``; ``errors`` (n,) are by a point.
+
+    Strokes are the units until recordings are enough; ``freedom`` is that of the recordings' mean
+    squared error.
+    """
+    left_out = np.full(len(moving), np.nan)
+    whole = np.full(len(moving), np.nan)
+    labels, several = folds.strokes, folds.recordings
+    for label in labels:
+        here = strokes == label
+        left_out[here] = errors(folds.without(np.array([label])))[here]
+    for label in several if len(several) > 1 else ():
+        here = recordings == label
+        whole[here] = errors(folds.without(folds.of_recording(label)))[here]
+    by_recording = len(several) > 1 and enough(len(several), level)
+    index, found = (recordings, whole) if by_recording else (strokes, left_out)
+    count = len(several) if by_recording else len(labels)
+    known = np.isfinite(found)
+    sure, still = known & moving, known & ~moving
+    width, calibrated = half_width(found[sure], index[sure], level, float(count))
+    resting = None
+    if still.any():
+        resting = max(width, half_width(found[still], index[still], level, float(count))[0])
+    new = None
+    if len(several) > 1:
+        there = np.isfinite(whole) & moving
+        new = half_width(whole[there], recordings[there], level, freedom)[0]
+    unit: Unit = "recording" if by_recording else "stroke"
+    return Band(level, unit, count, width, resting, calibrated, len(several), new)
 
 
 @dataclass(frozen=True)
 class _Folds:
-    """A law without one unit at a time; ``index`` (n,) is the unit of each moving window."""
+    """A law without some of its ``strokes`` (k,), or one of its ``recordings`` (r,), at a time."""
 
     design: FrictionExperiment
     point: Array
-    unit: Unit
-    index: Integers
-    labels: Integers
+    strokes: Integers
+    recordings: Integers
 
     @classmethod
     def of(cls, design: FrictionExperiment, fit: FitResult) -> "_Folds":
         normal = replace(design, tails=np.inf)
-        recordings = np.unique(design.bins.recording)
-        unit: Unit = "recording" if len(recordings) > 1 else "stroke"
-        index = design.bins.recording if unit == "recording" else design.strokes
-        labels = np.unique(index)
-        if len(labels) < 2:
+        strokes, recordings = np.unique(design.strokes), np.unique(design.bins.recording)
+        if len(strokes) < 2:
             raise InputError(
                 "A band needs hold-out strokes, and there is only one stroke: record several "
                 "strokes, or two recordings, and fit again."
             )
         values = {name: float(value) for name, value in _values(fit).items()}
-        return cls(normal, design.layout.unconstrained(values), unit, index, labels)
+        return cls(normal, design.layout.unconstrained(values), strokes, recordings)
 
-    def without(self, label: int) -> Array:
-        """The optimum (p,) without one unit."""
-        return self._reached(np.unique(self.design.strokes[self.index == label]))
-
-    def only(self, label: int) -> Array:
-        """The optimum (p,) of one unit by itself."""
-        return self._reached(np.unique(self.design.strokes[self.index != label]))
+    def of_recording(self, label: int) -> Integers:
+        """The strokes of one recording."""
+        return np.unique(self.design.strokes[self.design.bins.recording == label])
 
     def freedom(self) -> float:
-        """Degrees of freedom of the mean squared error (Satterthwaite, doi:10.2307/3002019).
+        """Degrees of freedom of a recording's mean squared error (doi:10.2307/3002019).
 
         What a recording's own fit leaves varies from stroke to stroke; only by how much the others'
-        fit is off beyond it does the recording count as one.
+        fit is off beyond it does the recording count as one (Satterthwaite).
         """
-        if self.unit == "stroke":
-            return float(len(self.labels))
+        if len(self.recordings) < 2:
+            return 1.0
         shift, own = 0.0, 0.0
-        for label in self.labels:
-            here = self.index == label
-            by_itself = self.design.mean(self.only(label))
-            shift += float(np.mean((by_itself - self.design.mean(self.without(label)))[here] ** 2))
+        for label in self.recordings:
+            here = self.design.bins.recording == label
+            strokes = self.of_recording(label)
+            by_itself = self.design.mean(self.without(np.setdiff1d(self.strokes, strokes)))
+            shift += float(
+                np.mean((by_itself - self.design.mean(self.without(strokes)))[here] ** 2)
+            )
             own += float(np.mean((self.design.observed - by_itself)[here] ** 2))
-        strokes = len(np.unique(self.design.strokes))
-        return (shift + own) ** 2 / (shift**2 / len(self.labels) + own**2 / strokes)
+        count = len(self.recordings)
+        return (shift + own) ** 2 / (shift**2 / count + own**2 / len(self.strokes))
 
-    def _reached(self, left_out: Integers) -> Array:
+    def without(self, left_out: Integers) -> Array:
+        """The optimum (p,) without some strokes."""
         rung = self.design.candidate(self.design.observed)
         assert rung.reduced is not None
         problem = rung.problem(self.design.series)

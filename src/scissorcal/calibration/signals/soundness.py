@@ -17,10 +17,11 @@ _CHANNELS = ("opening", "motor_torque", "handle_force", "advance")
 
 
 def refuse_unsound(recordings: tuple[Recording, ...]) -> None:
-    """Raise InputError for values that are no numbers or absurd, and for copied strokes.
+    """Raise InputError for values that are no numbers or absurd, for copies and for two rigs.
 
-    A sensor has noise, so two strokes never agree to the last digit. A copy would count as a second
-    observation, and intervals would come out too narrow by the root of two.
+    A sensor has noise, so two strokes or recordings never agree to the last digit. A copy would
+    count as a second observation, and intervals would come out too narrow by the root of two.
+    Recordings of two rigs, as their serial numbers tell, have no parameters in common.
     """
     if not recordings:
         raise InputError("There is no recording to fit: capture or import one first.")
@@ -31,6 +32,8 @@ def refuse_unsound(recordings: tuple[Recording, ...]) -> None:
                 "move: record again, or name another file."
             )
         _refuse_values(recording)
+    _refuse_two_rigs(recordings)
+    _refuse_copied_recordings(recordings)
     _refuse_copies(recordings)
 
 
@@ -57,6 +60,38 @@ def _refuse_values(recording: Recording) -> None:
                 f"measurement ({len(bad)} such samples in all). Check the sensor and record again, "
                 "or export the recording, remove those rows and import the table with gaps allowed."
             )
+
+
+def _refuse_two_rigs(recordings: tuple[Recording, ...]) -> None:
+    """Refuse recordings of devices with unlike serial numbers; those without one may be of any."""
+    seen = {
+        str(one.device["serial"]): f"{_name(one)} ({one.device.get('name', 'rig')}, serial number "
+        f"{one.device['serial']})"
+        for one in reversed(recordings)
+        if one.device.get("serial")
+    }
+    if len(seen) > 1:
+        first, second, *_ = reversed(seen.values())
+        raise InputError(
+            f"{first} and {second} are of two rigs, and one fit is of one rig: fit the recordings "
+            "of each rig in another workspace, or exclude those of one."
+        )
+
+
+def _refuse_copied_recordings(recordings: tuple[Recording, ...]) -> None:
+    seen: dict[bytes, str] = {}
+    for recording in recordings:
+        motion = [np.asarray(recording.samples[name], dtype=np.float64) for name in _CHANNELS[:3]]
+        if len(np.unique(motion[1])) < FEWEST_LEVELS:
+            continue
+        key = hashlib.sha256(b"".join(channel.tobytes() for channel in motion)).digest()
+        if key in seen:
+            raise InputError(
+                f"{_name(recording)} and {seen[key]} are the same recording: every opening and "
+                "torque is equal to the last digit. Remove one of them; it would count as a second "
+                "measurement."
+            )
+        seen[key] = _name(recording)
 
 
 def _refuse_copies(recordings: tuple[Recording, ...]) -> None:

@@ -6,7 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.calibration.caveats import caveats_by_parameter
+from scissorcal.calibration.caveats import (
+    COLUMN,
+    NOT_KNOWN,
+    caveats_by_parameter,
+    next_recording_sd,
+    next_recording_sentence,
+)
 from scissorcal.calibration.checks import K_HAT_LIMIT, PRIOR_ONLY
 from scissorcal.calibration.result import FitResult, FittedParameter
 from scissorcal.report.numbers import Number, finite, scalar, shown_unit, significant
@@ -70,23 +76,25 @@ def parameters_panel(fit: FitResult, part: str) -> Panel:
     every = (*fit.parameters, *fit.derived)
     if not every:
         return absent(f"{part}-parameters", part, "Parameters", "The fit has no parameters.")
-    rows = tuple(_row(parameter, caveats.get(parameter.name, ())) for parameter in every)
+    rows = tuple(_row(fit, parameter, caveats.get(parameter.name, ())) for parameter in every)
     silent = prior_only(fit)
     sentence = (
         f"The data do not inform {', '.join(silent)}: the posterior repeats the prior."
         if silent
         else "The data inform every parameter."
     )
+    sentence = f"{sentence} {next_recording_sentence(fit)}".strip()
     return Panel(
         f"{part}-parameters",
         part,
         "Parameters",
         sentence,
         rows,
-        caption="Posterior mean ± standard deviation, and the interval that holds the truth with "
-        "90 % probability if the model is right. Posterior / prior is the ratio of their standard "
-        f"deviations: up to {PRIOR_ONLY} the data identify the parameter, above it the value is "
-        "the prior's.",
+        caption="Posterior mean ± standard deviation where they agree with the quantiles, and the "
+        "interval that holds the truth with 90 % probability if the model is right. Next recording "
+        "is the standard deviation by which single recordings differ. Posterior / prior is the "
+        f"ratio of their standard deviations: up to {PRIOR_ONLY} the data identify the parameter, "
+        "above it the value is the prior's.",
     )
 
 
@@ -204,20 +212,26 @@ def _word(parameter: FittedParameter) -> str:
     return "identified" if ratio <= PRIOR_ONLY else "prior only"
 
 
-def _row(parameter: FittedParameter, caveats: tuple[str, ...]) -> Row:
+def _row(fit: FitResult, parameter: FittedParameter, caveats: tuple[str, ...]) -> Row:
     scale, unit = shown_unit(parameter.unit)
 
     def scaled(value: float) -> Number:
         known = finite(value)
         return None if known is None else scale * known
 
-    sd = scaled(parameter.sd)
     word = _word(parameter)
+    mean = Value("mean", scaled(parameter.mean), unit, sd=scaled(parameter.sd), digits=4)
+    if mean.number is not None and parameter.moments is None:
+        mean = words("mean", "see the median")
+    apart = next_recording_sd(fit, parameter)
+    another = words(COLUMN, NOT_KNOWN)
+    if apart is not None:
+        another = number(COLUMN, scaled(apart), unit, digits=2)
     return Row(
         plain_name(parameter),
         (
             words("meaning", parameter.meaning or " "),
-            Value("mean", scaled(parameter.mean), unit, sd=sd, digits=4),
+            mean,
             Value(
                 "median, 90 %",
                 scaled(parameter.q50),
@@ -225,6 +239,7 @@ def _row(parameter: FittedParameter, caveats: tuple[str, ...]) -> Row:
                 low=scaled(parameter.q05),
                 high=scaled(parameter.q95),
             ),
+            another,
             number("posterior / prior", parameter.identifiability, digits=2),
             words("data or prior", word),
         ),

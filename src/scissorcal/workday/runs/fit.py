@@ -1,7 +1,7 @@
 """Fit what a workspace's scene requires, in order, and only where something changed."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
@@ -171,12 +171,13 @@ def fit_step(
         stop=stop or (lambda: False),
     )
     made = cast(FitModule, import_module(step.run)).fit(engine, request)
-    save_anywhere(engine, step, made.result, made.draw, save_to)
+    result = _with_scatter_on_record(engine, step, made.result)
+    save_anywhere(engine, step, result, made.draw, save_to)
     state = engine.state(step.name)
     if state.state != "incomplete":
         request.checkpoint.unlink(missing_ok=True)
     drawn = pictures_beside(path)
-    return FitOutcome(step.what, made.result, path, drawn, False, state, made.notes)
+    return FitOutcome(step.what, result, path, drawn, False, state, made.notes)
 
 
 def load_result(engine: Engine, what: str) -> Any:
@@ -217,6 +218,19 @@ def share_of(progress: Progress | None, index: int, count: int) -> Progress:
 def pictures_beside(path: Path) -> tuple[Path, ...]:
     """Pictures that were drawn for a result: those in the folder of its name."""
     return tuple(sorted(path.with_suffix("").glob("*.png")))
+
+
+def _with_scatter_on_record(engine: Engine, step: Step, result: Any) -> Any:
+    """A law's fit of one recording, with what an earlier fit of several found them to differ by."""
+    from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD
+    from scissorcal.calibration.result import FitResult
+    from scissorcal.workday.history import scatter_on_record
+
+    if not isinstance(result, FitResult) or result.diagnostics.get(NEXT_RECORDING):
+        return result
+    found = scatter_on_record(engine, step)
+    known = {**result.diagnostics, ON_RECORD: found} if found else result.diagnostics
+    return replace(result, diagnostics=known)
 
 
 def _usable(engine: Engine, step: Step) -> bool:
