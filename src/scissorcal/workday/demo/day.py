@@ -129,7 +129,7 @@ def run_demo(
     verdicts = [verdict for found in geometry for verdict in found.verdicts]
     verdicts += [verdict for fit in fits_made for verdict in fit.verdicts]
     verdicts += [verdict for check in verified for verdict in check.result.verdicts]
-    files = [found.path for found in (*geometry, *outcomes, *verified)]
+    files = [found.path for found in (*geometry, *outcomes)] + [check.path for check in verified]
     return DemoResult(
         workspace=workspace.root,
         specimen=specimen.name,
