@@ -110,7 +110,8 @@ def fit_friction(
     again = partial(_slid, steady, cleaned, settings.cutoff_Hz, sensors.usable)
     every = again()
     windows = every.where(every.bins.moving)
-    refuse_friction(recordings, settings, every, windows, sensors)
+    usage = usage_of_windows(recordings, every, sensors.usable)
+    refuse_friction(recordings, settings, every, windows, sensors, usage)
     slow = SlowFriction.of(recordings, windows.bins, settings)
     settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
@@ -126,7 +127,6 @@ def fit_friction(
     posterior = widened(posterior, between, rng)
     swung = None if prior else inertia_verdict(law, posterior.draws, recordings)
     unshown = ("inertia",) if hidden_from_sweeps(law, recordings) else ()
-    usage = usage_of_windows(recordings, every, sensors.usable)
     drive = float(np.sqrt(np.mean(law.observed**2)))
     fit = assemble(
         what="friction",

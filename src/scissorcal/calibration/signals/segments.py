@@ -20,23 +20,30 @@ FEWEST_SAMPLES = 20
 GAP_FACTOR = 1.5
 
 
-def pieces_of(recording: Recording) -> list[tuple[int, int]]:
+def pieces_of(recording: Recording, tick_s: float | None = None) -> list[tuple[int, int]]:
     """Stretches without a gap that are long enough for a rate, as (first, one past the last).
 
     Long enough is longer than four times ``EDGE_S``, and more than ``FEWEST_SAMPLES`` samples,
-    whatever the sampling rate. Raises InputError where the device's clock stands still.
+    whatever the sampling rate. ``tick_s`` is the usual step of the clock, the median if not given.
+    Raises InputError where the device's clock stands still.
     """
     time = recording.device_time_s
     if len(time) < 2:
         return []
     step = np.diff(time)
-    usual = float(np.median(step))
-    if usual <= 0:
-        raise still_clock(recording)
+    usual = usual_tick(recording) if tick_s is None else tick_s
     breaks = np.flatnonzero((step > GAP_FACTOR * usual) | (step <= 0)) + 1
     bounds = [0, *breaks.tolist(), len(time)]
     least = max(EDGES * edge_samples(1.0 / usual), FEWEST_SAMPLES)
     return [(low, high) for low, high in pairwise(bounds) if high - low > least]
+
+
+def usual_tick(recording: Recording) -> float:
+    """Median step of the clock in s; raises InputError where it stands still."""
+    usual = float(np.median(np.diff(recording.device_time_s)))
+    if usual <= 0:
+        raise still_clock(recording)
+    return usual
 
 
 def edge_samples(rate_Hz: float) -> int:
@@ -61,7 +68,31 @@ def no_piece(recordings: tuple[Recording, ...]) -> InputError:
     names = ", ".join(recording.source or "recording" for recording in recordings)
     return InputError(
         f"{names}: no stretch without gaps is longer than {EDGES * EDGE_S:g} s and "
-        f"{FEWEST_SAMPLES} samples, so no rate can be computed; record again without interruptions."
+        f"{FEWEST_SAMPLES} samples, so no rate can be computed. {gaps_in_words(recordings)} "
+        f"Record for longer, without gaps of more than {EDGE_S:g} s."
+    )
+
+
+def gaps_in_words(recordings: tuple[Recording, ...]) -> str:
+    """How many gaps there are, the longest with its place, and the longest stretch between them."""
+    steps = [np.diff(one.device_time_s) for one in recordings]
+    wide = [step > GAP_FACTOR * np.median(step) if len(step) else step > 0 for step in steps]
+    count = sum(int(np.count_nonzero(one)) for one in wide)
+    if not count:
+        seconds = max((one.duration_s for one in recordings), default=0.0)
+        return f"There are no gaps, and the longest recording lasts {seconds:.3g} s."
+    index = max(range(len(steps)), key=lambda i: float(steps[i].max(initial=0.0)))
+    at = int(np.argmax(steps[index]))
+    longest = 0.0
+    for one, gaps in zip(recordings, wide, strict=True):
+        ends = np.concatenate([[0], np.flatnonzero(gaps) + 1, [len(one.samples)]])
+        time = one.device_time_s
+        longest = max([longest, *(float(time[b - 1] - time[a]) for a, b in pairwise(ends))])
+    worst = recordings[index]
+    where = f"{worst.source or 'the recording'} at {worst.device_time_s[at]:.4g} s"
+    return (
+        f"There are {count} gaps, the longest of {steps[index][at]:.3g} s ({where}); the longest "
+        f"stretch between gaps lasts {longest:.3g} s."
     )
 
 
