@@ -4,7 +4,7 @@ import numpy as np
 
 from scissorcal.calibration.signals.filtering import Bins, position_error
 from scissorcal.calibration.signals.interruptions import interruptions
-from scissorcal.calibration.signals.segments import EDGE_S, gaps_in_words
+from scissorcal.calibration.signals.segments import gaps_in_words
 from scissorcal.calibration.signals.sensors import Sensors
 from scissorcal.calibration.signals.usage import EDGE, GAP, INVALID, SLOW, Usage
 from scissorcal.calibration.signals.weak_form import Windows
@@ -57,8 +57,8 @@ def _too_little(
         cause = broken.sentence
     elif parted > max(slow, invalid):
         cause = (
-            f"Most of the others went to gaps and the ends of pieces: {gaps_in_words(recordings)} "
-            f"Record for longer, without gaps of more than {EDGE_S:g} s."
+            f"Most of the rest went to gaps and the ends of pieces: {gaps_in_words(recordings)} "
+            "Record for longer, and without losing samples."
         )
     else:
         cause = _motion_cause(recordings, every)

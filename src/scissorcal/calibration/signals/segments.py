@@ -69,7 +69,7 @@ def no_piece(recordings: tuple[Recording, ...]) -> InputError:
     return InputError(
         f"{names}: no stretch without gaps is longer than {EDGES * EDGE_S:g} s and "
         f"{FEWEST_SAMPLES} samples, so no rate can be computed. {gaps_in_words(recordings)} "
-        f"Record for longer, without gaps of more than {EDGE_S:g} s."
+        "Record for longer, and without losing samples."
     )
 
 
