@@ -186,10 +186,13 @@ def test_gaps_are_refused_or_kept_and_noted(tmp_path: Path) -> None:
     assert "line 52, column 't': 0.04 s since the row before" in message
     assert "where 0.01 s are usual (2 such gaps in all, the longest 0.04 s)" in message
     assert "Allow gaps" in message
+    assert "bridges gaps of up to 0.05 s (here 2 of 2)" in message
+    assert "about 0.04 s of 3.96 s" in message
     recording = import_table(path, columns=COLUMNS, units=UNITS, allow_gaps=True)
     assert_holds(recording, table)
     note = "4 frames are missing in 2 gaps, the longest (3 frames) at 0.490 s."
     assert note in recording.notes
+    assert any("about 0.04 s of 3.96 s" in said for said in recording.notes)
     stored = read_recording(write_recording(recording, tmp_path / "log.mcap"))
     assert stored.notes == recording.notes
     assert len(stored.strokes) == len(recording.strokes)

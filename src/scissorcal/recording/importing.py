@@ -15,13 +15,10 @@ from scissorcal.recording.layout import MEASURED, empty_samples
 from scissorcal.recording.quantities import Quantity, describe, quantity
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
-from scissorcal.recording.resolution import StrokeThreshold, stroke_threshold
+from scissorcal.recording.resolution import GAP_FACTOR, StrokeThreshold, stroke_threshold
 from scissorcal.recording.strokes import label_strokes
-from scissorcal.recording.summarising import gap_note
+from scissorcal.recording.summarising import gap_cost, gap_note
 from scissorcal.recording.table import Table, read_table
-
-GAP_FACTOR = 1.5
-"""A step longer than this many usual ones is a gap: a sample is missing."""
 
 WRAP = 2.0**32
 """Where the counter of a logger's clock begins at 0 again: 32 bits of us last 71.6 min."""
@@ -181,7 +178,8 @@ def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_
             f"{table.place(row, 'time')}: {steps[gaps[0]] * 1e-6:.6g} s since the row "
             f"before, where {usual * 1e-6:.6g} s are usual ({len(gaps)} such gaps in all, the "
             f"longest {steps.max() * 1e-6:.6g} s). Allow gaps (--allow-gaps) to keep them, "
-            "with a note, or export the log without gaps."
+            "with a note, or export the log without gaps. "
+            f"{gap_cost(microseconds * 1e-6).sentence}"
         )
     counts = np.maximum(1, np.rint(steps / usual)).astype(np.int64)
     samples["sequence"] = np.concatenate([[0], np.cumsum(counts)]) % 2**32
@@ -263,4 +261,6 @@ def _notes(
     notes += said
     if samples["stroke"].max() < 0:
         notes.append("No stroke was found: the joint moves less than the least travel.")
-    return (*notes, *gap_note(samples))
+    gaps = gap_note(samples)
+    cost = [gap_cost(samples["device_time_us"] * 1e-6).sentence] if gaps else []
+    return (*notes, *gaps, *cost)

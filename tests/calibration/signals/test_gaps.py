@@ -6,11 +6,12 @@ Motions are made here by closed forms; friction is regressed by least squares.
 import numpy as np
 import pytest
 
-from scissorcal.calibration.signals.gaps import bridge
+from scissorcal.calibration.signals.segments import bridge
 from scissorcal.calibration.signals.usage import GAP, SLOW, usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, weigh
 from scissorcal.recording.layout import empty_samples
 from scissorcal.recording.recording import Recording
+from scissorcal.recording.summarising import gap_cost
 
 INERTIA, COULOMB, VISCOUS = 2e-4, 0.05, 0.02
 
@@ -112,3 +113,21 @@ def test_a_steady_motion_is_not_taken_for_the_step_of_an_encoder(rate_Hz: float)
     windows = weigh((one,), 75.0)
     assert windows.bins.moving.mean() > 0.8
     assert windows.bins.rate_floor < 0.005
+
+
+@pytest.mark.parametrize(
+    ("rate_Hz", "every", "lost"),
+    [(1000.0, 100, 3), (1000.0, 500, 60), (250.0, 60, 8), (100.0, 30, 2), (64.5, 120, 2)],
+)
+def test_the_cost_that_an_import_states_is_about_that_of_a_fit(
+    rate_Hz: float, every: int, lost: int
+) -> None:
+    recording = swinging(rate_Hz, seconds=60.0)
+    parted = holed(recording, every, lost)
+    seconds = []
+    for one in (recording, parted):
+        usable = (np.ones(len(one.samples), dtype=bool),)
+        found = usage_of_windows((one,), weigh((one,), 75.0), usable).lost
+        seconds.append(sum(found.values()))
+    more = seconds[1] - seconds[0] + seconds[0] * (lost / every)
+    assert gap_cost(parted.device_time_s).lost_s == pytest.approx(more, rel=0.35)

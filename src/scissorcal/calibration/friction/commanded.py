@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.refusals import FEWEST_BINS
-from scissorcal.calibration.signals.gaps import bridge
+from scissorcal.calibration.signals.segments import bridge
 from scissorcal.calibration.signals.weak_form import HELD, Windows, weigh
 from scissorcal.calibration.signals.window_length import spline
 from scissorcal.kernel import presliding_path

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.signals.gaps import bridge
+from scissorcal.calibration.signals.segments import bridge
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.recipe.requirements import LITTLE
 from scissorcal.recording.recording import Recording

@@ -16,8 +16,7 @@ from scissorcal.calibration.signals.filtering import (
     position_error,
     rate_floor,
 )
-from scissorcal.calibration.signals.gaps import bridge
-from scissorcal.calibration.signals.segments import no_piece, sheets_of, usual_tick
+from scissorcal.calibration.signals.segments import bridge, no_piece, sheets_of, usual_tick
 from scissorcal.calibration.signals.window_length import (
     HALF_AT,
     SMOOTH,
@@ -131,7 +130,7 @@ def weigh(
     than the cutoff asks for where the encoder's steps would else be a part of psi''
     (:func:`~.window_length.longer_knot`); ``window_Hz`` is where they pass half, if that is to be
     prescribed. The rate within F keeps the band of ``cutoff_Hz`` all the same. Short gaps are
-    bridged (:func:`~.gaps.bridge`): ``first`` and the samples are then those of the bridged
+    bridged (:func:`~.segments.bridge`): ``first`` and the samples are then those of the bridged
     recordings, and windows that touch a gap are left out of ``moving``.
 
     ``bins.moving`` is false for windows that hold a rest or a turn: a sample where the sign of the

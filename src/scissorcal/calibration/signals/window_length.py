@@ -7,7 +7,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.filtering import BIN_S
-from scissorcal.calibration.signals.segments import edge_samples, stretches
+from scissorcal.calibration.signals.segments import stretches
+from scissorcal.recording.resolution import edge_samples
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
