@@ -127,13 +127,14 @@ def no_piece(recordings: tuple[Recording, ...]) -> InputError:
 
 def gaps_in_words(recordings: tuple[Recording, ...]) -> str:
     """How many gaps there are, the longest with its place, and the longest stretch between them."""
+    recordings = tuple(one for one in recordings if len(one.samples) > 1)
     steps = [np.diff(one.device_time_s) for one in recordings]
-    wide = [step > GAP_FACTOR * np.median(step) if len(step) else step > 0 for step in steps]
+    wide = [np.asarray(step > GAP_FACTOR * np.median(step)) for step in steps]
     count = sum(int(np.count_nonzero(one)) for one in wide)
     if not count:
         seconds = max((one.duration_s for one in recordings), default=0.0)
         return f"There are no gaps, and the longest recording lasts {seconds:.3g} s."
-    index = max(range(len(steps)), key=lambda i: float(steps[i].max(initial=0.0)))
+    index = int(np.argmax([step.max(initial=0.0) for step in steps]))
     at = int(np.argmax(steps[index]))
     longest = 0.0
     for one, gaps in zip(recordings, wide, strict=True):
@@ -180,7 +181,7 @@ def _cubic(recording: Recording, step: Array, short: Mask, before: Integers, sha
     usual = usual_tick(recording)
     broken, reach = np.flatnonzero(step > GAP_FACTOR * usual), 2 + 2 * edge_samples(1.0 / usual)
     rates = np.zeros((2, len(step)))
-    for gap in np.flatnonzero(short):
+    for gap in np.flatnonzero(short).tolist():
         place = int(np.searchsorted(broken, gap))
         first = int(broken[place - 1]) + 1 if place else 0
         last = int(broken[place + 1]) if place + 1 < len(broken) else len(time) - 1
@@ -188,7 +189,7 @@ def _cubic(recording: Recording, step: Array, short: Mask, before: Integers, sha
         rates[0, gap] = _end_rate(time, opening, np.arange(gap, first - 1, -1), step[gap])
         rates[1, gap] = _end_rate(time, opening, np.arange(gap + 1, last + 1), step[gap])
     rise, lasting = np.diff(opening)[before], step[before]
-    known = np.isfinite(rates).all(axis=0)[before]
+    known = (np.isfinite(rates[0]) & np.isfinite(rates[1]))[before]
     left, right = (np.where(known, lasting * rate[before], rise) for rate in rates)
     s = share
     bend = s * (1.0 - s) * ((1.0 - s) * (left - rise) - s * (right - rise))
