@@ -19,11 +19,14 @@ from scissorcal.recording.resolution import GAP_FACTOR, StrokeThreshold, stroke_
 from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_cost, gap_note
 from scissorcal.recording.table import Table, read_table
+from scissorcal.recording.wraps import continued
 
 WRAP = 2.0**32
 """Where the counter of a logger's clock begins at 0 again: 32 bits of us last 71.6 min."""
 NEAR_WRAP = 0.01
 """Before and after that its time is within this share of the counter's range of either end."""
+MOST_PLACES = 3
+"""Places that a note lists."""
 SHORT_SHARE, MANY = 0.25, 20
 """More strokes than MANY, half of them shorter than this share of the range, are worth a note."""
 
@@ -60,7 +63,8 @@ def import_table(
     A stroke travels at least ``min_travel`` [rad, or m]; where that is not given, so far that
     neither noise nor steps of the sensor make a stroke (`stroke_threshold`), which a note states.
     The last line of a text file is left out where it has no end, unless ``drop_last_line`` is
-    false. A clock of 32 bits that begins at 0 again is continued, with a note.
+    false. A clock of 32 bits that begins at 0 again is continued, with a note; so is an angle that
+    begins again after a full turn, or a counter after its last number.
 
     A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
     it and notes it. Both clocks begin at 0 and are rounded to 1 us.
@@ -89,6 +93,7 @@ def import_table(
     for channel in set(columns) - {"time"}:
         samples[channel] = table.columns[channel].values * quantities[channel].factor
     said = list(table.notes)
+    said += _go_on(samples, table, joint)
     if rate_Hz is not None:
         _set_regular_clock(samples, rate_Hz)
     else:
@@ -218,6 +223,19 @@ def _continued(table: Table) -> tuple[Table, list[str]]:
     places = ", ".join(table.place(int(row) + 1).rpartition(", ")[2] for row in falls)
     note = f"The clock begins at 0 again at {places}, after 2^32: it was continued."
     return replace(table, columns=columns), [note]
+
+
+def _go_on(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
+    """Continue a position that begins again; give a sentence on it."""
+    turn = 2.0 * math.pi if joint.kind == "rotary" else None
+    position = np.asarray(samples["opening"], dtype=np.float64)
+    found, places = continued(position, table.columns["opening"].values, turn)
+    if not len(places):
+        return []
+    samples["opening"] = found
+    listed = ", ".join(table.place(int(row)).rpartition(", ")[2] for row in places[:MOST_PLACES])
+    more = f" and {len(places) - MOST_PLACES} more" if len(places) > MOST_PLACES else ""
+    return [f"The opening begins again at {listed}{more}, after its period: it was continued."]
 
 
 def _label(

@@ -1,6 +1,7 @@
 """Motion and terms that cannot determine friction: refused, with what to record instead."""
 
 import numpy as np
+from scipy.stats import t as student
 
 from scissorcal.calibration.signals.filtering import Bins, position_error
 from scissorcal.calibration.signals.interruptions import interruptions
@@ -16,6 +17,8 @@ from scissorcal.recording.recording import Joint, Recording
 FEWEST_BINS = 200
 LEAST_TRAVEL_S = 0.1
 """Travel of so many seconds at the slowest certain rate is motion, if a slow one."""
+DRIFT_RATE = 1e-3
+"""Chance with which an interval that says of a drift that it exceeds friction is wrong."""
 STROKE_WINDOWS = 2.0
 """In strokes of so many windows' length half of the windows hold a turn, in shorter ones most."""
 
@@ -33,6 +36,7 @@ def refuse_friction(
     if len(windows.first) < FEWEST_BINS:
         raise _too_little(recordings, every, windows, sensors, usage)
     _refuse_poor_motion(windows.bins, recordings, joint)
+    _refuse_drift(windows.bins, recordings, joint)
     _refuse_terms(settings, windows, joint)
 
 
@@ -64,8 +68,8 @@ def _too_little(
         cause = _motion_cause(recordings, every)
     names = ", ".join(recording.source or "the recording" for recording in recordings)
     return InputError(
-        f"{names}: {used_s:.2g} s of motion are left to fit, and friction needs at least "
-        f"{needed_s:.2g} s. {cause} {usage.counted}: {len(windows.first)} of {len(every.first)} "
+        f"{names}: {used_s:.3g} s of motion are left to fit, and friction needs at least "
+        f"{needed_s:.3g} s. {cause} {usage.counted}: {len(windows.first)} of {len(every.first)} "
         "windows."
     )
 
@@ -130,6 +134,41 @@ def _refuse_poor_motion(bins: Bins, recordings: tuple[Recording, ...], joint: Jo
             f"{names}: the drive torque is constant while the joint moves; check the "
             "motor_torque column or the sensor's connection."
         )
+
+
+def _refuse_drift(bins: Bins, recordings: tuple[Recording, ...], joint: Joint) -> None:
+    """Refuse a torque whose zero drifts over a recording by more than friction.
+
+    The means of runs of one direction are regressed on time and direction; only where both
+    intervals are clear of each other is it said, at a false-alarm rate of ``DRIFT_RATE`` each.
+    """
+    for index in np.unique(bins.recording):
+        own = bins.where(bins.recording == index)
+        run = np.cumsum(np.diff(np.sign(own.rate), prepend=np.sign(own.rate[0])) != 0)
+        counts = np.bincount(run)
+        time, drive, way = (
+            np.bincount(run, values) / counts
+            for values in (own.time_s, own.drive, np.sign(own.rate))
+        )
+        freedom = len(counts) - 3
+        if freedom < 3 or np.ptp(time) == 0.0:
+            continue
+        columns = np.column_stack([(time - time.mean()) / np.ptp(time), way, np.ones(len(time))])
+        found, *_ = np.linalg.lstsq(columns, drive, rcond=None)
+        size = np.sqrt(np.sum((drive - columns @ found) ** 2) / freedom)
+        error = size * np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns)))
+        reach = float(student.isf(DRIFT_RATE / 2.0, freedom)) * error
+        drift, friction = np.abs(found[:2]).tolist()
+        if drift - reach[0] > friction + reach[1]:
+            unit = joint.effort_unit
+            raise InputError(
+                f"{recordings[index].source or 'the recording'}: the torque's zero drifts by "
+                f"{drift:.2g} {unit} (+- {reach[0]:.1g}) from {time.min():.3g} to {time.max():.3g} "
+                f"s, more than friction holds ({friction:.2g} +- {reach[1]:.1g} {unit}), so that "
+                "friction is not to be told from it. Let the sensor warm up, or record shorter "
+                "logs with the joint at rest and the motors off before and after, and import "
+                "them again."
+            )
 
 
 def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None:
