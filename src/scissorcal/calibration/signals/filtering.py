@@ -79,7 +79,7 @@ def position_error(position: Array) -> PositionError:
 
     Its standard deviation is that of the steps, step / sqrt(12), or of the noise where that exceeds
     a step: a table has steps of its last digit, however noisy the sensor. Of a part of a recording
-    it must not be taken: a steady motion has steps of its own, and would hide itself.
+    it must not be taken: a steady motion has even steps, and would hide itself.
     """
     step, noise = resolution_of(position), noise_of(position)
     noise = noise if np.isfinite(noise) else 0.0

@@ -68,14 +68,14 @@ def _refuse_two_rigs(recordings: tuple[Recording, ...]) -> None:
             raise InputError(
                 f"{_name(first)} is of a {first.joint.kind} joint and {_name(other)} of a "
                 f"{other.joint.kind} one: one fit is of one rig. Remove the recordings of the "
-                "other joint, or keep them in a workspace of their own."
+                "other joint, or keep them in a separate workspace."
             )
         lengths = first.handle_radius_m, other.handle_radius_m
         if np.all(np.isfinite(lengths)) and not np.isclose(*lengths):
             raise InputError(
                 f"{_name(first)} has a handle radius of {1e3 * lengths[0]:.4g} mm and "
                 f"{_name(other)} of {1e3 * lengths[1]:.4g} mm: one fit is of one rig. Keep the "
-                "recordings of each rig in a workspace of their own; if it is one rig, import the "
+                "recordings of each rig in a separate workspace; if it is one rig, import the "
                 "log again with --handle-radius-mm."
             )
 
