@@ -146,28 +146,30 @@ class StrokeError:
     independent: float = float("nan")
 
     def interval(self, tail: float = 0.05) -> tuple[float, float]:
-        """Interval of ``relative_rms`` that leaves ``tail`` on either side; NaN where not known.
+        """Interval of ``relative_rms``: see :func:`rms_interval`."""
+        return rms_interval(self.relative_rms, self.independent, tail)
 
-        Of n independent normal errors, n rms^2 over their variance is chi-squared with n degrees of
-        freedom; its quantiles are those of Wilson and Hilferty (doi:10.1073/pnas.17.12.684), the
-        lower one for few degrees that of the density's first term.
-        """
-        from statistics import NormalDist
 
-        n = self.independent
-        if not n > 0.0:
-            return float("nan"), float("nan")
-        reach = NormalDist().inv_cdf(1.0 - tail) * (2.0 / (9.0 * n)) ** 0.5
-        middle = 1.0 - 2.0 / (9.0 * n)
-        upper = n * max(middle + reach, 0.0) ** 3
-        lower = max(
-            n * max(middle - reach, 0.0) ** 3,
-            2.0 * (tail * math.gamma(0.5 * min(n, MANY) + 1.0)) ** (2.0 / min(n, MANY)),
-        )
-        low, high = (
-            (n / found) ** 0.5 if found > 0.0 else float("inf") for found in (upper, lower)
-        )
-        return self.relative_rms * low, self.relative_rms * high
+def rms_interval(rms: float, independent: float, tail: float = 0.05) -> tuple[float, float]:
+    """Interval of an rms error that leaves ``tail`` on either side; NaN where not known.
+
+    Of n independent normal errors, n rms^2 over their variance is chi-squared with n degrees of
+    freedom; its quantiles are those of Wilson and Hilferty (doi:10.1073/pnas.17.12.684), the lower
+    one for few degrees that of the density's first term.
+    """
+    from statistics import NormalDist
+
+    n, few = independent, min(independent, MANY)
+    if not n > 0.0:
+        return float("nan"), float("nan")
+    reach = NormalDist().inv_cdf(1.0 - tail) * (2.0 / (9.0 * n)) ** 0.5
+    middle = 1.0 - 2.0 / (9.0 * n)
+    upper = n * max(middle + reach, 0.0) ** 3
+    first = 2.0 * (tail * math.gamma(0.5 * few + 1.0)) ** (2.0 / few)
+    lower = max(n * max(middle - reach, 0.0) ** 3, first)
+    low = (n / upper) ** 0.5 if upper > 0.0 else 0.0
+    high = (n / lower) ** 0.5 if lower > 0.0 else float("inf")
+    return rms * low, rms * high
 
 
 def worst_stroke(errors: Sequence[StrokeError]) -> StrokeError | None:

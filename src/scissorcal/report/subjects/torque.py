@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.result import FitResult, worst_stroke
+from scissorcal.calibration.result import FitResult, rms_interval, worst_stroke
 from scissorcal.recording.recording import Stroke
 from scissorcal.report.numbers import Number, finite, percent, short, unit_text, with_unit
 from scissorcal.report.panel import (
@@ -124,13 +124,22 @@ def strokes_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -
         if fit.what != "cut":
             charts.append(_spread(fit, strokes, "rate", f"{part}-spread-rate"))
     charts += [_card(fit, stroke) for stroke in ranked[:MOST_CARDS]]
-    worst = ranked[0]
+    worst = max(ranked, key=lambda one: _shown(fit, one, len(ranked)))
     sentence = (
         f"The model misses most on {worst.name.label}: "
         f"{with_unit(finite(_rms(fit, worst)), fit.effort_unit, 2)} rms."
     )
     caption = f"Measured minus model by stroke, in {unit_text(fit.effort_unit)}."
     return Panel(id_, part, title, sentence, rows, tuple(charts), caption=caption)
+
+
+def _shown(fit: FitResult, stroke: StrokeSamples, of: int) -> float:
+    """The error that a stroke is shown to have, one ``of`` so many; -1 where there is none."""
+    rms = finite(_rms(fit, stroke))
+    if rms is None:
+        return -1.0
+    share = finite(fit.diagnostics.get("independent_share")) or 1.0
+    return rms_interval(rms, share * len(stroke.places), 0.05 / of)[0]
 
 
 def held_out_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
