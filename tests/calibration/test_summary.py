@@ -243,15 +243,17 @@ def test_the_ends_of_a_plateau_have_intervals_that_hold_them() -> None:
     assert plateau.high_ends[0] - 0.05 < 0.61 < plateau.high_ends[1] + 0.05
 
 
-def test_a_plateau_of_a_few_strokes_only_is_not_determined() -> None:
+def test_a_plateau_that_one_stroke_makes_is_not_determined() -> None:
+    """Three strokes fall by 1 N m/rad and one rises by 3: their mean is level, by chance."""
     made = log(Made(strokes=4, slope=-1.0, level=0.3))
-    steep = made.samples["motor_torque"].copy()
     first = made.samples["stroke"] <= 1
-    made.samples["motor_torque"][first] += 6.0 * (made.samples["opening"][first] - 0.6)
+    made.samples["motor_torque"][first] += 4.0 * (made.samples["opening"][first] - 0.6)
     (found,) = summed(made)
     plateau = plateau_in(found, np.random.default_rng(0))
-    assert steep.any()
-    assert plateau is None or not plateau.determined
+    assert plateau is not None
+    assert plateau.share is not None
+    assert plateau.share < 0.9
+    assert not plateau.determined
 
 
 def test_strokes_with_a_hole_are_left_out_and_counted() -> None:
