@@ -143,8 +143,9 @@ def gaps_in_words(recordings: tuple[Recording, ...]) -> str:
         longest = max([longest, *(float(time[b - 1] - time[a]) for a, b in pairwise(ends))])
     worst = recordings[index]
     where = f"{worst.source or 'the recording'} at {worst.device_time_s[at]:.4g} s"
+    counted = "There is 1 gap" if count == 1 else f"There are {count} gaps"
     return (
-        f"There are {count} gaps, the longest of {steps[index][at]:.3g} s ({where}); the longest "
+        f"{counted}, the longest of {steps[index][at]:.3g} s ({where}); the longest "
         f"stretch between gaps lasts {longest:.3g} s."
     )
 
