@@ -4,18 +4,22 @@ Nothing here is a model of a cut. A stroke is the unit of every interval: sample
 its friction, its sheet and its hand.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.plateau import LEAST_PLATEAU, plateau_of
+from scissorcal.calibration.plateau import (
+    LEAST_PLATEAU,
+    Plateau,
+    drawn_strokes,
+    find_plateau,
+)
 from scissorcal.calibration.signals.sensors import channels_of
 from scissorcal.calibration.stroke_intervals import (
     FEWEST,
-    LEVEL,
     Interval,
     difference_interval,
     mean_interval,
@@ -36,9 +40,6 @@ SPEED_CLASS = 1.4
 FULL_TURN_RAD = 2.0 * np.pi
 SIGN_LEVEL = 0.998
 """Of the interval that decides a sign: chance changes a right one in 1 of 1,000 logs."""
-RESAMPLES = 100
-"""Draws of the strokes over which a plateau's ends are stated: their 5 % and 95 % quantiles lie
-within 0.15 standard deviations or so of those of many more."""
 
 
 @dataclass(frozen=True)
@@ -71,28 +72,6 @@ class SpeedClass:
     kind: StrokeKind
     speed: float
     level: Interval
-
-
-@dataclass(frozen=True)
-class Plateau:
-    """Where the mean curve is level: from ``low`` to ``high`` [rad, or m], and how high.
-
-    ``low_ends`` and ``high_ends`` are the 5 % and 95 % quantiles of the two ends over draws of the
-    strokes with replacement (Efron 1979, doi:10.1214/aos/1176344552), ``share`` is that of the
-    draws that have a plateau at all; None with fewer than three strokes.
-    """
-
-    low: float
-    high: float
-    level: Interval
-    low_ends: tuple[float, float] | None = None
-    high_ends: tuple[float, float] | None = None
-    share: float | None = None
-
-    @property
-    def determined(self) -> bool:
-        """Whether the strokes show that there is a plateau: 90 % of the draws have one."""
-        return self.share is None or self.share >= LEVEL
 
 
 @dataclass(frozen=True)
@@ -205,10 +184,10 @@ def difference(one: LogSummary, other: LogSummary, rng: np.random.Generator) -> 
         return difference_interval(a[:, chosen].mean(axis=1), b[:, chosen].mean(axis=1))
 
     def drawn() -> Array:
-        return np.asarray(_drawn(a, rng).mean(axis=0) - _drawn(b, rng).mean(axis=0))
+        return np.asarray(drawn_strokes(a, rng).mean(axis=0) - drawn_strokes(b, rng).mean(axis=0))
 
     few = min(len(a), len(b)) < FEWEST
-    plateau = _plateau(curve, places, level, None if few else drawn)
+    plateau = find_plateau(curve, places, level, None if few else drawn)
     return Difference(
         curve,
         low,
@@ -231,39 +210,10 @@ def plateau_in(found: LogSummary, rng: np.random.Generator) -> Plateau | None:
         return mean_interval(values[:, chosen].mean(axis=1))
 
     def drawn() -> Array:
-        return np.asarray(_drawn(values, rng).mean(axis=0))
+        return np.asarray(drawn_strokes(values, rng).mean(axis=0))
 
     few = len(values) < FEWEST
-    return _plateau(found.closing.mean, found.places, level, None if few else drawn)
-
-
-def _plateau(
-    curve: Array,
-    places: Array,
-    level: Callable[[slice], Interval],
-    drawn: Callable[[], Array] | None,
-) -> Plateau | None:
-    """The plateau of ``curve`` (BINS,), how high, and how its ends scatter over ``drawn`` ones."""
-    place = plateau_of(curve, places)
-    if place is None:
-        return None
-    first, last = float(places[place[0]]), float(places[place[1] - 1])
-    height = level(slice(*place))
-    if drawn is None:
-        return Plateau(first, last, height)
-    found = [plateau_of(drawn(), places) for _ in range(RESAMPLES)]
-    ends = np.array([(places[one[0]], places[one[1] - 1]) for one in found if one is not None])
-    if not len(ends):
-        return Plateau(first, last, height, share=0.0)
-    (low, high), (low_, high_) = np.quantile(ends, [0.05, 0.95], axis=0).T
-    share = len(ends) / RESAMPLES
-    spread = ((float(low), float(high)), (float(low_), float(high_)))
-    return Plateau(first, last, height, *spread, share)
-
-
-def _drawn(values: Array, rng: np.random.Generator) -> Array:
-    """As many strokes (n, BINS) as there are, drawn with replacement."""
-    return np.asarray(values[rng.integers(len(values), size=len(values))])
+    return find_plateau(found.closing.mean, found.places, level, None if few else drawn)
 
 
 def slope_in(found: LogSummary) -> Interval:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scissorcal.calibration.plateau import LEAST_PLATEAU
+from scissorcal.calibration.plateau import LEAST_PLATEAU, Plateau
 from scissorcal.calibration.stroke_intervals import Interval
 from scissorcal.report.html import made_line, panel_section, parts_nav, prose, whole_page
 from scissorcal.report.panel import (
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
         Curves,
         Difference,
         LogSummary,
-        Plateau,
     )
 
 PART = "summary"
