@@ -4,11 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.checks import trust_verdicts
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
-from scissorcal.calibration.result import StrokeError
+from scissorcal.calibration.result import StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.cli.fit_law import text
 from scissorcal.inference import Posterior, SearchStatus, infer
@@ -226,3 +227,40 @@ def test_a_rejected_fit_is_not_printed_as_a_calibration(tmp_path):
     )
     assert good.rejected == ()
     assert "not a calibration" not in text(FitOutcome("friction", good, tmp_path, (), False, state))
+
+
+def error(relative: float, independent: float, stroke: int = 0) -> StrokeError:
+    return StrokeError(stroke, "a.mcap", "closing", 0.1, relative, relative, independent)
+
+
+@pytest.mark.parametrize("independent", [1.0, 2.0, 5.0, 40.0, 1000.0])
+@pytest.mark.parametrize("tail", [0.05, 0.001])
+def test_the_interval_of_a_strokes_error_is_that_of_chi_squared(independent, tail):
+    low, high = error(0.1, independent).interval(tail)
+    exact = np.sqrt(independent / chi2.isf([tail, 1.0 - tail], independent))
+    assert low == pytest.approx(0.1 * exact[0], rel=0.03)
+    assert high == pytest.approx(0.1 * exact[1], rel=0.1)
+
+
+def test_a_fragment_is_the_worst_stroke_only_where_chance_would_not_make_it_so():
+    """40 strokes of one error: 38 of 60 samples and two of 2, and one of 60 that errs half more."""
+    rng = np.random.default_rng(7)
+    fragments = worse = 0
+    for _ in range(500):
+        sizes = np.array([60] * 37 + [60] + [2] * 2)
+        scale = np.where(np.arange(40) == 37, 0.06, 0.04)
+        rms = scale * np.sqrt(rng.chisquare(sizes) / sizes)
+        errors = [error(r, float(n), i) for i, (r, n) in enumerate(zip(rms, sizes, strict=True))]
+        found = worst_stroke(errors)
+        fragments += found.independent == 2.0
+        worse += found.stroke == 37
+    assert fragments <= 10
+    assert worse >= 450
+    far = [error(0.04, 60.0, 0), error(0.9, 2.0, 1)]
+    assert worst_stroke(far).stroke == 1, "an error that no chance makes of 0.04"
+
+
+def test_without_counts_the_largest_error_is_the_worst():
+    errors = [error(share, float("nan"), i) for i, share in enumerate((0.02, 0.05, 0.03))]
+    assert worst_stroke(errors).stroke == 1
+    assert worst_stroke([error(float("nan"), 3.0)]) is None

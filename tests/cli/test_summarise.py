@@ -169,3 +169,41 @@ def test_friction_of_a_real_tool_is_the_published_one(
     )
     friction = value_of(said.envelope["result"], "figures", "half of closing minus opening")
     assert low < friction["number"] < high
+
+
+CASES = Path(__file__).parents[3] / "shared" / "cases"
+
+
+def case(name: str) -> Path:
+    if not (CASES / name).is_file():
+        pytest.skip(f"{name} is not beside the project")
+    return CASES / name
+
+
+def test_a_force_that_is_never_below_0_keeps_its_sign(here: Path, cli: Cli) -> None:
+    path = str(case("summarise/one_sided.csv"))
+    columns = ("-c", "time=time_s", "-c", "opening=angle_deg", "-c", "handle_force=force_N")
+    said = cli("summarise", path, *columns, "--json")
+    mean = value_of(said.envelope["result"], "figures", "closing, mean")
+    assert mean["number"] == pytest.approx(5.0, abs=0.1)
+    shown = cli("summarise", path, *columns).out
+    assert "which sign resists closing is not determined" in shown
+    assert "plateau, closing: from" in shown
+
+
+def test_what_is_no_measurement_is_named(here: Path, cli: Cli) -> None:
+    """Marks of overflow, a sensor at its ends, gaps: each in words, with its count."""
+    path = logged(here / "a.csv", 1.0, 1)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    for row in (100, 900, 2000):
+        lines[row] = lines[row].rpartition(",")[0] + ",9999"
+    del lines[1500:1503]
+    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    said = cli("summarise", "a.csv", *COLUMNS, "--allow-gaps").out
+    assert "handle_force is exactly 9999 N in 3 samples" in said
+    assert "3 frames are missing in 1 gap" in said
+    ends = [line.rpartition(",") for line in lines[1:]]
+    cut = [f"{head},{max(-0.2, min(0.2, float(force)))}" for head, _, force in ends]
+    (here / "b.csv").write_text("\n".join([lines[0], *cut, ""]), encoding="utf-8")
+    said = cli("summarise", "b.csv", *COLUMNS, "--allow-gaps").out
+    assert "handle_force is -0.2 or 0.2 N, its least and its largest value, in" in said

@@ -186,10 +186,13 @@ def test_gaps_are_refused_or_kept_and_noted(tmp_path: Path) -> None:
     assert "line 52, column 't': 0.04 s since the row before" in message
     assert "where 0.01 s are usual (2 such gaps in all, the longest 0.04 s)" in message
     assert "Allow gaps" in message
+    assert "bridges gaps of up to 0.05 s (here 2 of 2)" in message
+    assert "about 0.04 s of 3.96 s" in message
     recording = import_table(path, columns=COLUMNS, units=UNITS, allow_gaps=True)
     assert_holds(recording, table)
     note = "4 frames are missing in 2 gaps, the longest (3 frames) at 0.490 s."
     assert note in recording.notes
+    assert any("about 0.04 s of 3.96 s" in said for said in recording.notes)
     stored = read_recording(write_recording(recording, tmp_path / "log.mcap"))
     assert stored.notes == recording.notes
     assert len(stored.strokes) == len(recording.strokes)
@@ -286,3 +289,37 @@ def test_random_text_is_read_or_refused(
     except InputError:
         return
     assert np.isfinite(found.samples["opening"]).all()
+
+
+@pytest.mark.parametrize(
+    ("unit", "period", "low"),
+    [("deg", 360.0, 0.0), ("deg", 360.0, -180.0), ("rad", 2 * math.pi, 0.0), ("counts", 4096, 0)],
+)
+def test_a_position_that_begins_again_is_continued(
+    tmp_path: Path, unit: str, period: float, low: float
+) -> None:
+    """Sweeps of 50 deg across the place where the sensor begins again."""
+    turn = 2 * math.pi
+    begins = turn * low / period
+    angle = begins + 0.2 + np.radians(25.0) * np.cos(np.arange(1200) / 40.0)
+    value = (angle / turn * period - low) % period + low
+    value = np.floor(value) if unit == "counts" else np.round(value, 6)
+    table = [[k * 0.01, v, 0.01 * k] for k, v in enumerate(value.tolist())]
+    path = written(tmp_path / "log.csv", table)
+    scale = {"opening": turn / period} if unit == "counts" else {}
+    units = {**UNITS, "opening": "rad" if unit == "counts" else unit}
+    recording = import_table(path, columns=COLUMNS, units=units, scale=scale)
+    moved = recording.samples["opening"] - recording.samples["opening"][0]
+    assert moved == pytest.approx(angle - angle[0], abs=2e-3)
+    assert any("begins again at line" in note for note in recording.notes)
+    closing = [stroke for stroke in recording.strokes if stroke.kind == "closing"]
+    assert len(closing) == 5
+
+
+def test_a_position_that_jumps_otherwise_is_left_as_it_is(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    angle = np.round(np.where(rng.random(400) < 0.02, 300.0, 30.0 + np.arange(400) / 10.0), 3)
+    path = written(tmp_path / "log.csv", [[k * 0.01, a, 0.0] for k, a in enumerate(angle.tolist())])
+    recording = import_table(path, columns=COLUMNS, units={**UNITS, "opening": "deg"})
+    assert np.degrees(recording.samples["opening"]) == pytest.approx(angle)
+    assert not any("begins again" in note for note in recording.notes)

@@ -229,6 +229,7 @@ def _stroke_errors(
                 speed=float(np.median(np.abs(bins.rate[here]))),
                 rms=rms,
                 relative_rms=rms / size if size > 0 else float("inf"),
+                independent=float(np.count_nonzero(here)) * chosen.share,
             )
         )
     return tuple(errors)

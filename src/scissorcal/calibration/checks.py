@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.fit_candidate import SEARCH_REACH, FittedCandidate
-from scissorcal.calibration.result import StrokeError
+from scissorcal.calibration.result import StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior, SearchStatus
 from scissorcal.inference.importance import ADAPTED_LIMIT
@@ -253,9 +253,8 @@ def _unseen(scope: str, held_out: tuple[StrokeError, ...]) -> Verdict:
     if median is None:
         why = "Only one stroke was recorded, so none can be held out: record several."
         return not_evaluated(scope, "hold-out", why, HELD_OUT_LIMIT)
-    worst = max(held_out, key=lambda error: error.relative_rms)
-    why = (
-        f"On hold-out strokes the error is {median:.1%} (median rms); the worst is stroke "
-        f"{worst.stroke} with {worst.relative_rms:.1%}."
-    )
+    worst = worst_stroke(held_out)
+    why = f"On hold-out strokes the error is {median:.1%} (median rms)."
+    if worst is not None:
+        why = f"{why[:-1]}; the worst is stroke {worst.stroke} with {worst.relative_rms:.1%}."
     return judge(scope, "hold-out", median, HELD_OUT_LIMIT, why)

@@ -1,6 +1,7 @@
 """What a fit results in: posterior draws, parameters, diagnostics, verdicts."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -12,6 +13,9 @@ from scissorcal.verdicts import Verdict, failed
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Effort = Literal["draft", "standard", "thorough"]
+
+MANY = 10.0
+"""Degrees of freedom from which the approximation of Wilson and Hilferty is the closer one."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +176,8 @@ class StrokeError:
     """Hold-out error: one stroke as predicted by a fit without it.
 
     ``rms`` and ``relative_rms`` (``rms`` over that of the measured effort of all strokes) are of
-    the band-limited samples that the likelihood uses.
+    the band-limited samples that the likelihood uses, ``independent`` is how many independent ones
+    these are worth, NaN where that is not known.
     """
 
     stroke: int
@@ -181,6 +186,48 @@ class StrokeError:
     speed: float
     rms: float
     relative_rms: float
+    independent: float = float("nan")
+
+    def interval(self, tail: float = 0.05) -> tuple[float, float]:
+        """Interval of ``relative_rms``: see :func:`rms_interval`."""
+        return rms_interval(self.relative_rms, self.independent, tail)
+
+
+def rms_interval(rms: float, independent: float, tail: float = 0.05) -> tuple[float, float]:
+    """Interval of an rms error that leaves ``tail`` on either side; NaN where not known.
+
+    Of n independent normal errors, n rms^2 over their variance is chi-squared with n degrees of
+    freedom; its quantiles are those of Wilson and Hilferty (doi:10.1073/pnas.17.12.684), the lower
+    one for few degrees that of the density's first term.
+    """
+    from statistics import NormalDist
+
+    n, few = independent, min(independent, MANY)
+    if not n > 0.0:
+        return float("nan"), float("nan")
+    reach = NormalDist().inv_cdf(1.0 - tail) * (2.0 / (9.0 * n)) ** 0.5
+    middle = 1.0 - 2.0 / (9.0 * n)
+    upper = n * max(middle + reach, 0.0) ** 3
+    first = 2.0 * (tail * math.gamma(0.5 * few + 1.0)) ** (2.0 / few)
+    lower = max(n * max(middle - reach, 0.0) ** 3, first)
+    low = (n / upper) ** 0.5 if upper > 0.0 else 0.0
+    high = (n / lower) ** 0.5 if lower > 0.0 else float("inf")
+    return rms * low, rms * high
+
+
+def worst_stroke(errors: Sequence[StrokeError]) -> StrokeError | None:
+    """The stroke that is shown to be predicted worst; None where no error is finite.
+
+    The largest of many errors is that of the smallest stroke: of two samples, one in twenty is 1.7
+    times their true size. So the lower ends of intervals are compared, together of 95 %
+    (Bonferroni): a stroke of a few samples is the worst only if chance would not make it so. Where
+    no stroke states its independent samples, errors are compared.
+    """
+    known = [one for one in errors if np.isfinite(one.relative_rms)]
+    if not known:
+        return None
+    tail = 0.05 / len(known)
+    return max(known, key=lambda one: (np.nan_to_num(one.interval(tail)[0]), one.relative_rms))
 
 
 _CONSTANT = Stored(("point",), "/constant_data")

@@ -11,7 +11,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.plateau import plateau_of
+from scissorcal.calibration.plateau import (
+    LEAST_PLATEAU,
+    Plateau,
+    drawn_strokes,
+    find_plateau,
+)
+from scissorcal.calibration.signals.sensors import channels_of
 from scissorcal.calibration.stroke_intervals import (
     FEWEST,
     Interval,
@@ -32,6 +38,8 @@ EDGE = 0.05
 SPEED_CLASS = 1.4
 """Speeds further apart than this factor are different classes."""
 FULL_TURN_RAD = 2.0 * np.pi
+SIGN_LEVEL = 0.998
+"""Of the interval that decides a sign: chance changes a right one in 1 of 1,000 logs."""
 
 
 @dataclass(frozen=True)
@@ -67,21 +75,15 @@ class SpeedClass:
 
 
 @dataclass(frozen=True)
-class Plateau:
-    """Where the mean curve is level: from ``low`` to ``high`` [rad, or m], and how high."""
-
-    low: float
-    high: float
-    level: Interval
-
-
-@dataclass(frozen=True)
 class LogSummary:
     """One log on the grid ``places`` (BINS,). Resistance is positive while closing is resisted.
 
-    ``left_out`` strokes do not reach over the range. ``turned`` says that the sign was changed.
-    ``share`` is that of the range in the median travel of the closing strokes. ``drift`` is the
-    change of a closing stroke's mean from one to the next, None with fewer than three.
+    ``left_out`` strokes do not reach over the range, ``holed`` ones reach and have a hole as wide
+    as the least plateau. ``turned`` says that the sign was changed: ``sign`` is closing minus
+    opening (closing, where nothing opens) as recorded, with an interval of ``SIGN_LEVEL``, and
+    ``signed`` whether some log of the channel determines it. ``share`` is that of the range
+    in the median travel of the closing strokes. ``drift`` is the change of a closing stroke's mean
+    from one to the next, None with fewer than three.
     """
 
     source: str
@@ -94,7 +96,10 @@ class LogSummary:
     drift: Interval | None
     share: float
     left_out: int
+    holed: int
     turned: bool
+    sign: Interval
+    signed: bool
 
 
 @dataclass(frozen=True)
@@ -146,22 +151,27 @@ def summarise(logs: Sequence[tuple[Recording, Effort]], places: Array) -> tuple[
     Each comes with its channel: ``motor_torque``, or ``handle_force`` as a force, or as a torque
     where the recording has a handle radius. One sign holds for all logs of a channel. It is taken
     from closing minus opening, which friction and cutting make positive whatever the sensor's zero;
-    from the closing strokes where nothing opens. Raises InputError where a channel is constant or
-    too few strokes reach over the range.
+    from the closing strokes where nothing opens. It is changed only where an interval of
+    ``SIGN_LEVEL`` lies below 0 in some log and above 0 in none; else it stays as recorded. Marks of
+    overflow are left out. Raises InputError where a channel is constant or too few strokes reach
+    over the range.
     """
     seen = [_Strokes.of(recording, effort, places) for recording, effort in logs]
-    turned = {
-        effort: _resists([one for one, log in zip(seen, logs, strict=True) if log[1] == effort]) < 0
+    signs = {
+        effort: {one.sign.sign for one, log in zip(seen, logs, strict=True) if log[1] == effort}
         for _, effort in logs
     }
     return tuple(
-        _summary(recording, strokes, places, turned[effort])
+        _summary(recording, strokes, places, signs[effort] - {0})
         for strokes, (recording, effort) in zip(seen, logs, strict=True)
     )
 
 
-def difference(one: LogSummary, other: LogSummary) -> Difference:
-    """Closing strokes of ``one`` minus those of ``other``, on one grid (Welch's t-intervals)."""
+def difference(one: LogSummary, other: LogSummary, rng: np.random.Generator) -> Difference:
+    """Closing strokes of ``one`` minus those of ``other``, on one grid (Welch's t-intervals).
+
+    ``rng`` draws strokes, for the ends of the plateau.
+    """
     places, (a, b) = one.places, (one.closing.values, other.closing.values)
     low = high = None
     if min(len(a), len(b)) >= FEWEST:
@@ -169,12 +179,15 @@ def difference(one: LogSummary, other: LogSummary) -> Difference:
         low = np.array([entry.low for entry in each], dtype=np.float64)
         high = np.array([entry.high for entry in each], dtype=np.float64)
     curve = a.mean(axis=0) - b.mean(axis=0)
-    found = plateau_of(curve, places)
-    plateau = None
-    if found is not None:
-        chosen = slice(*found)
-        level = difference_interval(a[:, chosen].mean(axis=1), b[:, chosen].mean(axis=1))
-        plateau = Plateau(float(places[found[0]]), float(places[found[1] - 1]), level)
+
+    def level(chosen: slice) -> Interval:
+        return difference_interval(a[:, chosen].mean(axis=1), b[:, chosen].mean(axis=1))
+
+    def drawn() -> Array:
+        return np.asarray(drawn_strokes(a, rng).mean(axis=0) - drawn_strokes(b, rng).mean(axis=0))
+
+    few = min(len(a), len(b)) < FEWEST
+    plateau = find_plateau(curve, places, level, None if few else drawn)
     return Difference(
         curve,
         low,
@@ -186,13 +199,21 @@ def difference(one: LogSummary, other: LogSummary) -> Difference:
     )
 
 
-def plateau_in(found: LogSummary) -> Plateau | None:
-    """The plateau of the closing strokes of one log; None where their mean has none."""
-    place = plateau_of(found.closing.mean, found.places)
-    if place is None:
-        return None
-    level = mean_interval(found.closing.values[:, slice(*place)].mean(axis=1))
-    return Plateau(float(found.places[place[0]]), float(found.places[place[1] - 1]), level)
+def plateau_in(found: LogSummary, rng: np.random.Generator) -> Plateau | None:
+    """The plateau of the closing strokes of one log; None where their mean has none.
+
+    ``rng`` draws strokes, for the ends of the plateau.
+    """
+    values = found.closing.values
+
+    def level(chosen: slice) -> Interval:
+        return mean_interval(values[:, chosen].mean(axis=1))
+
+    def drawn() -> Array:
+        return np.asarray(drawn_strokes(values, rng).mean(axis=0))
+
+    few = len(values) < FEWEST
+    return find_plateau(found.closing.mean, found.places, level, None if few else drawn)
 
 
 def slope_in(found: LogSummary) -> Interval:
@@ -236,7 +257,16 @@ class _Strokes:
     closing: Curves
     opening: Curves | None
     left_out: int
+    holed: int
     travel: float
+
+    @property
+    def sign(self) -> Interval:
+        """Closing minus opening as recorded, or closing alone, with an interval of SIGN_LEVEL."""
+        closing = self.closing.values.mean(axis=1)
+        if self.opening is None:
+            return mean_interval(closing, SIGN_LEVEL)
+        return difference_interval(closing, self.opening.values.mean(axis=1), SIGN_LEVEL)
 
     @classmethod
     def of(cls, recording: Recording, effort: Effort, places: Array) -> "_Strokes":
@@ -246,8 +276,16 @@ class _Strokes:
                 f"{recording.source}: {effort} is constant at {values[0]:.4g}: name its column, or "
                 "check the sensor."
             )
-        closing, left_out = _curves(recording, values, places, "closing")
-        opening, other = _curves(recording, values, places, "opening")
+        (channel,) = channels_of(recording, (effort,))
+        usable = ~np.isin(recording.samples[effort], channel.marks)
+        closing, left_out, holed = _curves(recording, values, usable, places, "closing")
+        opening, *others = _curves(recording, values, usable, places, "opening")
+        if closing is None and holed:
+            raise InputError(
+                f"{recording.source}: every closing stroke has a hole of {LEAST_PLATEAU:.0%} of "
+                "the range or more, in which nothing was measured: log at a higher rate, or "
+                "without losing samples."
+            )
         if closing is None:
             raise InputError(
                 f"{recording.source}: no closing stroke reaches over the range from "
@@ -255,21 +293,13 @@ class _Strokes:
                 "smaller --min-travel, or another log."
             )
         low, high = _ends_of(recording)
-        return cls(closing, opening, left_out + other, high - low)
+        left_out, holed = left_out + others[0], holed + others[1]
+        return cls(closing, opening, left_out, holed, high - low)
 
 
-def _resists(seen: Sequence[_Strokes]) -> float:
-    """Above 0 where the channel's sign is that in which closing is resisted."""
-    both = [
-        float(one.closing.values.mean() - one.opening.values.mean())
-        for one in seen
-        if one.opening is not None
-    ]
-    return sum(both) if both else float(np.median(seen[0].closing.values))
-
-
-def _summary(recording: Recording, strokes: _Strokes, places: Array, turned: bool) -> LogSummary:
-    closing, opening = strokes.closing, strokes.opening
+def _summary(recording: Recording, strokes: _Strokes, places: Array, signs: set[int]) -> LogSummary:
+    """One log; ``signs`` are those that logs of its channel determine."""
+    closing, opening, turned = strokes.closing, strokes.opening, signs == {-1}
     if turned:
         closing = _negated(closing)
         opening = None if opening is None else _negated(opening)
@@ -286,7 +316,10 @@ def _summary(recording: Recording, strokes: _Strokes, places: Array, turned: boo
         drift=trend_interval(closing.values.mean(axis=1)),
         share=width / strokes.travel,
         left_out=strokes.left_out,
+        holed=strokes.holed,
         turned=turned,
+        sign=strokes.sign,
+        signed=len(signs) == 1,
     )
 
 
@@ -320,39 +353,49 @@ def _ends_of(recording: Recording) -> tuple[float, float]:
 
 
 def _curves(
-    recording: Recording, values: Array, places: Array, kind: StrokeKind
-) -> tuple[Curves | None, int]:
-    """The strokes of one direction that reach over the grid, and how many do not."""
+    recording: Recording,
+    values: Array,
+    usable: NDArray[np.bool_],
+    places: Array,
+    kind: StrokeKind,
+) -> tuple[Curves | None, int, int]:
+    """The strokes of one direction over the grid; how many do not reach, how many have holes."""
     opening = np.asarray(recording.samples["opening"], dtype=np.float64)
     half = 0.5 * (places[1] - places[0])
     edges = np.append(places - half, places[-1] + half)
-    rows, speeds, left_out = [], [], 0
+    rows, speeds, left_out, holed = [], [], 0, 0
     for stroke in recording.strokes:
         if stroke.kind != kind:
             continue
-        own = recording.samples["stroke"] == stroke.index
+        own = usable & (recording.samples["stroke"] == stroke.index)
         curve = _binned(opening[own], values[own], edges)
-        if curve is None:
-            left_out += 1
+        if isinstance(curve, str):
+            left_out, holed = left_out + (curve == "short"), holed + (curve == "holed")
             continue
         rows.append(curve)
         speeds.append(stroke.speed)
     if not rows:
-        return None, left_out
+        return None, left_out, holed
     table = np.array(rows)
     work = table.mean(axis=1) * (edges[-1] - edges[0])
-    return Curves(kind, table, np.array(speeds), work), left_out
+    return Curves(kind, table, np.array(speeds), work), left_out, holed
 
 
-def _binned(opening: Array, values: Array, edges: Array) -> Array | None:
-    """Mean in each bin, between neighbours where a bin is empty; None where the ends are."""
+def _binned(opening: Array, values: Array, edges: Array) -> Array | Literal["short", "holed"]:
+    """Mean in each bin, between neighbours where a bin is empty.
+
+    "short" where the ends are empty, "holed" where so many bins in a row are that a plateau would
+    fit in: a line drawn across would be taken for a measurement.
+    """
     inside = (opening >= edges[0]) & (opening < edges[-1])
     index = np.clip(np.searchsorted(edges, opening[inside], side="right") - 1, 0, len(edges) - 2)
     counts = np.bincount(index, minlength=len(edges) - 1)
     seen = np.flatnonzero(counts)
     reach = max(1, round(EDGE * len(counts)))
     if len(seen) < 2 or seen[0] > reach or seen[-1] < len(counts) - 1 - reach:
-        return None
+        return "short"
+    if np.diff(seen).max() > LEAST_PLATEAU * len(counts):
+        return "holed"
     sums = np.bincount(index, values[inside], minlength=len(edges) - 1)
     return np.asarray(np.interp(np.arange(len(counts)), seen, sums[seen] / counts[seen]))
 

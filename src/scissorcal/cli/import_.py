@@ -194,6 +194,7 @@ def _answer(one: _Imported) -> Answer:
             f"[rig] to plan for a {joint.kind} one."
         )
     found = survey(recording, one.measured)
+    notes += found.notes
     lines = [
         f"{one.shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
         f"{len(recording.strokes)} strokes, {joint.kind} joint",

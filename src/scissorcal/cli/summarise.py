@@ -73,6 +73,8 @@ def summarise(
     from dataclasses import replace
     from datetime import UTC, datetime
 
+    import numpy as np
+
     import scissorcal
     from scissorcal.calibration.summary import (
         common_places,
@@ -141,13 +143,16 @@ def summarise(
     places = common_places([one for one, _ in logs])
     found, *rest = sum_up(logs, places)
     other = rest[0] if rest else None
-    notes = tuple(f"{one.source}: {said}" for one, _ in logs for said in _said(one))
+    notes = tuple(
+        f"{one.source}: {said}" for one, used in logs for said in (*_said(one), *_survey(one, used))
+    )
+    rng = np.random.default_rng(0)  # one log gives one page
     shown = Shown(
         log=found,
         second=other,
         against="blank" if blank else "other" if compare else "",
-        apart=difference(found, other) if other else None,
-        plateau=plateau_in(found),
+        apart=difference(found, other, rng) if other else None,
+        plateau=plateau_in(found, rng),
         slope=slope_in(found),
         friction=friction_of(other if blank and other else found),
         unit=unit,
@@ -169,6 +174,13 @@ def _said(recording: "Recording") -> tuple[str, ...]:
     """What reading a log told, without the sentence that an import begins with: which column."""
     imported = not recording.source.endswith(".mcap")
     return recording.notes[1:] if imported else recording.notes
+
+
+def _survey(recording: "Recording", effort: "Effort") -> tuple[str, ...]:
+    """What in the channels is no measurement, in sentences."""
+    from scissorcal.calibration.signals.survey import survey
+
+    return survey(recording, ("opening", effort)).notes
 
 
 def _refuse(

@@ -15,18 +15,18 @@ from scissorcal.recording.layout import MEASURED, empty_samples
 from scissorcal.recording.quantities import Quantity, describe, quantity
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
-from scissorcal.recording.resolution import StrokeThreshold, stroke_threshold
+from scissorcal.recording.resolution import GAP_FACTOR, StrokeThreshold, stroke_threshold
 from scissorcal.recording.strokes import label_strokes
-from scissorcal.recording.summarising import gap_note
+from scissorcal.recording.summarising import gap_cost, gap_note
 from scissorcal.recording.table import Table, read_table
-
-GAP_FACTOR = 1.5
-"""A step longer than this many usual ones is a gap: a sample is missing."""
+from scissorcal.recording.wraps import continued
 
 WRAP = 2.0**32
 """Where the counter of a logger's clock begins at 0 again: 32 bits of us last 71.6 min."""
 NEAR_WRAP = 0.01
 """Before and after that its time is within this share of the counter's range of either end."""
+MOST_PLACES = 3
+"""Places that a note lists."""
 SHORT_SHARE, MANY = 0.25, 20
 """More strokes than MANY, half of them shorter than this share of the range, are worth a note."""
 
@@ -63,7 +63,8 @@ def import_table(
     A stroke travels at least ``min_travel`` [rad, or m]; where that is not given, so far that
     neither noise nor steps of the sensor make a stroke (`stroke_threshold`), which a note states.
     The last line of a text file is left out where it has no end, unless ``drop_last_line`` is
-    false. A clock of 32 bits that begins at 0 again is continued, with a note.
+    false. A clock of 32 bits that begins at 0 again is continued, with a note; so is an angle that
+    begins again after a full turn, or a counter after its last number.
 
     A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
     it and notes it. Both clocks begin at 0 and are rounded to 1 us.
@@ -92,6 +93,7 @@ def import_table(
     for channel in set(columns) - {"time"}:
         samples[channel] = table.columns[channel].values * quantities[channel].factor
     said = list(table.notes)
+    said += _go_on(samples, table, joint)
     if rate_Hz is not None:
         _set_regular_clock(samples, rate_Hz)
     else:
@@ -181,7 +183,8 @@ def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_
             f"{table.place(row, 'time')}: {steps[gaps[0]] * 1e-6:.6g} s since the row "
             f"before, where {usual * 1e-6:.6g} s are usual ({len(gaps)} such gaps in all, the "
             f"longest {steps.max() * 1e-6:.6g} s). Allow gaps (--allow-gaps) to keep them, "
-            "with a note, or export the log without gaps."
+            "with a note, or export the log without gaps. "
+            f"{gap_cost(microseconds * 1e-6).sentence}"
         )
     counts = np.maximum(1, np.rint(steps / usual)).astype(np.int64)
     samples["sequence"] = np.concatenate([[0], np.cumsum(counts)]) % 2**32
@@ -220,6 +223,19 @@ def _continued(table: Table) -> tuple[Table, list[str]]:
     places = ", ".join(table.place(int(row) + 1).rpartition(", ")[2] for row in falls)
     note = f"The clock begins at 0 again at {places}, after 2^32: it was continued."
     return replace(table, columns=columns), [note]
+
+
+def _go_on(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
+    """Continue a position that begins again; give a sentence on it."""
+    turn = 2.0 * math.pi if joint.kind == "rotary" else None
+    position = np.asarray(samples["opening"], dtype=np.float64)
+    found, places = continued(position, table.columns["opening"].values, turn)
+    if not len(places):
+        return []
+    samples["opening"] = found
+    listed = ", ".join(table.place(int(row)).rpartition(", ")[2] for row in places[:MOST_PLACES])
+    more = f" and {len(places) - MOST_PLACES} more" if len(places) > MOST_PLACES else ""
+    return [f"The opening begins again at {listed}{more}, after its period: it was continued."]
 
 
 def _label(
@@ -263,4 +279,6 @@ def _notes(
     notes += said
     if samples["stroke"].max() < 0:
         notes.append("No stroke was found: the joint moves less than the least travel.")
-    return (*notes, *gap_note(samples))
+    gaps = gap_note(samples)
+    cost = [gap_cost(samples["device_time_us"] * 1e-6).sentence] if gaps else []
+    return (*notes, *gaps, *cost)

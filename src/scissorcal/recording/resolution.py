@@ -1,4 +1,4 @@
-"""What a position sensor can tell apart: its step, its noise, and the least stroke that is one."""
+"""What samples can tell apart: a sensor's step and noise, the least stroke, gaps of the clock."""
 
 import math
 from dataclasses import dataclass
@@ -23,6 +23,16 @@ MOST_NOISE_SHARE = 0.25
 """Of the range: what is taken for noise never makes a stroke of a larger share no stroke."""
 ORDERS = range(2, 9)
 """Differences from which noise is told: a motion of x rad a sample leaves (2 sin(x/2))^k of it."""
+
+GAP_FACTOR = 1.5
+"""A step longer than this many usual ones is a gap: a sample is missing."""
+EDGE_S = 0.05
+"""Time left out at both ends of a piece, where a zero-phase filter sees no neighbours; gaps up to
+this length are bridged."""
+EDGES = 4
+"""Least length of a piece in edges, so that at least half of it can be used."""
+FEWEST_SAMPLES = 20
+"""Samples that a piece must exceed for a 4th-order filter and a window of one knot to fit in."""
 
 
 @dataclass(frozen=True)
@@ -92,3 +102,22 @@ def _noise_from(values: Array, order: int) -> float:
     # 0.6745: the median of |x| for a standard normal x.
     spread = float(np.median(np.abs(np.diff(values, order)))) / 0.6745
     return spread / math.sqrt(math.comb(2 * order, order))
+
+
+def edge_samples(rate_Hz: float) -> int:
+    """Samples that ``EDGE_S`` lasts at a sampling rate, one at least.
+
+    >>> edge_samples(1000.0), edge_samples(200.0)
+    (50, 10)
+    """
+    return max(1, round(EDGE_S * rate_Hz))
+
+
+def is_short(step: Array, usual: float) -> NDArray[np.bool_]:
+    """Which steps (n,) of a clock miss no more samples than an edge has: such gaps are bridged."""
+    return np.asarray(np.rint(step / usual) - 1 <= edge_samples(1.0 / usual))
+
+
+def long_enough(samples: int, usual: float) -> bool:
+    """Whether a stretch of so many samples is long enough for a rate."""
+    return samples > max(EDGES * edge_samples(1.0 / usual), FEWEST_SAMPLES)

@@ -1,6 +1,7 @@
-"""A recording in numbers: duration, rate, gaps, strokes and ranges."""
+"""A recording in numbers: duration, rate, gaps and what they cost, strokes and ranges."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,18 @@ from numpy.typing import NDArray
 
 from scissorcal.recording.layout import MEASURED, unit_of
 from scissorcal.recording.recording import Recording, Stroke
+from scissorcal.recording.resolution import (
+    EDGE_S,
+    GAP_FACTOR,
+    edge_samples,
+    is_short,
+    long_enough,
+)
+
+Array = NDArray[np.float64]
+
+KNOT_S = 0.0049
+"""Knot distance of a fit's windows at the usual cutoff of 75 Hz; a window lasts three of them."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +35,29 @@ class Gaps:
     missing: int
     longest: int
     longest_at_s: float
+
+
+@dataclass(frozen=True)
+class GapCost:
+    """What gaps cost a fit: ``lost_s`` of ``recorded_s``, about; ``bridged`` of ``gaps`` are short.
+
+    A window that touches a bridged gap is lost; at a longer one an edge on either side is, and so
+    is a stretch between two of them that is too short.
+    """
+
+    gaps: int
+    bridged: int
+    lost_s: float
+    recorded_s: float
+
+    @property
+    def sentence(self) -> str:
+        """The cost in words."""
+        return (
+            f"A fit of friction bridges gaps of up to {EDGE_S:g} s (here {self.bridged} of "
+            f"{self.gaps}), uses no window that touches one, and leaves out {EDGE_S:g} s on either "
+            f"side of a longer one: about {self.lost_s:.3g} s of {self.recorded_s:.3g} s."
+        )
 
 
 @dataclass(frozen=True)
@@ -123,6 +159,27 @@ def gap_note(samples: NDArray[np.void]) -> tuple[str, ...]:
     return (
         f"{gaps.missing} frames are missing in {where}, the longest "
         f"({gaps.longest} frames) at {gaps.longest_at_s:.3f} s.",
+    )
+
+
+def gap_cost(time_s: Array) -> GapCost:
+    """What the gaps of a clock (n,) cost, n > 1."""
+    step = np.diff(time_s)
+    usual = float(np.median(step))
+    gaps = step > GAP_FACTOR * usual
+    bridged = gaps & is_short(step, usual)
+    ends = np.concatenate([[0], np.flatnonzero(gaps & ~bridged) + 1, [len(time_s)]])
+    edge, window = edge_samples(1.0 / usual) * usual, 3 * max(1, round(KNOT_S / usual)) * usual
+    lost = 0.0
+    for low, high in pairwise(ends):
+        inside = bridged[low : high - 1]
+        count = (high - low) * usual
+        whole = long_enough(int(high - low + np.sum(step[low : high - 1][inside]) / usual), usual)
+        windows = (window - usual) * np.count_nonzero(inside)
+        at_ends = edge * (int(low > 0) + int(high < len(time_s)))
+        lost += min(count, windows + at_ends) if whole else count
+    return GapCost(
+        int(np.count_nonzero(gaps)), int(np.count_nonzero(bridged)), lost, usual * len(time_s)
     )
 
 

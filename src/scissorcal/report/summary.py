@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scissorcal.calibration.plateau import LEAST_PLATEAU, Plateau
 from scissorcal.calibration.stroke_intervals import Interval
 from scissorcal.report.html import made_line, panel_section, parts_nav, prose, whole_page
 from scissorcal.report.panel import (
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
         Curves,
         Difference,
         LogSummary,
-        Plateau,
     )
 
 PART = "summary"
@@ -98,14 +98,13 @@ def summary_panels(shown: Shown) -> list[Panel]:
 
 def _figures(shown: Shown) -> Panel:
     log, place = shown.log, _place_unit(shown)
-    rows = [_row("closing, mean", log.mean, shown.unit, "over the range, positive: resists")]
+    sense = "positive: resists" if log.signed else "sign as recorded, not determined"
+    rows = [_row("closing, mean", log.mean, shown.unit, f"over the range, {sense}")]
     if shown.has_work:
         rows.append(_row("work of a closing stroke", log.work, "J"))
         rows += _per_length(shown, log.work)
     if shown.plateau:
-        low, high = (_in_shown(shown, end) for end in (shown.plateau.low, shown.plateau.high))
-        note = f"level from {low:.3g} to {high:.3g} {place}"
-        rows.append(_row("plateau, closing", shown.plateau.level, shown.unit, note))
+        rows += _plateau(shown, shown.plateau, "plateau, closing")
     slope = _times(shown.slope, _per(shown))
     rows.append(_row("slope, closing", slope, f"{shown.unit}/{place}"))
     if shown.friction:
@@ -129,8 +128,34 @@ def _figures(shown: Shown) -> Panel:
         _sentence(shown),
         rows=tuple(rows),
         notes=_notes(shown),
-        caption="Means over strokes with 90 % intervals by Student's t; a stroke is the unit.",
+        caption=(
+            "Means over strokes with 90 % intervals by Student's t; a stroke is the unit. The ends "
+            "of a plateau: 5 % and 95 % of draws of the strokes with replacement."
+        ),
     )
+
+
+def _plateau(shown: Shown, plateau: Plateau, name: str) -> list[Row]:
+    """How high a plateau is and where it begins and ends; none where it is not determined."""
+    if not plateau.determined:
+        return []
+    rows, strokes = [_row(name, plateau.level, shown.unit)], plateau.level.strokes
+    ends = (("from", plateau.low, plateau.low_ends), ("to", plateau.high, plateau.high_ends))
+    for word, end, spread in ends:
+        low, high = spread or (None, None)
+        found = Interval(end, low, high, strokes)
+        place = _times(found, 1.0 / _per(shown))
+        rows.append(_row(f"{name}: {word}", place, _place_unit(shown)))
+    return rows
+
+
+def _on_plateau(plateau: Plateau | None) -> list[str]:
+    if plateau is None or plateau.determined:
+        return []
+    return [
+        f"Whether there is a plateau is not determined: in {1.0 - (plateau.share or 0.0):.0%} of "
+        "the draws of these strokes there is none. Record more strokes."
+    ]
 
 
 def _sentence(shown: Shown) -> str:
@@ -163,7 +188,7 @@ def _per_length(shown: Shown, work: Interval) -> list[Row]:
 
 
 def _notes(shown: Shown) -> tuple[str, ...]:
-    found = list(shown.notes)
+    found = [*shown.notes, *_on_plateau(shown.plateau)]
     if shown.cut_length_m and shown.log.share < LEAST_SHARE:
         found.append(
             f"The range is {shown.log.share:.0%} of a closing stroke of {shown.log.source}: how "
@@ -171,15 +196,35 @@ def _notes(shown: Shown) -> tuple[str, ...]:
             "length. Compare with strokes over the same range."
         )
     for log in (shown.log, *((shown.second,) if shown.second else ())):
-        if log.turned:
-            found.append(
-                f"{log.source}: the sign was changed, so that what resists closing is positive."
-            )
+        found += _on_sign(shown, log)
         if log.left_out:
             found.append(f"{log.source}: {log.left_out} strokes do not reach over the range.")
+        if log.holed:
+            found.append(
+                f"{log.source}: {log.holed} strokes have a hole of {LEAST_PLATEAU:.0%} of the "
+                "range or more, and are left out."
+            )
         if log.mean.low is None:
             found.append(f"{log.source}: fewer than 3 closing strokes, so there is no interval.")
     return tuple(found)
+
+
+def _on_sign(shown: Shown, log: LogSummary) -> list[str]:
+    """What decided the sign, where it was changed or is not determined."""
+    what = "closing minus opening" if log.opening else "the closing strokes' mean"
+    as_recorded = f"{what} is {_words(log.sign, shown.unit)} as recorded (99.8 %)"
+    if log.turned:
+        return [
+            f"{log.source}: the sign was changed, so that what resists closing is positive: "
+            f"{as_recorded}."
+        ]
+    if log.signed:
+        return []
+    return [
+        f"{log.source}: which sign resists closing is not determined, and the sign is as recorded: "
+        f"{as_recorded}. If it is the wrong way round, give the scale -1 (-s CHANNEL=-1); to have "
+        "it determined, record more strokes in both directions."
+    ]
 
 
 def _curves(shown: Shown) -> Panel:
@@ -229,9 +274,7 @@ def _difference(shown: Shown, apart: Difference) -> Panel:
         rows.append(_row("work of a closing stroke", apart.work, "J"))
         rows += _per_length(shown, apart.work)
     if apart.plateau:
-        low, high = (_in_shown(shown, end) for end in (apart.plateau.low, apart.plateau.high))
-        note = f"level from {low:.3g} to {high:.3g} {_place_unit(shown)}"
-        rows.append(_row("plateau", apart.plateau.level, shown.unit, note))
+        rows += _plateau(shown, apart.plateau, "plateau")
     rows.append(
         _row("slope", _times(apart.slope, _per(shown)), f"{shown.unit}/{_place_unit(shown)}")
     )
@@ -240,6 +283,7 @@ def _difference(shown: Shown, apart: Difference) -> Panel:
         PART,
         "Log minus blank" if shown.against == "blank" else "First log minus second",
         rows=tuple(rows),
+        notes=tuple(_on_plateau(apart.plateau)),
         charts=(
             Chart(
                 "difference-chart",

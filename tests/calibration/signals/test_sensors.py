@@ -237,3 +237,41 @@ def test_a_dead_band_of_a_noisy_sensor_is_still_found(width_N: float) -> None:
     inside = np.abs(slow) < 0.5 * width_N
     assert np.mean(~found.usable[0][inside]) > 0.9
     assert any("a dead band" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("mark", [9999.0, -32768.0])
+def test_marks_of_overflow_are_told_from_measurements(mark: float) -> None:
+    rng = np.random.default_rng(4)
+    torque = 0.05 * np.sign(np.sin(np.arange(6000) / 300)) + rng.normal(0.0, 0.01, 6000)
+    for values, marked in (
+        (torque, 0),
+        (_marked(torque, mark, 2), 2),
+        (_marked(torque, mark, 1), 0),
+    ):
+        samples = np.zeros(6000, SAMPLE_DTYPE)
+        samples["device_time_us"] = np.arange(6000) * 1000
+        samples["opening"], samples["motor_torque"] = np.sin(np.arange(6000) / 300), values
+        one = Recording("friction", samples, source="a.csv")
+        (channel,) = channels_of(one, ("motor_torque",))
+        assert channel.marks == ((mark,) if marked else ())
+        assert channel.saturated.sum() == marked
+        found = inspect_sensors((one,))
+        assert found.verdict.status == "pass"
+        told = [said for said in found.notes if f"exactly {mark:g} N m in 2 samples" in said]
+        assert len(told) == (1 if marked else 0)
+
+
+def _marked(values, mark, count):
+    other = values.copy()
+    other[np.arange(count) * 700 + 50] = mark
+    return other
+
+
+def test_a_level_of_one_direction_is_no_mark() -> None:
+    samples = np.zeros(6000, SAMPLE_DTYPE)
+    samples["device_time_us"] = np.arange(6000) * 1000
+    samples["opening"] = np.sin(np.arange(6000) / 300)
+    closing = np.cos(np.arange(6000) / 300) < 0.0
+    samples["motor_torque"] = np.where(closing, 0.1 + 0.01 * samples["opening"], -0.1)
+    (channel,) = channels_of(Recording("cut", samples), ("motor_torque",))
+    assert channel.marks == ()

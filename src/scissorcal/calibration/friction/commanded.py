@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.refusals import FEWEST_BINS
-from scissorcal.calibration.signals.segments import pieces_of
+from scissorcal.calibration.signals.segments import bridge
 from scissorcal.calibration.signals.weak_form import HELD, Windows, weigh
 from scissorcal.calibration.signals.window_length import spline
 from scissorcal.kernel import presliding_path
@@ -134,15 +134,16 @@ def find_actuation(recordings: tuple[Recording, ...], cutoff_Hz: float) -> Actua
     columns = _columns(windows)
     weights = np.pad(spline(len(windows.weights) // 3), 1)
     commands = [np.asarray(one.samples["force_command"], dtype=np.float64) for one in recordings]
-    kept, pieces = [driven(one) for one in recordings], [pieces_of(one) for one in sliding]
+    kept = [driven(one) for one in recordings]
+    filled = [bridge(one, np.ones(len(one.samples), dtype=bool)) for one in sliding]
 
     def badness(point: Array) -> float:
         actuation = Actuation(*np.abs(point).tolist())
         force = np.concatenate(
             [
-                two_tick_means(command, actuation)[mask][low:high]
-                for command, mask, bounds in zip(commands, kept, pieces, strict=True)
-                for low, high in bounds
+                two_tick_means(command, actuation)[mask][one.source][low:high]
+                for command, mask, one in zip(commands, kept, filled, strict=True)
+                for low, high in one.pieces
             ]
         )
         drive = sliding_window_view(force, len(weights))[windows.first] @ weights

@@ -55,6 +55,7 @@ from scissorcal.calibration.signals.soundness import refuse_unsound
 from scissorcal.calibration.signals.steadiness import Steadiness, steadiness
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
+from scissorcal.calibration.signals.window_length import HALF_AT
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros, zero_verdicts
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import Posterior, Stop, infer
@@ -111,7 +112,8 @@ def fit_friction(
     again = partial(_slid, steady, cleaned, settings.cutoff_Hz, sensors.usable)
     every = again()
     windows = every.where(every.bins.moving)
-    refuse_friction(recordings, settings, every, windows, sensors)
+    usage = usage_of_windows(recordings, every, sensors.usable)
+    refuse_friction(recordings, settings, every, windows, sensors, usage)
     slow = SlowFriction.of(recordings, windows.bins, settings)
     settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
@@ -128,7 +130,6 @@ def fit_friction(
     between = compare_recordings(law, chosen.optimum.point, recordings, usual, rng)
     posterior = widened(posterior, between, rng)
     unshown = ("inertia",) if hidden_from_sweeps(law, recordings) else ()
-    usage = usage_of_windows(recordings, every, sensors.usable)
     verdicts: tuple[Verdict, ...] = ()
     if prior is None:
         swung = inertia_verdict(law, posterior.draws, recordings)
@@ -283,7 +284,11 @@ def _bandwidth(
         return not_evaluated("fit.friction", "bandwidth", why)
     other_Hz = next_cutoff(law.windows)
     if other_Hz is None:
-        why = "No window is shorter than those of this cutoff: lower fit.friction.cutoff_Hz."
+        longer_Hz = HALF_AT / (2.0 * law.windows.tick_s)
+        why = (
+            "No window is shorter than those of this cutoff at this sampling rate: set "
+            f"fit.friction.cutoff_Hz to {longer_Hz:.3g} or less, or log at a higher rate."
+        )
         return Verdict("fit.friction", "bandwidth", "fail", None, None, why)
     every = weighed(window_Hz=other_Hz)
     windows = every.where(every.bins.moving)
@@ -312,7 +317,7 @@ def _notes(
     notes = [
         f"{left:.1%} of the time is left out: the joint rests, turns or moves by less than "
         f"{every.bins.rate_floor:.2g} {joint.position_unit}/s (below that the encoder does not "
-        "show the direction), or a sensor is faulty."
+        "show the direction), samples are missing, or a sensor is faulty."
     ]
     if windows.lengthening > 1.0:
         notes.append(

@@ -1,20 +1,26 @@
 """Motion and terms that cannot determine friction: refused, with what to record instead."""
 
 import numpy as np
+from scipy.stats import t as student
 
-from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.filtering import Bins, position_error
 from scissorcal.calibration.signals.interruptions import interruptions
+from scissorcal.calibration.signals.segments import gaps_in_words
 from scissorcal.calibration.signals.sensors import Sensors
+from scissorcal.calibration.signals.usage import EDGE, GAP, INVALID, SLOW, Usage
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.errors import InputError
 from scissorcal.model.friction_terms import TERMS, terms_of
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Joint, Recording
-from scissorcal.recording.resolution import resolution_of
 
 FEWEST_BINS = 200
 LEAST_TRAVEL_S = 0.1
 """Travel of so many seconds at the slowest certain rate is motion, if a slow one."""
+DRIFT_RATE = 1e-3
+"""Chance with which an interval that says of a drift that it exceeds friction is wrong."""
+STROKE_WINDOWS = 2.0
+"""In strokes of so many windows' length half of the windows hold a turn, in shorter ones most."""
 
 
 def refuse_friction(
@@ -23,36 +29,100 @@ def refuse_friction(
     every: Windows,
     windows: Windows,
     sensors: Sensors,
+    usage: Usage,
 ) -> None:
     """Raise InputError where the moving windows cannot determine what ``settings`` ask for."""
     joint = recordings[0].joint
-    _refuse_poor_motion(windows.bins, every.bins, recordings, joint, sensors)
+    if len(windows.first) < FEWEST_BINS:
+        raise _too_little(recordings, every, windows, sensors, usage)
+    _refuse_poor_motion(windows.bins, recordings, joint)
+    _refuse_drift(windows.bins, recordings, joint)
     _refuse_terms(settings, windows, joint)
 
 
-def _refuse_poor_motion(
-    bins: Bins, every: Bins, recordings: tuple[Recording, ...], joint: Joint, sensors: Sensors
-) -> None:
-    names = ", ".join(recording.source or "the recording" for recording in recordings)
-    if len(bins.rate) < FEWEST_BINS:
-        travel = float(np.ptp(every.opening)) if len(every.opening) else 0.0
-        if sensors.verdict.status == "fail":
-            raise InputError(f"{names}: too few samples are left to fit. {sensors.verdict.why}")
-        broken = interruptions(recordings)
-        if broken.decide:
-            raise InputError(f"{names}: too few samples are left to fit. {broken.sentence}")
-        if 0 < LEAST_TRAVEL_S * every.rate_floor < travel:
-            raise InputError(
-                f"{names}: the joint travels {travel:.3g} {joint.position_unit}, but nearly always "
-                f"below {every.rate_floor:.2g} {joint.position_unit}/s, where the encoder does not "
-                "show its direction: record faster sweeps, or lower fit.friction.cutoff_Hz."
-            )
-        raise InputError(
-            f"{names}: there is hardly any motion ({travel:.3g} {joint.position_unit} of travel, "
-            f"{len(bins.rate) * bins.bin_s:.2g} s of it moving). Friction needs at least "
-            f"{FEWEST_BINS * bins.bin_s:.1g} s of motion: capture sweeps in both directions at "
-            f"several speeds.{_coarse(recordings, every, joint)}"
+def _too_little(
+    recordings: tuple[Recording, ...],
+    every: Windows,
+    windows: Windows,
+    sensors: Sensors,
+    usage: Usage,
+) -> InputError:
+    """The error of recordings of which too little is left: what became of them, and the cause.
+
+    The cause is what most of the time was lost to, not the last filter that found nothing.
+    """
+    lost, broken = usage.lost, interruptions(recordings)
+    needed_s, used_s = FEWEST_BINS * every.bins.bin_s, len(windows.first) * every.bins.bin_s
+    parted = lost.get(GAP, 0.0) + lost.get(EDGE, 0.0)
+    slow, invalid = lost.get(SLOW, 0.0), lost.get(INVALID, 0.0)
+    if invalid > max(slow, parted) and sensors.verdict.status == "fail":
+        cause = sensors.verdict.why
+    elif broken.decide:
+        cause = broken.sentence
+    elif parted > max(slow, invalid):
+        cause = (
+            f"Most of the rest went to gaps and the ends of pieces: {gaps_in_words(recordings)} "
+            "Record for longer, and without losing samples."
         )
+    else:
+        cause = _motion_cause(recordings, every)
+    names = ", ".join(recording.source or "the recording" for recording in recordings)
+    return InputError(
+        f"{names}: {used_s:.3g} s of motion are left to fit, and friction needs at least "
+        f"{needed_s:.3g} s. {cause} {usage.counted}: {len(windows.first)} of {len(every.first)} "
+        "windows."
+    )
+
+
+def _motion_cause(recordings: tuple[Recording, ...], every: Windows) -> str:
+    """Why the joint's own motion leaves too few windows without a rest or a turn."""
+    unit, floor = recordings[0].joint.position_unit, every.bins.rate_floor
+    travel = max(float(np.ptp(one.samples["opening"])) for one in recordings)
+    below = float(np.mean(np.abs(every.rate) <= floor)) if len(every.rate) else 1.0
+    window_s, stroke_s = len(every.weights) * every.tick_s, _stroke_s(recordings)
+    if stroke_s < STROKE_WINDOWS * window_s:
+        return (
+            f"The joint turns too soon: half of the strokes last less than {stroke_s:.2g} s, and "
+            f"windows of {window_s:.2g} s are needed that hold no turn. Make longer strokes, or "
+            "log them at a higher rate."
+        )
+    if travel > LEAST_TRAVEL_S * floor > 0.0 and below > 0.5:
+        return (
+            f"The joint travels {travel:.3g} {unit}, but {below:.0%} of the time below "
+            f"{floor:.2g} {unit}/s, where {_hiding(recordings, unit)} does not show its direction: "
+            "record faster sweeps, or lower fit.friction.cutoff_Hz."
+        )
+    hidden = ""
+    if floor > 0.0 and travel > 0.0:
+        hidden = f" Below {floor:.2g} {unit}/s {_hiding(recordings, unit)} hides the motion."
+    return (
+        f"There is hardly any motion ({travel:.3g} {unit} of travel): capture sweeps in both "
+        f"directions at several speeds.{hidden}"
+    )
+
+
+def _stroke_s(recordings: tuple[Recording, ...]) -> float:
+    """Median time of the strokes; infinite where there are none."""
+    found = [
+        float(np.median(np.diff(one.device_time_s))) * np.bincount(label[label >= 0])
+        for one in recordings
+        if np.any((label := np.asarray(one.samples["stroke"], dtype=np.int64)) >= 0)
+    ]
+    return float(np.median(np.concatenate(found))) if found else float("inf")
+
+
+def _hiding(recordings: tuple[Recording, ...], unit: str) -> str:
+    """What hides the sense of motion: the encoder's step, or the noise of the position."""
+    errors = [position_error(np.asarray(one.samples["opening"], float)) for one in recordings]
+    worst = max(errors, key=lambda one: one.sd)
+    if np.isfinite(worst.step) and worst.sd < worst.step:
+        turned = f" ({np.degrees(worst.step):.3g} deg)" if unit == "rad" else ""
+        return f"the encoder's step of {worst.step:.3g} {unit}{turned}"
+    return f"the position's noise of {worst.sd:.2g} {unit}"
+
+
+def _refuse_poor_motion(bins: Bins, recordings: tuple[Recording, ...], joint: Joint) -> None:
+    names = ", ".join(recording.source or "the recording" for recording in recordings)
     if not (np.any(bins.rate > 0) and np.any(bins.rate < 0)):
         missing = "negative (closing)" if np.all(bins.rate > 0) else "positive (opening)"
         raise InputError(
@@ -66,20 +136,39 @@ def _refuse_poor_motion(
         )
 
 
-def _coarse(recordings: tuple[Recording, ...], every: Bins, joint: Joint) -> str:
-    """That the encoder's step hides the motion, where it has one and the sweeps are slower."""
-    steps = [resolution_of(np.asarray(one.samples["opening"], float)) for one in recordings]
-    step = max((one for one in steps if np.isfinite(one)), default=0.0)
-    moved = any(np.ptp(one.samples["opening"]) > step for one in recordings)
-    if not step or not every.rate_floor or not moved:
-        return ""
-    shown = f"{step:.3g} {joint.position_unit}"
-    if joint.kind == "rotary":
-        shown += f" ({np.degrees(step):.3g} deg)"
-    return (
-        f" The encoder's step of {shown} hides motion below {every.rate_floor:.2g} "
-        f"{joint.position_unit}/s: use a finer encoder, or faster sweeps."
-    )
+def _refuse_drift(bins: Bins, recordings: tuple[Recording, ...], joint: Joint) -> None:
+    """Refuse a torque whose zero drifts over a recording by more than friction.
+
+    The means of runs of one direction are regressed on time and direction; only where both
+    intervals are clear of each other is it said, at a false-alarm rate of ``DRIFT_RATE`` each.
+    """
+    for index in np.unique(bins.recording):
+        own = bins.where(bins.recording == index)
+        run = np.cumsum(np.diff(np.sign(own.rate), prepend=np.sign(own.rate[0])) != 0)
+        counts = np.bincount(run)
+        time, drive, way = (
+            np.bincount(run, values) / counts
+            for values in (own.time_s, own.drive, np.sign(own.rate))
+        )
+        freedom = len(counts) - 3
+        if freedom < 3 or np.ptp(time) == 0.0:
+            continue
+        columns = np.column_stack([(time - time.mean()) / np.ptp(time), way, np.ones(len(time))])
+        found, *_ = np.linalg.lstsq(columns, drive, rcond=None)
+        size = np.sqrt(np.sum((drive - columns @ found) ** 2) / freedom)
+        error = size * np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns)))
+        reach = float(student.isf(DRIFT_RATE / 2.0, freedom)) * error
+        drift, friction = np.abs(found[:2]).tolist()
+        if drift - reach[0] > friction + reach[1]:
+            unit = joint.effort_unit
+            raise InputError(
+                f"{recordings[index].source or 'the recording'}: the torque's zero drifts by "
+                f"{drift:.2g} {unit} (+- {reach[0]:.1g}) from {time.min():.3g} to {time.max():.3g} "
+                f"s, more than friction holds ({friction:.2g} +- {reach[1]:.1g} {unit}), so that "
+                "friction is not to be told from it. Let the sensor warm up, or record shorter "
+                "logs with the joint at rest and the motors off before and after, and import "
+                "them again."
+            )
 
 
 def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None:

@@ -6,12 +6,14 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.recording.resolution import resolution_of
+from scissorcal.recording.resolution import noise_of, resolution_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 BIN_S = 0.005
+HIGHEST = 0.4
+"""A filter passes half at no more than this share of the sampling rate."""
 PASSING = 0.01
 """Share of the motion below whose rate a joint only passes through."""
 REMEMBERED = 10.0
@@ -66,7 +68,7 @@ def low_pass(values: Array, cutoff_Hz: float, rate_Hz: float) -> Array:
     Worked out in the frequency domain: importing scipy.signal takes as long as fitting a law. Both
     ends are continued by their point reflection, as far as the filter remembers.
     """
-    corner = np.tan(np.pi * min(cutoff_Hz, 0.4 * rate_Hz) / rate_Hz)
+    corner = np.tan(np.pi * min(cutoff_Hz, HIGHEST * rate_Hz) / rate_Hz)
     beyond = min(len(values) - 1, math.ceil(REMEMBERED * rate_Hz / cutoff_Hz))
     before = 2 * values[0] - values[beyond:0:-1]
     after = 2 * values[-1] - values[-2 : -beyond - 2 : -1]
@@ -78,19 +80,38 @@ def low_pass(values: Array, cutoff_Hz: float, rate_Hz: float) -> Array:
     return np.asarray(smooth[beyond : beyond + len(values)])
 
 
-def rate_floor(position: Array, cutoff_Hz: float, rate_Hz: float) -> float:
-    """Three standard deviations of the rate that the encoder's steps alone would give."""
-    steps = np.abs(np.diff(position))
-    moved = steps[steps > 0]
-    if len(moved) == 0:
-        return 0.0
-    seen = resolution_of(position)
-    step = seen if np.isfinite(seen) else float(np.quantile(moved, 0.01))
-    return rate_floor_of_step(step, cutoff_Hz, rate_Hz)
+@dataclass(frozen=True)
+class PositionError:
+    """What hides a motion: the sensor's ``step`` (NaN: none to be seen), its error's ``sd``."""
+
+    step: float
+    sd: float
+
+
+def position_error(position: Array) -> PositionError:
+    """The error of a position sensor, from a whole recording (m,).
+
+    Its standard deviation is that of the steps, step / sqrt(12), or of the noise where that exceeds
+    a step: a table has steps of its last digit, however noisy the sensor. Of a part of a recording
+    it must not be taken: a steady motion has even steps, and would hide itself.
+    """
+    step, noise = resolution_of(position), noise_of(position)
+    noise = noise if np.isfinite(noise) else 0.0
+    if not np.isfinite(step) or noise > step:
+        return PositionError(step, noise)
+    return PositionError(step, float(step / np.sqrt(12.0)))
+
+
+def rate_floor(sd: float, cutoff_Hz: float, rate_Hz: float) -> float:
+    """Three standard deviations of the rate that white noise ``sd`` of the position gives.
+
+    The position is low-passed as :func:`low_pass` does, at no more than 0.4 of the sampling rate.
+    """
+    passed_Hz = min(cutoff_Hz, HIGHEST * rate_Hz)
+    noise = 2 * np.pi * passed_Hz / np.sqrt(3) * sd * np.sqrt(2 * passed_Hz / rate_Hz)
+    return float(3 * noise)
 
 
 def rate_floor_of_step(step: float, cutoff_Hz: float, rate_Hz: float) -> float:
     """The same of an encoder whose step is known, as before a capture."""
-    share = min(2 * cutoff_Hz / rate_Hz, 1.0)
-    noise = 2 * np.pi * cutoff_Hz / np.sqrt(3) * step / np.sqrt(12) * np.sqrt(share)
-    return float(3 * noise)
+    return rate_floor(step / np.sqrt(12.0), cutoff_Hz, rate_Hz)

@@ -1,7 +1,8 @@
 """Sensor faults in a recording: quantisation, saturation, dead bands, constant channels."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -29,6 +30,11 @@ EQUAL_HALF_STEPS = 0.55
 """Half a step, and a tenth more for what the noise's own estimate may be off."""
 BLOCK = 50
 """Second differences whose mean square is one estimate of the noise: known to 20 %."""
+FAR = 100.0
+"""Ranges of a channel's other values: a sensor that resolves a hundredth of what it measures would
+have a range of 10,000 steps to reach so far."""
+FEWEST_LEVELS = 4
+"""Different values without which none lies apart: two ends, and a range within them."""
 FEWEST_INVALID_S = 0.02
 NEAR_S = 0.05
 """The joint moves where its position changes more than twice within this time before and after."""
@@ -61,6 +67,9 @@ class Channel:
 
     ``step`` is its resolution (NaN: none to be seen), ``saturated`` and ``dead`` (m,) mark
     samples at an end of its range and within a dead band; ``low`` and ``high`` are those ends.
+    ``marks`` are values so far from all others that they are no measurement (see
+    :func:`_marks_in`); their samples count as saturated. ``at_ends`` is the share of samples at
+    ``low`` or ``high``, whether or not the sensor is cut off there.
     """
 
     name: str
@@ -70,6 +79,13 @@ class Channel:
     dead: Mask
     low: float
     high: float
+    marks: tuple[float, ...] = ()
+    at_ends: float = 0.0
+
+    @property
+    def mostly_at_ends(self) -> bool:
+        """Whether the sensor tells more of its range than of what it measures."""
+        return not self.constant and self.at_ends > WITHIN
 
 
 @dataclass(frozen=True)
@@ -110,12 +126,12 @@ def inspect_sensors(recordings: tuple[Recording, ...], scope: Scope = "fit.frict
     return Sensors(tuple(usable), tuple(notes), _verdict(scope, worst, named))
 
 
-def channels_of(recording: Recording) -> tuple[Channel, ...]:
-    """Inspect the channels that a fit of this recording uses, the position first."""
+def channels_of(recording: Recording, names: Sequence[str] | None = None) -> tuple[Channel, ...]:
+    """Inspect channels by name; if none are given, those that a fit uses, the position first."""
     samples = recording.samples
-    names = ["opening", "motor_torque"]
-    if np.isfinite(recording.handle_radius_m):
-        names.append("handle_force")
+    if names is None:
+        force = ["handle_force"] if np.isfinite(recording.handle_radius_m) else []
+        names = ["opening", "motor_torque", *force]
     opening = np.asarray(samples["opening"], dtype=np.float64)
     time = recording.device_time_s
     tick_s = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
@@ -131,8 +147,14 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
     low, high = float(values.min()), float(values.max())
     none = np.zeros(len(values), dtype=bool)
     constant, step = low == high, resolution_of(values)
+    at_ends = float(np.mean((values == low) | (values == high)))
     if constant or name == "opening":
-        return Channel(name, constant, step, none, none, low, high)
+        return Channel(name, constant, step, none, none, low, high, at_ends=at_ends)
+    marks = _marks_in(values)
+    if marks:
+        marked = np.isin(values, marks)
+        rest = _inspect(name, np.where(marked, values[~marked][0], values), moves, tick_s)
+        return replace(rest, saturated=rest.saturated | marked, marks=marks)
     long_run = max(FEWEST_IN_RUN, round(LONG_RUN_S / tick_s))
     fewest = max(2 * FEWEST_IN_RUN, round(FEWEST_INVALID_S / tick_s))
     hold, alike = _repetition(values)
@@ -146,7 +168,30 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
             dead = silent
     else:
         ends = _held_ends(values, moves, step, long_run, fewest)
-    return Channel(name, constant, step, np.isin(values, ends), dead, low, high)
+    cut = np.isin(values, ends)
+    return Channel(name, constant, step, cut, dead, low, high, at_ends=at_ends)
+
+
+def _marks_in(values: Array) -> tuple[float, ...]:
+    """Values that mark an overflow or a loss: 9999, -32768 and the like.
+
+    An end of the range counts that comes at least twice to the last digit, and lies farther from
+    the next value than all values within the ends are apart. What is sampled while it moves has
+    values on its way, so that no measurement lies so far off; a single spike never repeats. A value
+    that is held for more of the time than ``INVALID_LIMIT`` may be a level, unless it lies ``FAR``
+    times farther off.
+    """
+    levels, counts = np.unique(values, return_counts=True)
+    if len(levels) < FEWEST_LEVELS:
+        return ()
+    inside = float(levels[-2] - levels[1])
+    apart = (float(levels[1] - levels[0]), float(levels[-1] - levels[-2]))
+    return tuple(
+        float(levels[end])
+        for end, away in zip((0, -1), apart, strict=True)
+        if counts[end] > 1
+        and away > inside * (1.0 if counts[end] <= INVALID_LIMIT * len(values) else FAR)
+    )
 
 
 def _longest_by_chance(values: Array, step: float) -> int:
@@ -259,6 +304,24 @@ def _flagged(recording: Recording) -> Mask:
     return np.asarray((flags & wrong) != 0)
 
 
+def mark_sentence(channel: Channel, count: int, unit: str) -> str:
+    """That samples hold a mark in the place of a measurement."""
+    listed = " or ".join(f"{value:g}" for value in channel.marks)
+    return (
+        f"{channel.name} is exactly {listed} {unit} in {count} samples, farther from all others "
+        "than those are from each other: a mark of overflow or loss, which is left out."
+    )
+
+
+def ends_sentence(channel: Channel, unit: str) -> str:
+    """That most samples stand at an end of the range."""
+    return (
+        f"{channel.name} is {channel.low:.6g} or {channel.high:.6g} {unit}, its least and its "
+        f"largest value, in {channel.at_ends:.1%} of the samples. If it is cut off there, what "
+        "lies beyond was not measured: check the sensor's range."
+    )
+
+
 def _sentences(channel: Channel, recording: Recording) -> list[str]:
     joint = recording.joint
     unit = {"opening": joint.position_unit, "motor_torque": joint.effort_unit}.get(
@@ -269,7 +332,10 @@ def _sentences(channel: Channel, recording: Recording) -> list[str]:
         said.append(f"{channel.name} is constant at {channel.low:.6g} {unit}.")
     elif np.isfinite(channel.step):
         said.append(f"{channel.name} has a resolution of {channel.step:.3g} {unit}.")
-    if channel.saturated.any():
+    if channel.marks:
+        count = int(np.isin(recording.samples[channel.name], channel.marks).sum())
+        said.append(mark_sentence(channel, count, unit))
+    if channel.saturated.any() and not channel.marks:
         said.append(
             f"{channel.name} is at an end of its range ({channel.low:.3g} to {channel.high:.3g} "
             f"{unit}) in {channel.saturated.mean():.2%} of the samples, which are left out."

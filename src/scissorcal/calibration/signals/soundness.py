@@ -21,7 +21,8 @@ def refuse_unsound(recordings: tuple[Recording, ...]) -> None:
 
     A sensor has noise, so two strokes or recordings never agree to the last digit. A copy would
     count as a second observation, and intervals would come out too narrow by the root of two.
-    Recordings of two rigs, as their serial numbers tell, have no parameters in common.
+    Recordings of joints of two kinds, with handles of two lengths, or of devices with unlike serial
+    numbers are not of one rig.
     """
     if not recordings:
         raise InputError("There is no recording to fit: capture or import one first.")
@@ -63,7 +64,23 @@ def _refuse_values(recording: Recording) -> None:
 
 
 def _refuse_two_rigs(recordings: tuple[Recording, ...]) -> None:
-    """Refuse recordings of devices with unlike serial numbers; those without one may be of any."""
+    """Refuse recordings of two joints, two handles, or devices with unlike serial numbers."""
+    first = recordings[0]
+    for other in recordings[1:]:
+        if other.joint.kind != first.joint.kind:
+            raise InputError(
+                f"{_name(first)} is of a {first.joint.kind} joint and {_name(other)} of a "
+                f"{other.joint.kind} one: one fit is of one rig. Remove the recordings of the "
+                "other joint, or keep them in a separate workspace."
+            )
+        lengths = first.handle_radius_m, other.handle_radius_m
+        if np.all(np.isfinite(lengths)) and not np.isclose(*lengths):
+            raise InputError(
+                f"{_name(first)} has a handle radius of {1e3 * lengths[0]:.4g} mm and "
+                f"{_name(other)} of {1e3 * lengths[1]:.4g} mm: one fit is of one rig. Keep the "
+                "recordings of each rig in a separate workspace; if it is one rig, import the "
+                "log again with --handle-radius-mm."
+            )
     seen = {
         str(one.device["serial"]): f"{_name(one)} ({one.device.get('name', 'rig')}, serial number "
         f"{one.device['serial']})"
@@ -71,9 +88,9 @@ def _refuse_two_rigs(recordings: tuple[Recording, ...]) -> None:
         if one.device.get("serial")
     }
     if len(seen) > 1:
-        first, second, *_ = reversed(seen.values())
+        one, another, *_ = reversed(seen.values())
         raise InputError(
-            f"{first} and {second} are of two rigs, and one fit is of one rig: fit the recordings "
+            f"{one} and {another} are of two rigs, and one fit is of one rig: fit the recordings "
             "of each rig in another workspace, or exclude those of one."
         )
 
@@ -101,12 +118,15 @@ def _refuse_copies(recordings: tuple[Recording, ...]) -> None:
         edges = np.flatnonzero(np.diff(stroke)) + 1
         for low, high in zip([0, *edges], [*edges, len(stroke)], strict=True):
             torque = np.asarray(recording.samples["motor_torque"][low:high], dtype=np.float64)
-            if low == high or stroke[low] < 0 or len(np.unique(torque)) < FEWEST_LEVELS:
+            between = stroke[low] < 0 and bool(np.any(stroke >= 0))
+            if low == high or between or len(np.unique(torque)) < FEWEST_LEVELS:
                 continue
             opening = np.asarray(recording.samples["opening"][low:high], dtype=np.float64)
             force = np.asarray(recording.samples["handle_force"][low:high], dtype=np.float64)
             key = hashlib.sha256(opening.tobytes() + torque.tobytes() + force.tobytes()).digest()
-            here = f"stroke {stroke[low]} of {_name(recording)}"
+            here = _name(recording)
+            if stroke[low] >= 0:
+                here = f"stroke {stroke[low]} of {here}"
             if key in seen:
                 raise InputError(
                     f"{here} is a copy of {seen[key]}: every opening and torque is the same to the "

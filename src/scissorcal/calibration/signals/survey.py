@@ -6,12 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.calibration.signals.sensors import Channel, channels_of
+from scissorcal.calibration.signals.sensors import (
+    Channel,
+    channels_of,
+    ends_sentence,
+    mark_sentence,
+)
 from scissorcal.recording.layout import unit_of
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.summarising import Gaps, find_gaps
 
 SPREAD = (0.05, 0.95)
+CHANNELS = ("opening", "motor_torque", "handle_force")
 
 
 @dataclass(frozen=True)
@@ -37,6 +43,7 @@ class SensorSurvey:
 class Survey:
     """Sampling, sensors and strokes of a recording.
 
+    ``notes`` tell what is no measurement: marks of overflow, a sensor that stands at its ends.
     ``interval_low_ms`` and ``interval_high_ms`` are the 5 % and 95 % quantiles of the time between
     two samples, ``longest_ms`` the longest.
     """
@@ -49,6 +56,7 @@ class Survey:
     sensors: tuple[SensorSurvey, ...]
     closings: int
     openings: int
+    notes: tuple[str, ...] = ()
 
 
 def survey(recording: Recording, measured: Iterable[str]) -> Survey:
@@ -57,18 +65,36 @@ def survey(recording: Recording, measured: Iterable[str]) -> Survey:
     low_ms, high_ms = np.quantile(intervals_ms, SPREAD)
     counts = Counter(stroke.kind for stroke in recording.strokes)
     wanted = set(measured)
+    channels = channels_of(recording, [name for name in CHANNELS if name in wanted])
     return Survey(
         rate_Hz=1e3 / float(np.median(intervals_ms)),
         interval_low_ms=float(low_ms),
         interval_high_ms=float(high_ms),
         longest_ms=float(intervals_ms.max()),
         gaps=find_gaps(recording.samples),
-        sensors=tuple(
-            _sensor(recording, one) for one in channels_of(recording) if one.name in wanted
-        ),
+        sensors=tuple(_sensor(recording, one) for one in channels),
         closings=counts["closing"],
         openings=counts["opening"],
+        notes=tuple(said for one in channels for said in _told(recording, one)),
     )
+
+
+def _told(recording: Recording, channel: Channel) -> list[str]:
+    """Sentences on a channel that holds what is no measurement."""
+    unit = unit_of(channel.name, recording.joint)
+    said = []
+    if channel.marks:
+        count = int(np.isin(recording.samples[channel.name], channel.marks).sum())
+        said.append(mark_sentence(channel, count, unit))
+    elif channel.saturated.any():
+        said.append(
+            f"{channel.name} looks cut off at an end of its range ({channel.low:.3g} to "
+            f"{channel.high:.3g} {unit}) in {channel.saturated.mean():.2%} of the samples: what "
+            "lies beyond was not measured. Use a sensor of larger range, or a smaller gain."
+        )
+    if channel.mostly_at_ends:
+        said.append(ends_sentence(channel, unit))
+    return said
 
 
 def _sensor(recording: Recording, channel: Channel) -> SensorSurvey:

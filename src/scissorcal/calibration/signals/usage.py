@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.signals.segments import pieces_of
+from scissorcal.calibration.signals.segments import bridge
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.recipe.requirements import LITTLE
 from scissorcal.recording.recording import Recording
@@ -63,6 +63,19 @@ class Usage:
             same = np.isnan(speeds) if np.isnan(speed) else speeds == speed
             rows.append(_together([self.rows[i] for i in np.flatnonzero(same)], float(speed)))
         return tuple(rows)
+
+    @property
+    def lost(self) -> Mapping[str, float]:
+        """Seconds that are not used, by reason, over all recordings."""
+        return _together(list(self.rows), float("nan")).reasons
+
+    @property
+    def counted(self) -> str:
+        """How many seconds were recorded, are used, and went by which reason, the largest first."""
+        whole = _together(list(self.rows), float("nan"))
+        parts = sorted(whole.reasons.items(), key=lambda item: -item[1])
+        listed = "; ".join(f"{seconds:.3g} s {reason}" for reason, seconds in parts)
+        return f"Of {whole.recorded_s:.3g} s recorded, {whole.used_s:.3g} s are used; {listed}"
 
     @property
     def sentence(self) -> str:
@@ -138,37 +151,42 @@ def usage_of_windows(recordings: tuple[Recording, ...], every: Windows, usable: 
     """Count what moving windows use of their recordings, each for its bin.
 
     ``every`` are all windows of the recordings, ``usable`` the masks (m,) of samples that no sensor
-    invalid.
+    made invalid.
     """
     width = max(1, round(every.bins.bin_s / every.tick_s))
     length = len(every.weights)
     used, gap, edge, invalid, slow = ([], [], [], [], [])
     windows = start = 0
     for recording, good in zip(recordings, usable, strict=True):
-        size = len(recording.samples)
-        masks = {name: np.zeros(size, dtype=bool) for name in ("used", INVALID, SLOW)}
+        bridged = bridge(recording, good)
+        size = len(bridged.recorded)
+        masks = {name: np.zeros(size, dtype=bool) for name in ("used", GAP, INVALID, SLOW)}
         inside, covered = np.zeros(size, dtype=bool), np.zeros(size, dtype=bool)
-        bad = np.concatenate([[0], np.cumsum(~good)])
-        for low, high in pieces_of(recording):
+        bad = np.concatenate([[0], np.cumsum(~bridged.usable)])
+        made = np.concatenate([[0], np.cumsum(~bridged.recorded)])
+        for low, high in bridged.pieces:
             inside[low:high] = True
             count = int(np.count_nonzero(every.first[windows:] < start + high - low))
             first = every.first[windows : windows + count] - start + low
             moving = every.bins.moving[windows : windows + count]
+            parted = made[first + length] > made[first]
             touched = bad[first + length] > bad[first]
             begin = first + (length - width) // 2
             for name, chosen in (
                 ("used", moving),
-                (INVALID, ~moving & touched),
+                (GAP, ~moving & parted),
+                (INVALID, ~moving & touched & ~parted),
                 (SLOW, ~moving & ~touched),
             ):
                 masks[name][(begin[chosen, None] + np.arange(width)).ravel()] = True
             covered[(begin[:, None] + np.arange(width)).ravel()] = True
             windows, start = windows + count, start + high - low
-        used.append(masks["used"])
-        gap.append(~inside)
-        edge.append(inside & ~covered)
-        invalid.append(masks[INVALID])
-        slow.append(masks[SLOW])
+        real = bridged.recorded
+        used.append(masks["used"][real])
+        gap.append((masks[GAP] | ~inside)[real])
+        edge.append((inside & ~covered)[real])
+        invalid.append(masks[INVALID][real])
+        slow.append(masks[SLOW][real])
     reasons = {GAP: gap, EDGE: edge, INVALID: invalid, SLOW: slow}
     return count_usage(
         recordings, tuple(used), {name: tuple(masks) for name, masks in reasons.items()}

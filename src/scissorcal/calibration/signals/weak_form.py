@@ -8,12 +8,15 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from scissorcal.calibration.signals.filtering import BIN_S, Bins, low_pass, rate_floor
-from scissorcal.calibration.signals.segments import (
-    no_piece,
-    pieces_of,
-    sheets_of,
+from scissorcal.calibration.signals.filtering import (
+    BIN_S,
+    Bins,
+    PositionError,
+    low_pass,
+    position_error,
+    rate_floor,
 )
+from scissorcal.calibration.signals.segments import bridge, no_piece, sheets_of, usual_tick
 from scissorcal.calibration.signals.window_length import (
     HALF_AT,
     SMOOTH,
@@ -126,7 +129,9 @@ def weigh(
     smeared on both sides, and a window knows nothing of what lies outside it. Windows are longer
     than the cutoff asks for where the encoder's steps would else be a part of psi''
     (:func:`~.window_length.longer_knot`); ``window_Hz`` is where they pass half, if that is to be
-    prescribed. The rate within F keeps the band of ``cutoff_Hz`` all the same.
+    prescribed. The rate within F keeps the band of ``cutoff_Hz`` all the same. Short gaps are
+    bridged (:func:`~.segments.bridge`): ``first`` and the samples are then those of the bridged
+    recordings, and windows that touch a gap are left out of ``moving``.
 
     ``bins.moving`` is false for windows that hold a rest or a turn: a sample where the sign of the
     rate is not certain, or changes. When a turn was is known to a fraction of the low-pass only,
@@ -138,27 +143,28 @@ def weigh(
         raise InputError("There is no recording to fit: capture or import one first.")
     loaded = all(np.isfinite(recording.handle_radius_m) for recording in recordings)
     found: list[tuple[int, tuple[int, int], Motion]] = []
+    filled: list[Recording] = []
     for index, recording in enumerate(recordings):
         good = np.ones(len(recording.samples), dtype=bool) if usable is None else usable[index]
-        for low, high in pieces_of(recording):
-            motion = _motion(recording, (low, high), cutoff_Hz, good[low:high])
+        bridged = bridge(recording, good)
+        filled.append(bridged.recording)
+        error = position_error(np.asarray(recording.samples["opening"], dtype=np.float64))
+        for low, high in bridged.pieces:
+            motion = _motion(
+                bridged.recording, (low, high), cutoff_Hz, bridged.usable[low:high], error
+            )
             found.append((index, (low, high), motion))
     if not found:
         raise no_piece(recordings)
     motions = [motion for _, _, motion in found]
-    knots = {knot_samples(window_Hz or cutoff_Hz, motion.rate_Hz) for motion in motions}
-    if len(knots) > 1:
-        raise InputError(
-            "The recordings have different sampling rates; fit those of one rate together."
-        )
-    asked = knots.pop()
+    asked = _common_knot(recordings, window_Hz or cutoff_Hz)
     knot = asked if window_Hz else longer_knot(motions, asked)
     strokes = np.cumsum([0, *(len(recording.strokes) for recording in recordings)]).tolist()
     pieces: list[Windows] = []
     samples = 0
     for number, ((index, (low, high), _), motion) in enumerate(zip(found, motions, strict=True)):
         numbers = (index, strokes[index], number)
-        piece = _weigh_piece(recordings[index], (low, high), motion, knot, cutoff_Hz, numbers)
+        piece = _weigh_piece(filled[index], (low, high), motion, knot, cutoff_Hz, numbers)
         shifted = replace(piece, first=piece.first + samples, starts=piece.starts + samples)
         pieces.append(shifted)
         samples += high - low
@@ -169,6 +175,26 @@ def next_cutoff(windows: Windows) -> float | None:
     """Cutoff in Hz of the next shorter windows over the same samples; None where none are."""
     knot = len(windows.weights) // 3
     return HALF_AT / (windows.tick_s * (knot - 1)) if knot > 1 else None
+
+
+def _common_knot(recordings: tuple[Recording, ...], cutoff_Hz: float) -> int:
+    """Knot distance in samples of windows over all recordings.
+
+    Raises InputError where rates differ by so much that it would differ by half a sample.
+    """
+    timed = [one for one in recordings if len(one.samples) > 1]
+    rates = [1.0 / usual_tick(one) for one in timed]
+    knot = knot_samples(cutoff_Hz, max(rates))
+    if max(rates) - min(rates) > 0.5 * min(rates) / knot:
+        listed = ", ".join(
+            f"{one.source or 'a recording'}: {rate:.4g} Hz"
+            for one, rate in zip(timed, rates, strict=True)
+        )
+        raise InputError(
+            f"The recordings have different sampling rates ({listed}); fit those of one rate "
+            "together."
+        )
+    return knot_samples(cutoff_Hz, float(np.median(rates)))
 
 
 def _joined(pieces: list[Windows], loaded: bool) -> Windows:
@@ -196,7 +222,13 @@ def _joined(pieces: list[Windows], loaded: bool) -> Windows:
     )
 
 
-def _motion(recording: Recording, piece: tuple[int, int], cutoff_Hz: float, usable: Mask) -> Motion:
+def _motion(
+    recording: Recording,
+    piece: tuple[int, int],
+    cutoff_Hz: float,
+    usable: Mask,
+    error: PositionError,
+) -> Motion:
     low, high = piece
     time = recording.device_time_s[low:high]
     rate_Hz = float((len(time) - 1) / (time[-1] - time[0]))
@@ -204,9 +236,9 @@ def _motion(recording: Recording, piece: tuple[int, int], cutoff_Hz: float, usab
     band_Hz = RATE_BAND * cutoff_Hz
     opening = low_pass(position, band_Hz, rate_Hz)
     rate = np.gradient(opening) * rate_Hz
-    floor = rate_floor(position, band_Hz, rate_Hz)
-    turns = _turns(rate, floor or np.inf)
-    return Motion(position, opening, rate, floor, turns, ~usable, rate_Hz)
+    floor = rate_floor(error.sd, band_Hz, rate_Hz)
+    turns = _turns(rate, floor if np.ptp(position) > 0.0 else np.inf)
+    return Motion(position, error.step, opening, rate, floor, turns, ~usable, rate_Hz)
 
 
 def _weigh_piece(

@@ -7,8 +7,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.filtering import BIN_S
-from scissorcal.calibration.signals.segments import edge_samples, stretches
-from scissorcal.recording.resolution import resolution_of
+from scissorcal.calibration.signals.segments import stretches
+from scissorcal.recording.resolution import edge_samples
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -33,12 +33,14 @@ SMOOTH = 1 / 12
 class Motion:
     """One piece of a recording without a gap, before it is weighed; arrays (m,) by sample.
 
-    ``position`` is as measured, ``opening`` and ``rate`` are low-passed, ``floor`` is the speed
-    below which the rate's sign is noise. ``turning`` marks samples of rest and of turns, ``faulty``
-    those that a sensor invalidated.
+    ``position`` is as measured, in steps of ``step`` (NaN: none to be seen), ``opening`` and
+    ``rate`` are low-passed, ``floor`` is the speed below which the rate's sign is noise.
+    ``turning`` marks samples of rest and of turns, ``faulty`` those that a sensor invalidated, and
+    those that bridge a gap.
     """
 
     position: Array
+    step: float
     opening: Array
     rate: Array
     floor: float
@@ -89,7 +91,7 @@ def longer_knot(pieces: list[Motion], shortest: int) -> int:
     which the share is at most ``ENCODER_SHARE`` over all motion, turns among it; where none is, or
     too few windows without a turn would be left, the longest that is allowed.
     """
-    steps = [resolution_of(piece.position) for piece in pieces]
+    steps = [piece.step for piece in pieces]
     if not pieces or not np.all(np.isfinite(steps)):
         return shortest
     rate_Hz = pieces[0].rate_Hz

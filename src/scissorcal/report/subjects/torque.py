@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.result import FitResult, rms_interval, worst_stroke
 from scissorcal.recording.recording import Stroke
 from scissorcal.report.numbers import Number, finite, percent, short, unit_text, with_unit
 from scissorcal.report.panel import (
@@ -124,13 +124,22 @@ def strokes_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -
         if fit.what != "cut":
             charts.append(_spread(fit, strokes, "rate", f"{part}-spread-rate"))
     charts += [_card(fit, stroke) for stroke in ranked[:MOST_CARDS]]
-    worst = ranked[0]
+    worst = max(ranked, key=lambda one: _shown(fit, one, len(ranked)))
     sentence = (
         f"The model misses most on {worst.name.label}: "
         f"{with_unit(finite(_rms(fit, worst)), fit.effort_unit, 2)} rms."
     )
     caption = f"Measured minus model by stroke, in {unit_text(fit.effort_unit)}."
     return Panel(id_, part, title, sentence, rows, tuple(charts), caption=caption)
+
+
+def _shown(fit: FitResult, stroke: StrokeSamples, of: int) -> float:
+    """The error that a stroke is shown to have, one ``of`` so many; -1 where there is none."""
+    rms = finite(_rms(fit, stroke))
+    if rms is None:
+        return -1.0
+    share = finite(fit.diagnostics.get("independent_share")) or 1.0
+    return rms_interval(rms, share * len(stroke.places), 0.05 / of)[0]
 
 
 def held_out_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
@@ -148,8 +157,9 @@ def held_out_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) 
             name.label if name else stroke_label(Stroke(0, kind), error.stroke, fit.position_unit)
         )
         speed = name.speed if name and name.speed is not None else finite(error.speed)
+        low, high = error.interval()
         values = (
-            percent_of("relative", error.relative_rms),
+            percent_of("relative", error.relative_rms, low=low, high=high),
             number("rms", error.rms, fit.effort_unit),
         )
         rows.append(Row(label, values, link=name.anchor if name else ""))
@@ -161,14 +171,19 @@ def held_out_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) 
         f"On strokes that it had not seen the model errs by {percent(middle)} (median rms, share "
         f"of the rms of all strokes); worst {percent(worst)}."
     )
-    return Panel(id_, part, title, sentence, tuple(rows), charts)
+    caption = (
+        "With 90 % intervals by the independent samples of a stroke. The worst stroke is the one "
+        "whose error is shown to be largest: a few samples may err by more by chance."
+    )
+    return Panel(id_, part, title, sentence, tuple(rows), charts, caption=caption)
 
 
 def held_out_summary(fit: FitResult) -> tuple[Number, Number]:
-    """Median and worst relative error on unseen strokes."""
+    """Median relative error on unseen strokes, and that of the worst of them."""
     shares = np.array([e.relative_rms for e in fit.held_out], dtype=np.float64)
-    shares = shares[np.isfinite(shares)]
-    return finite(median(shares)), finite(shares.max()) if len(shares) else None
+    worst = worst_stroke(fit.held_out)
+    middle = finite(median(shares[np.isfinite(shares)]))
+    return middle, None if worst is None else finite(worst.relative_rms)
 
 
 def _held_out_chart(fit: FitResult, marks: Sequence[tuple[float, float, str]], id_: str) -> Chart:
