@@ -331,7 +331,7 @@ def _assembled(
         joint=recordings[0].joint,
         nuisance=NUISANCE,
         rng=rng,
-        critic=data.recipe.fit.cut.critic,
+        critic=data.recipe.fit.cut.critic and effort != "draft",
         usage=usage,
         extra_verdicts=(
             *cut_verdicts(data.friction, edge_verdicts, scouted, data.sensors, recordings),

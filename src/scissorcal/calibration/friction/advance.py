@@ -14,7 +14,7 @@ from scissorcal.calibration.friction.commanded import (
     driven,
     find_actuation,
 )
-from scissorcal.calibration.friction.fit import fit_friction
+from scissorcal.calibration.friction.fit import TOLERANCE, fit_friction
 from scissorcal.calibration.result import Effort, FitResult, Proposal
 from scissorcal.errors import InputError
 from scissorcal.inference import Stop
@@ -38,6 +38,8 @@ def fit_friction_advance(
     checkpoint: Path | None = None,
     last_chosen: str | None = None,
     stop: Stop | None = None,
+    critic: bool = False,
+    tolerance: float = TOLERANCE,
 ) -> FitResult:
     """Identify mass, friction and offset of the sledge from empty motion of it.
 
@@ -63,6 +65,8 @@ def fit_friction_advance(
             checkpoint=checkpoint,
             last_chosen=last_chosen,
             stop=stop,
+            critic=critic,
+            tolerance=tolerance,
         )
     except InputError as error:
         raise InputError(_renamed(str(error))) from error

@@ -72,6 +72,9 @@ DRAFT_LAWS = {
 }
 """What draft effort fits to a joint where nothing says otherwise."""
 
+TOLERANCE = 0.07
+"""Share of the torque by which it may be wrong, as a recipe has it that states none."""
+
 PRESLIDING = "presliding_fine_rad"
 """Fact of a probe: the shortest way over which friction builds up after a turn, which a fit of cuts
 takes. A longer one shows in sweeps, and is a term of the law."""
@@ -88,6 +91,8 @@ def fit_friction(
     last_chosen: str | None = None,
     stop: Stop | None = None,
     prior: StatedPrior | None = None,
+    critic: bool = False,
+    tolerance: float = TOLERANCE,
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
@@ -98,7 +103,8 @@ def fit_friction(
 
     ``checkpoint`` is a file from which an interrupted thorough fit goes on, ``last_chosen`` the law
     of draft effort where the recipe leaves several, ``prior`` that of a study of simulated data;
-    ``stop`` says whether the time is used up. Raises InputError where there is too little motion, a
+    ``stop`` says whether the time is used up. ``critic`` asks for the critic at draft effort too;
+    ``tolerance`` is the share of torque by which what it finds is judged. Raises InputError where there is too little motion, a
     value is no measurement, or a stroke is a copy of another.
     """
     tell = progress or (lambda done, sentence: None)
@@ -143,7 +149,8 @@ def fit_friction(
         joint=joint,
         nuisance=NUISANCE,
         rng=rng,
-        critic=settings.critic,
+        critic=critic or (settings.critic and effort != "draft"),
+        tolerance=None if prior else tolerance,
         usage=usage,
         extra_verdicts=(
             physical_verdict(law, chosen.optimum.point, chosen.share),
