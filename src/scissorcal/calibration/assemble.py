@@ -48,6 +48,7 @@ def assemble(
     usage: Usage,
     load: Array | None = None,
     tolerance: float | None = None,
+    known: tuple[str, ...] = (),
     extra_verdicts: tuple[Verdict, ...] = (),
     extra_notes: tuple[str, ...] = (),
     extra_diagnostics: Mapping[str, Any] | None = None,
@@ -58,7 +59,8 @@ def assemble(
     out of the parameter table. ``measured`` and ``contact`` are by bin (n,). ``extra_verdicts`` and
     ``extra_notes`` and ``extra_diagnostics`` are what only the fit itself can say; they follow the
     common ones. ``critic`` has the residuals searched for what the law lacks, which is judged by
-    the ``tolerance`` of torque, a share, where there is one; ``load`` (n,) is what the joint bore,
+    the ``tolerance`` of torque, a share, where there is one, but for terms that are ``known`` by
+    name from elsewhere; ``load`` (n,) is what the joint bore,
     where that was measured. ``usage`` says which samples the fit uses.
     """
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
@@ -70,7 +72,7 @@ def assemble(
     diagnostics |= dict(extra_diagnostics or {})
     critique = Critique((), NOT_ASKED)
     if critic:
-        critique = _criticise(what, chosen, bins, measured, load, joint, rng)
+        critique = _criticise(what, chosen, bins, measured, load, joint, rng, known)
     tables = _parameters(chosen, posterior, nuisance, rng)
     diagnostics["critic"] = critique.sentence
     trust = trust_verdicts(
@@ -188,11 +190,12 @@ def _criticise(
     load: Array | None,
     joint: Joint,
     rng: np.random.Generator,
+    known: tuple[str, ...],
 ) -> Critique:
     """A cut's load, where none was measured, is the torque that the law expects of the material."""
     if what == "cut" and load is None:
         load = measured - chosen.candidate.likelihood.residuals(chosen.optimum.point)
-    return criticise(what, chosen, bins, load, joint, rng)
+    return criticise(what, chosen, bins, load, joint, rng, known)
 
 
 def _prior_draws(chosen: FittedCandidate, rng: np.random.Generator) -> Array:

@@ -27,8 +27,9 @@ Array = NDArray[np.float64]
 
 FALSE_ALARM = 0.02
 """Chance that the critic proposes anything where nothing is missing."""
-FEWEST_STROKES = 7
-"""With six strokes one in 2^5 choices of signs goes along with a term as the data do: 3 %."""
+FEWEST_STROKES = 6
+"""Six strokes must agree on a term to an eighth of itself, three to a fiftieth (Student's t at the
+chance ``FALSE_ALARM`` of one in 45 terms)."""
 RECURS = 0.75
 """Share of the searches without a quarter of the strokes in which a term must be found: one quarter
 may hold all strokes that show it."""
@@ -101,11 +102,11 @@ def criticise(
     left = tabulate(chosen, course_of(bins, load), terms, already, labels)
     tried = f"The critic tried {len(left.terms)} terms over {len(labels)} strokes"
     quiet = Structure(0.0, 0.0, left.hidden())
-    least = min(left.chances((), rng).values(), default=1.0)
+    least = min(left.chances().values(), default=1.0)
     if least >= FALSE_ALARM:
         sentence = f"{tried} and proposes none: none stands out of chance ({least:.0%})."
         return Critique((), sentence, quiet)
-    findings = _accepted(left, rng)
+    findings = _accepted(left)
     if not findings:
         sentence = f"{tried} and proposes none: what stands out does not recur in unseen strokes."
         return Critique((), sentence, quiet)
@@ -115,8 +116,7 @@ def criticise(
     low, high = np.quantile(left.sizes(accepted, draws), [0.05, 0.95])
     size = float(left.sizes(accepted, coefficients[None])[0])
     proposals = tuple(
-        _propose(what, chosen, left, findings[: place + 1], joint)
-        for place in range(len(findings))
+        _propose(what, chosen, left, findings[: place + 1], joint) for place in range(len(findings))
     )
     listed = ", ".join(proposal.name for proposal in proposals)
     return Critique(
@@ -186,7 +186,7 @@ class _Finding:
     twins: tuple[str, ...]
 
 
-def _accepted(left: Leftover, rng: np.random.Generator) -> list[_Finding]:
+def _accepted(left: Leftover) -> list[_Finding]:
     """What is found, recurs, stands out of chance and helps on unseen strokes, in order."""
     folds = split_strokes(np.unique(left.stroke))
     seen = [(~np.isin(left.stroke, fold)).astype(np.float64) for fold in folds]
@@ -203,11 +203,31 @@ def _accepted(left: Leftover, rng: np.random.Generator) -> list[_Finding]:
         gain, nats = left.held_out(within, terms)
         if recurs < RECURS or nats.sum() < POSITIVE_EVIDENCE:
             continue
-        if left.chances(within, rng).get(name, 1.0) >= FALSE_ALARM:
+        name, gain, nats = _adoptable_instead(left, within, name, gain, nats)
+        if left.chances(within).get(name, 1.0) >= FALSE_ALARM:
             continue
+        terms = left.findings[name]
         others = tuple(sorted(twins[name] - {name}))
         found.append(_Finding(name, tuple(terms), recurs, gain, float(nats.sum()), others))
     return found
+
+
+def _adoptable_instead(
+    left: Leftover, within: Sequence[int], name: str, gain: float, nats: Array
+) -> tuple[str, float, Array]:
+    """The term of a law that strokes do not tell from a finding that no law has, if there is one.
+
+    With it come its gain and nats; a finding that a law can adopt stays as it is.
+    """
+    if left.terms[left.findings[name][0]].adoptable:
+        return name, gain, nats
+    best, least = (name, gain, nats), float(nats.sum()) - POSITIVE_EVIDENCE
+    for other, terms in left.findings.items():
+        if left.terms[terms[0]].adoptable and terms[0] not in within:
+            theirs, told = left.held_out(within, terms)
+            if told.sum() > least:
+                best, least = (other, theirs, told), float(told.sum())
+    return best
 
 
 def _search(left: Leftover, weights: Array) -> tuple[int, ...]:

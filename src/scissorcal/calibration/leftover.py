@@ -21,8 +21,7 @@ Integers = NDArray[np.int64]
 
 KNOWN_TO_LAW = 1e-3
 """Share of a term's variance that law and simpler terms cannot imitate, below which it is none."""
-FLIPS = 2000
-"""Choices of signs: a chance of 5 % is then known to 0.5 %."""
+WITHIN_ROUNDING = 1e-9
 DRAWS = 1000
 NINETY_FIVE = 1.645
 """Standard deviations below and above which 5 % of a normal lie each."""
@@ -74,34 +73,30 @@ class Leftover:
             found.setdefault(term.part or term.name, []).append(index)
         return found
 
-    def chances(self, within: Sequence[int], rng: np.random.Generator) -> dict[str, float]:
+    def chances(self, within: Sequence[int] = ()) -> dict[str, float]:
         """Chance that, without structure, any finding goes along with the residual as one does.
 
-        Pieces keep their residuals and get random signs, for a wave their parts (the wild bootstrap
-        of scores, Kline and Santos 2012, doi:10.1515/2156-6674.1006); the rarest of all findings
-        counts (Westfall and Young 1993, ISBN 9780471557616), so that many terms raise no false
-        alarm. The law and the terms ``within`` are taken out.
+        Of two chances the larger: by noise with memory, and by how far pieces (of waves: parts)
+        differ from each other, weighted by what they tell: a t or Hotelling's T^2 whose variance is
+        free of bias and whose degrees of freedom count pieces that tell much (Bell and McCaffrey
+        2002, Survey Methodology 28, 169). All findings together are as likely as their number times
+        one of them. The law and the terms ``within`` are taken out.
         """
         free = self.free(within)
-        by_part = self._scores(free)
-        by_piece = _summed(by_part, self.piece)
+        scores = self._scores(free)
+        squares = np.einsum("ij,kil->kjl", free[:, :-1], self.gram)
         own = set(np.flatnonzero(self._own(free)).tolist()) - set(within)
-        flips = [
-            np.concatenate([np.ones((1, n)), rng.choice([-1.0, 1.0], size=(FLIPS, n))])
-            for n in (len(by_piece), len(by_part))
-        ]
-        rarest, seen = np.ones(FLIPS + 1), {}
+        variance = self._variance()
+        found = {}
         for name, indices in self.findings.items():
             used = [i for i in indices if i in own]
             if used:
-                swings = len(indices) > 1
-                scores = (by_part if swings else by_piece)[:, used]
-                basis, size, _ = np.linalg.svd(scores, full_matrices=False)
-                basis = basis[:, size > 1e-9 * size.max(initial=0.0)]
-                chance = _chance(np.sum((flips[swings] @ basis) ** 2, axis=1), basis.shape[1])
-                seen[name] = float(chance[0])
-                rarest = np.minimum(rarest, chance)
-        return {name: float(np.mean(rarest <= chance)) for name, chance in seen.items()}
+                along, told = scores[:, used], squares[:, used] @ free[:, used]
+                told = told.reshape(len(along), -1)
+                if len(indices) == 1:
+                    along, told = _summed(along, self.piece), _summed(told, self.piece)
+                found[name] = _chance(along, told.reshape(-1, len(used), len(used)), variance)
+        return {name: min(1.0, len(found) * chance) for name, chance in found.items()}
 
     def weighed(self, weights: Array) -> tuple[Array, Array]:
         """Few rows with the products of all pieces, each counted as often as ``weights`` says.
@@ -181,6 +176,13 @@ class Leftover:
             name: {other for other, theirs in found.items() if np.any(alike[np.ix_(own, theirs)])}
             for name, own in found.items()
         }
+
+    def _variance(self) -> float:
+        """Variance of the noise of a bin, over the share of bins that are independent."""
+        gram = self.gram.sum(axis=0)
+        columns = range(len(gram) - 1)
+        left = _squares(self.gram, columns, solve(gram, columns)).sum()
+        return float(left / self.bins.sum() / self.share)
 
     def _scores(self, free: Array) -> Array:
         """How terms go along with the residual (parts, terms), as :meth:`free` has both."""
@@ -267,11 +269,26 @@ def course_of(bins: Bins, load: Array | None) -> Course:
     )
 
 
-def _chance(squares: Array, count: int) -> Array:
-    """Chance that one or two normals have such a sum of squares (k,) or more."""
-    from scipy.special import chdtrc
+def _chance(scores: Array, told: Array, variance: float) -> float:
+    """Chance of what pieces say of terms together: ``scores`` (k, q), and ``told`` (k, q, q).
 
-    return np.asarray(chdtrc(count, squares))
+    The latter are the scores that a coefficient of one would give.
+    """
+    from scipy.special import chdtrc, fdtrc
+
+    total, summed = told.sum(axis=0), scores.sum(axis=0)
+    count = len(total)
+    inverse = np.linalg.pinv(total, hermitian=True)
+    by_noise = float(chdtrc(count, summed @ inverse @ summed / variance))
+    weight = np.einsum("kij,ji->k", told, inverse) / count
+    apart = scores - told @ (inverse @ summed)
+    apart /= np.sqrt(np.maximum(1.0 - weight, WITHIN_ROUNDING))[:, None]
+    squared = float(summed @ np.linalg.pinv(apart.T @ apart, hermitian=True) @ summed)
+    freedom = 1.0 / float(np.sum(weight**2)) - count
+    if freedom <= 0.0:
+        return 1.0
+    by_pieces = fdtrc(count, freedom, squared * freedom / (count * (freedom + count - 1.0)))
+    return max(by_noise, float(by_pieces))
 
 
 def _summed(values: Array, labels: Integers) -> Array:

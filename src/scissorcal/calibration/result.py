@@ -274,7 +274,8 @@ class FitResult(Result):
     with ``name``, ``bic``, ``held_out_rms``, ``held_out_score``, ``loo``, ``loo_se``,
     ``loo_k_hat``, ``chosen`` (it is the one used) and ``equivalent`` (not distinguishable from the
     best); ``selection`` is the same in words. ``critic`` holds the terms that the critic proposes,
-    ``proposed`` (n,) what they add to the law at the points of ``series``, ``replay`` the comparison with record-and-replay. ``prior_draws`` (k, parameters) are the
+    ``proposed`` (n,) what they add to the law at the points of ``series``, ``replay`` the
+    comparison with record-and-replay. ``prior_draws`` (k, parameters) are the
     prior's, in SI. ``nuisance`` and ``nuisance_draws`` (draws, nuisance) are parameters that are
     inferred and not reported, row by row with ``draws``. ``derived`` follow from parameters and the
     recipe, with ``derived_draws`` (draws, derived) row by row; no model needs them. ``diagnostics``

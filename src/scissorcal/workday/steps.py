@@ -96,12 +96,14 @@ def _in_fits(name: str) -> Callable[[Workspace, Recipe], Path]:
 
 
 def _friction_settings(recipe: Recipe) -> object:
-    return recipe.fit.friction.model_dump(mode="json")
+    settings = recipe.fit.friction.model_dump(mode="json")
+    return {**settings, "tolerance_percent": recipe.scene.tolerance_percent}
 
 
 def _friction_advance_settings(recipe: Recipe) -> object:
     priors = recipe.fit.friction.priors.linear.model_dump(mode="json")
-    return [recipe.fit.friction_advance.model_dump(mode="json"), priors]
+    settings = recipe.fit.friction_advance.model_dump(mode="json")
+    return [settings, priors, recipe.scene.tolerance_percent]
 
 
 def _camera_settings(recipe: Recipe) -> object:
@@ -241,7 +243,7 @@ STEPS: tuple[Step, ...] = (
         _fit("friction"),
         inputs=("capture friction",),
         settings=_friction_settings,
-        version=15,
+        version=16,
         by_effort=True,
         file=_in_fits("friction.nc"),
         read=facts.fit,
@@ -256,7 +258,7 @@ STEPS: tuple[Step, ...] = (
         _fit("friction-advance"),
         inputs=("capture friction-advance",),
         settings=_friction_advance_settings,
-        version=3,
+        version=4,
         by_effort=True,
         file=_in_fits("friction-advance.nc"),
         read=facts.fit,
@@ -272,7 +274,7 @@ STEPS: tuple[Step, ...] = (
         _fit("cut"),
         inputs=("capture cut", "fit friction", "fit blade"),
         settings=_cut_settings,
-        version=15,
+        version=16,
         by_effort=True,
         file=_in_fits("cut.nc"),
         read=facts.fit,

@@ -14,8 +14,9 @@ from scissorcal.calibration.friction.commanded import (
     driven,
     find_actuation,
 )
-from scissorcal.calibration.friction.fit import TOLERANCE, fit_friction
+from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.result import Effort, FitResult, Proposal
+from scissorcal.calibration.signals.zeros import FELT
 from scissorcal.errors import InputError
 from scissorcal.inference import Stop
 from scissorcal.recipe.friction import AdvanceSettings
@@ -39,7 +40,7 @@ def fit_friction_advance(
     last_chosen: str | None = None,
     stop: Stop | None = None,
     critic: bool = False,
-    tolerance: float = TOLERANCE,
+    tolerance: float = FELT,
 ) -> FitResult:
     """Identify mass, friction and offset of the sledge from empty motion of it.
 

@@ -55,7 +55,7 @@ from scissorcal.calibration.signals.soundness import refuse_unsound
 from scissorcal.calibration.signals.steadiness import Steadiness, steadiness
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
-from scissorcal.calibration.signals.zeros import DriveZero, without_zeros, zero_verdicts
+from scissorcal.calibration.signals.zeros import FELT, DriveZero, without_zeros, zero_verdicts
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import Posterior, Stop, infer
 from scissorcal.model.friction_terms import NUISANCE, needs_load
@@ -71,9 +71,6 @@ DRAFT_LAWS = {
     "linear": "coulomb + viscous, symmetric",
 }
 """What draft effort fits to a joint where nothing says otherwise."""
-
-TOLERANCE = 0.07
-"""Share of the torque by which it may be wrong, as a recipe has it that states none."""
 
 PRESLIDING = "presliding_fine_rad"
 """Fact of a probe: the shortest way over which friction builds up after a turn, which a fit of cuts
@@ -92,7 +89,7 @@ def fit_friction(
     stop: Stop | None = None,
     prior: StatedPrior | None = None,
     critic: bool = False,
-    tolerance: float = TOLERANCE,
+    tolerance: float = FELT,
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
@@ -104,8 +101,8 @@ def fit_friction(
     ``checkpoint`` is a file from which an interrupted thorough fit goes on, ``last_chosen`` the law
     of draft effort where the recipe leaves several, ``prior`` that of a study of simulated data;
     ``stop`` says whether the time is used up. ``critic`` asks for the critic at draft effort too;
-    ``tolerance`` is the share of torque by which what it finds is judged. Raises InputError where there is too little motion, a
-    value is no measurement, or a stroke is a copy of another.
+    ``tolerance`` is the share of torque by which what it finds is judged. Raises InputError where
+    there is too little motion, a value is no measurement, or a stroke is a copy of another.
     """
     tell = progress or (lambda done, sentence: None)
     refuse_unsound(recordings)
@@ -151,6 +148,7 @@ def fit_friction(
         rng=rng,
         critic=critic or (settings.critic and effort != "draft"),
         tolerance=None if prior else tolerance,
+        known=("time",) if zero and np.isfinite(zero.drift) else (),
         usage=usage,
         extra_verdicts=(
             physical_verdict(law, chosen.optimum.point, chosen.share),
