@@ -203,31 +203,11 @@ def _accepted(left: Leftover) -> list[_Finding]:
         gain, nats = left.held_out(within, terms)
         if recurs < RECURS or nats.sum() < POSITIVE_EVIDENCE:
             continue
-        name, gain, nats = _adoptable_instead(left, within, name, gain, nats)
         if left.chances(within).get(name, 1.0) >= FALSE_ALARM:
             continue
-        terms = left.findings[name]
         others = tuple(sorted(twins[name] - {name}))
         found.append(_Finding(name, tuple(terms), recurs, gain, float(nats.sum()), others))
     return found
-
-
-def _adoptable_instead(
-    left: Leftover, within: Sequence[int], name: str, gain: float, nats: Array
-) -> tuple[str, float, Array]:
-    """The term of a law that strokes do not tell from a finding that no law has, if there is one.
-
-    With it come its gain and nats; a finding that a law can adopt stays as it is.
-    """
-    if left.terms[left.findings[name][0]].adoptable:
-        return name, gain, nats
-    best, least = (name, gain, nats), float(nats.sum()) - POSITIVE_EVIDENCE
-    for other, terms in left.findings.items():
-        if left.terms[terms[0]].adoptable and terms[0] not in within:
-            theirs, told = left.held_out(within, terms)
-            if told.sum() > least:
-                best, least = (other, theirs, told), float(told.sum())
-    return best
 
 
 def _search(left: Leftover, weights: Array) -> tuple[int, ...]:

@@ -18,8 +18,8 @@ MOST_PERIODS, MOST_MISREAD = 3, 6
 fit finds cogging by itself. What a reading's error costs grows with their square."""
 BUILT_UP = (0.125, 0.25, 0.5)
 """Shares of the range over which friction builds up: shorter ones are a law's presliding."""
-CENTRES, BUMP = (0.25, 0.5, 0.75), 0.125
-"""Places of bumps among the speeds, and their half width: neighbours overlap at half height."""
+CENTRES, BUMP = tuple(0.125 * place for place in range(1, 8)), 0.125
+"""Places of bumps among the speeds, and their width (sd): one lies near every dip."""
 
 
 @dataclass(frozen=True)
