@@ -18,7 +18,7 @@ from scissorcal.calibration.critic import (
 )
 from scissorcal.calibration.fit_candidate import fit_candidate
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.model.friction_terms import LIBRARY
+from scissorcal.model.course_terms import LIBRARY
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.friction.test_fit import emps
@@ -137,13 +137,13 @@ def test_the_critic_is_asked_at_standard_effort_only_unless_it_is_asked_for():
         assert status == "pass"
 
 
-def test_emps_leaves_friction_that_bends_over_the_speed():
-    """A bump at a quarter of the speeds gains 61 nats, a drag with the square of the rate 46."""
+def test_emps_leaves_friction_that_bends_over_speed_and_place():
+    """One bump gains 77 nats on unseen strokes, a drag with the square of the rate 46."""
     found = fit_friction((emps(),), SIMPLE, effort="standard", rng=np.random.default_rng(0))
-    (proposal,) = found.critic
-    assert proposal.name == "sign*bump(0.25)"
-    assert proposal.held_out_gain == pytest.approx(0.034, abs=0.005)
-    assert proposal.unit == "N"
+    assert [one.name for one in found.critic] == ["sign*bump(0.375)", "sign*wave(1 period)"]
+    assert found.critic[0].coefficient == pytest.approx(-3.4, rel=0.2)
+    assert found.critic[0].held_out_gain == pytest.approx(0.043, abs=0.005)
+    assert found.critic[0].unit == "N"
     (judged,) = (one for one in found.verdicts if one.check == "structure left")
     assert judged.status == "pass"
 

@@ -18,7 +18,7 @@ from scissorcal.calibration.fit_candidate import FittedCandidate, split_strokes
 from scissorcal.calibration.leftover import DRAWS, Leftover, course_of, tabulate
 from scissorcal.calibration.result import Proposal
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.model.friction_terms import LIBRARY
+from scissorcal.model.course_terms import LIBRARY
 from scissorcal.model.terms import Term
 from scissorcal.recording.recording import Joint
 from scissorcal.verdicts import Verdict, not_evaluated
@@ -137,7 +137,9 @@ def structure_verdict(
     """
     found = critique.structure
     if found is None:
-        return not_evaluated(scope, "structure left", critique.sentence, tolerance)
+        asked = critique.sentence != NOT_ASKED
+        why = critique.sentence if asked else "The critic was not asked; --critic asks it."
+        return not_evaluated(scope, "structure left", why, tolerance)
     low, size, high = (value / drive for value in (found.low, found.size, found.high))
     names = ", ".join(proposal.name for proposal in critique.proposals)
     most = f"{found.high:.2g} {unit} ({high:.1%} of the drive)"
@@ -150,7 +152,7 @@ def structure_verdict(
     if low > tolerance:
         why = (
             f"{said} That is more than the scene's tolerance of {tolerance:.3g}: adopt the term if "
-            "it is friction; if it is of the day or the rig, cure it (warm up, mend the encoder) "
+            "it is friction; if it is of the day or the rig, cure it (warm up, repair the encoder) "
             "and capture again."
         )
         return Verdict(scope, "structure left", "fail", low, tolerance, why)

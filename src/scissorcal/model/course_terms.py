@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from scissorcal.model.friction_terms import TERMS
 from scissorcal.model.terms import Motion, Role, Term
 
 MOST_PERIODS, MOST_MISREAD = 3, 6
@@ -144,3 +145,5 @@ COURSE = (
     ),
 )
 """Rows in the form of :mod:`~scissorcal.model.friction_terms`; a wave's two phases are one part."""
+LIBRARY = TERMS | {term.name: term for term in COURSE}
+"""Terms that the critic searches: those that a recipe adopts, then those of a whole course."""

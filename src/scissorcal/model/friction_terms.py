@@ -11,7 +11,6 @@ import itertools
 from collections.abc import Container
 from typing import TYPE_CHECKING, Any
 
-from scissorcal.model.course_terms import COURSE
 from scissorcal.model.terms import Motion, Prior, Role, Term
 from scissorcal.model.transforms import LOG, LOGIT
 
@@ -307,9 +306,8 @@ _ADOPTED = (
 PARAMETERS = {term.name: term for term in (*_LAW, *_NUISANCE)}
 """Rows of a friction fit by the name of their parameter, without its direction."""
 TERMS = {term.name: term for term in _ADOPTED}
-"""Terms that a recipe adopts, by name, simple ones first."""
-LIBRARY = TERMS | {term.name: term for term in COURSE}
-"""Terms that the critic searches: those of :data:`TERMS`, and those of a whole course of motion."""
+"""Terms that the critic proposes and a recipe adopts, by name, simple ones first; what it searches
+besides is in :mod:`~scissorcal.model.course_terms`."""
 NUISANCE = tuple(term.name for term in _NUISANCE)
 NEAR_REST = tuple(n for t in _LAW if t.scale for n in (t.name, t.scale))
 """Parameters that matter below the slowest sweep alone, where no sweep is slow enough."""
