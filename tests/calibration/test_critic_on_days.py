@@ -31,9 +31,9 @@ def day(seed: int, make=fine):
     return capture_friction(rig, recipe_for(rig), rng)[0]
 
 
-def criticised(recording) -> tuple[tuple[str, ...], Verdict]:
+def criticised(recording, law=LAW) -> tuple[tuple[str, ...], Verdict]:
     rng = np.random.default_rng(183)
-    fit = fit_friction((recording,), LAW, effort="draft", rng=rng, critic=True)
+    fit = fit_friction((recording,), law, effort="draft", rng=rng, critic=True)
     judged = next(one for one in fit.verdicts if one.check == "structure left")
     return tuple(proposal.name for proposal in fit.critic), judged
 
@@ -46,12 +46,24 @@ def test_a_drift_of_friction_is_named_and_fails_by_its_torque():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", NAMES)
+@pytest.mark.parametrize("what", [what for what in NAMES if what != "second minimum"])
 def test_what_is_planted_is_named_on_five_of_five_days(what):
     for seed in SEEDS:
         names, judged = criticised(planted(day(seed), what, np.random.default_rng(seed)))
         assert any(name.startswith(NAMES[what]) for name in names), (seed, names)
         assert judged.status == "fail" or what not in FELT, (seed, judged)
+
+
+@pytest.mark.slow
+def test_a_second_minimum_is_named_at_the_latest_when_a_drag_is_adopted():
+    """A law whose Stribeck friction reached for the dip leaves what a drag explains best."""
+    for seed in SEEDS:
+        recording = planted(day(seed), "second minimum", np.random.default_rng(seed))
+        first, judged = criticised(recording)
+        assert judged.value > 0.04
+        adopted = LAW.model_copy(update={"adopt": tuple({*first} & {"rate*|rate|"})})
+        second, _ = criticised(recording, adopted)
+        assert any(name.startswith("sign*bump(0.375)") for name in (*first, *second)), seed
 
 
 @pytest.mark.slow

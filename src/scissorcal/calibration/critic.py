@@ -151,18 +151,18 @@ def structure_verdict(
         )
     if low > tolerance:
         why = (
-            f"{said} That is more than the scene's tolerance of {tolerance:.3g}: adopt the term if "
-            "it is friction; if it is of the day or the rig, cure it (warm up, repair the encoder) "
-            "and capture again."
+            f"{said} That is more than the scene's tolerance of {100 * tolerance:g}%: adopt the "
+            "term if it is friction; if it is of the day or the rig, cure it (warm up, repair the "
+            "encoder) and capture again."
         )
         return Verdict(scope, "structure left", "fail", low, tolerance, why)
     if high > tolerance:
-        why = f"{said} Whether that exceeds the scene's tolerance is not determined: {_MORE}"
+        why = (
+            f"{said} Whether that exceeds the scene's tolerance of {100 * tolerance:g}% is not "
+            "determined: capture more strokes."
+        )
         return not_evaluated(scope, "structure left", why, tolerance, low)
     return Verdict(scope, "structure left", "pass", low, tolerance, said)
-
-
-_MORE = "capture more strokes."
 
 
 def _candidates(load: Array | None, joint: Joint) -> tuple[Term, ...]:
