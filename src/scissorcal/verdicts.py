@@ -77,6 +77,11 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "at most",
         TORQUE + "median rms error on unseen strokes, share of the rms of all strokes",
     ),
+    "fit structure left": (
+        "at most",
+        TORQUE + "lower limit of twice the rms of what the law lacks in every stroke, share of the "
+        "drive (rms)",
+    ),
     "fit recordings": (
         "at most",
         TORQUE + "rms error on a recording by the others, share of the rms of all recordings",

@@ -32,7 +32,9 @@ def results() -> dict[str, Result]:
         rows=(ReplayRow(2, "a.mcap", "speed", 1.0, 0.9, 0.02, 0.004, 0.001, float("nan")),),
         sentence="Replaying stroke 1 misses the others.",
     )
-    proposal = Proposal("rate^2", "rate squared", 1e-3, 1e-4, "N m", 0.9, 0.1, 12.0, "", "It.")
+    proposal = Proposal(
+        "rate^2", "rate squared", 1e-3, 1e-4, "N m", 2e-3, 0.9, 0.1, 12.0, "", "It."
+    )
     density = rng.normal(-5.0, 0.1, (8, 3))
     predictive = Predictive(
         torque=rng.normal(0.0, 0.1, (4, len(cut.series.measured))).astype(np.float32),
@@ -51,6 +53,7 @@ def results() -> dict[str, Result]:
             nuisance_draws=friction.draws[:, :1],
             replay=replay,
             critic=(proposal,),
+            proposed=1e-3 * friction.series.measured,
             selection="The cheapest.",
         ),
         "cut": replace(cut, predictive=predictive),

@@ -39,6 +39,7 @@ def doubted() -> FitResult:
         0.12,
         0.02,
         "1",
+        0.0031,
         0.93,
         0.18,
         41.0,
@@ -54,7 +55,8 @@ def doubted() -> FitResult:
         2, FRICTION_SOURCE, "closing", 0.12, table, table, rows, "The law is better on 1 of 2."
     )
     prior = fit.map_point * np.exp(rng.normal(size=(300, len(fit.parameters))))
-    return replace(fit, critic=(proposal,), replay=replay, prior_draws=prior)
+    bent = 3e-4 * np.sign(fit.series.opening_rate) * fit.series.time_s
+    return replace(fit, critic=(proposal,), proposed=bent, replay=replay, prior_draws=prior)
 
 
 def checked(fit: FitResult, ranks: tuple[int, ...]) -> VerifyResult:
@@ -128,8 +130,20 @@ def test_a_proposal_shows_how_often_and_how_much(report: Built) -> None:
     for words in ("|load| sgn(rate)", "0.120 ± 0.020", 'terms = ["load"]'):
         assert words in report.page.text
     row = values_of(panel_of(report.twin, "friction-critic"))["|load| sgn(rate)"]
-    found, falls = row["found in resamples"], row["hold-out error falls by"]
+    found = row["found without a quarter of the strokes"]
+    size, falls = row["torque, twice the rms"], row["hold-out error falls by"]
     assert (found["number"], found["unit"], falls["number"]) == (pytest.approx(93), "%", 18)
+    assert (size["number"], size["unit"]) == (0.0031, "N m")
+
+
+def test_what_is_proposed_is_drawn_among_the_residuals(report: Built) -> None:
+    charts = {one["id"]: one for one in panel_of(report.twin, "friction-residuals")["charts"]}
+    for over in ("spread", "spread-rate", "spread-time"):
+        lines = [one for one in charts[f"friction-{over}"]["series"] if one["kind"] == "line"]
+        assert [one["name"] for one in lines] == ["load, closing", "load, opening"]
+    closing, opening = lines
+    assert np.all(np.diff(opening["y"]) > 0.0)
+    assert np.all(np.diff(closing["y"]) < 0.0)
 
 
 def test_a_replay_is_tied_to_its_strokes(report: Built) -> None:

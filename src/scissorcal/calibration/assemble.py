@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.checks import trust_verdicts
 from scissorcal.calibration.comparison import candidate_rows, comparison_text
-from scissorcal.calibration.critic import Critique, criticise
+from scissorcal.calibration.critic import NOT_ASKED, Critique, criticise, structure_verdict
 from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.calibration.predictive import predictive_of
 from scissorcal.calibration.replay import compare_with_replay
@@ -17,7 +17,6 @@ from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeEr
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.usage import Usage
 from scissorcal.inference import Posterior, ljung_box
-from scissorcal.model.terms import Motion
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict
 
@@ -49,6 +48,8 @@ def assemble(
     usage: Usage,
     brief: bool = False,
     load: Array | None = None,
+    tolerance: float | None = None,
+    known: tuple[str, ...] = (),
     extra_verdicts: tuple[Verdict, ...] = (),
     extra_notes: tuple[str, ...] = (),
     extra_diagnostics: Mapping[str, Any] | None = None,
@@ -58,9 +59,10 @@ def assemble(
     ``nuisance`` names parameters that the posterior holds but nobody asked for; they are kept
     out of the parameter table. ``measured`` and ``contact`` are by bin (n,). ``extra_verdicts`` and
     ``extra_notes`` and ``extra_diagnostics`` are what only the fit itself can say; they follow the
-    common ones. ``critic``
-    has the residuals searched for what the law lacks, unless the effort is draft; ``load`` (n,) is
-    what the joint bore, where that was measured. ``usage`` says which samples the fit uses.
+    common ones. ``critic`` has the residuals searched for what the law lacks, which is judged by
+    the ``tolerance`` of torque, a share, where there is one, but for terms that are ``known`` by
+    name from elsewhere; ``load`` (n,) is what the joint bore,
+    where that was measured. ``usage`` says which samples the fit uses.
     ``brief`` leaves out what only people read: replay and replicated data.
     """
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
@@ -70,14 +72,17 @@ def assemble(
     rows = candidate_rows(compared, chosen)
     diagnostics = _diagnostics(compared, chosen, posterior, bins, measured)
     diagnostics |= dict(extra_diagnostics or {})
-    critique = Critique((), "The critic was not asked.")
-    if critic and effort != "draft":
-        critique = _criticise(what, chosen, bins, measured, load, joint, rng)
+    critique = Critique((), NOT_ASKED)
+    if critic:
+        critique = _criticise(what, chosen, bins, measured, load, joint, rng, known)
     tables = _parameters(chosen, posterior, nuisance, rng)
     diagnostics["critic"] = critique.sentence
     trust = trust_verdicts(
         what, effort, chosen, posterior, diagnostics, held_out, nuisance, bins, contact
     )
+    if tolerance is not None:
+        drive, unit = float(np.sqrt(np.mean(measured**2))), joint.effort_unit
+        trust += (structure_verdict(f"fit.{what}", critique, drive, unit, tolerance),)
     for_people: dict[str, Any] = {}
     if not brief:
         for_people["replay"] = compare_with_replay(
@@ -109,6 +114,7 @@ def assemble(
         notes=(*(note for recording in recordings for note in recording.notes), *extra_notes),
         selection=comparison_text(compared, chosen, bins, contact, joint),
         critic=critique.proposals,
+        proposed=None if critique.torque is None else critique.torque[thin],
         **for_people,
         **tables,
     )
@@ -191,12 +197,12 @@ def _criticise(
     load: Array | None,
     joint: Joint,
     rng: np.random.Generator,
+    known: tuple[str, ...],
 ) -> Critique:
     """A cut's load, where none was measured, is the torque that the law expects of the material."""
     if what == "cut" and load is None:
         load = measured - chosen.candidate.likelihood.residuals(chosen.optimum.point)
-    motion = Motion(bins.opening, bins.rate, bins.acceleration, load)
-    return criticise(what, chosen, motion, joint, rng)
+    return criticise(what, chosen, bins, load, joint, rng, known)
 
 
 def _prior_draws(chosen: FittedCandidate, rng: np.random.Generator) -> Array:

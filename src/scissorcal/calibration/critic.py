@@ -1,6 +1,11 @@
-"""The critic: searches what a law leaves unexplained for terms that recur. It never decides."""
+"""The critic: searches what a law leaves unexplained for terms that recur. It never decides.
+
+Whether anything stands out at all is asked first, without a search; PySINDy, whose import takes
+most of a second, searches only then.
+"""
 
 import json
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -10,61 +15,80 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.candidates import POSITIVE_EVIDENCE
 from scissorcal.calibration.fit_candidate import FittedCandidate, split_strokes
+from scissorcal.calibration.leftover import DRAWS, Leftover, course_of, tabulate
 from scissorcal.calibration.result import Proposal
-from scissorcal.inference import gradient, ljung_box
-from scissorcal.model.friction_terms import TERMS, evaluate
-from scissorcal.model.terms import Motion, Term
+from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.model.course_terms import LIBRARY
+from scissorcal.model.terms import Term
 from scissorcal.recording.recording import Joint
+from scissorcal.verdicts import Verdict, not_evaluated
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
-RESAMPLES = 100
-FALSE_ALARM = 0.05
-FEWEST_FOR_RANKS = 6
-"""With fewer strokes no ranking reaches 5 %, and the evidence alone decides."""
-RECURS = 0.8
-"""Share of resamples in which a term must be found to be proposed."""
+FALSE_ALARM = 0.02
+"""Chance that the critic proposes anything where nothing is missing."""
+FEWEST_STROKES = 6
+"""Six strokes must agree on a term to an eighth of itself, three to a fiftieth (Student's t at the
+chance ``FALSE_ALARM`` of one in 45 terms)."""
+RECURS = 0.75
+"""Share of the searches without a quarter of the strokes in which a term must be found: one quarter
+may hold all strokes that show it."""
 TWINS = 0.9
 """Correlation, the law taken out, from which two terms are one finding under two names."""
 MOST_TERMS = 3
-FEWEST_STROKES = 6
-WITHIN_ROUNDING = 1e-10
-KNOWN_TO_LAW = 1e-3
-"""Share of a term's variance that the law cannot imitate, below which the law has it already."""
-LEAST_GAIN = 0.005
-"""Share of the hold-out error below which a gain is of no use to anybody."""
+NOT_ASKED = "The critic was not asked."
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Torque that a law lacks and that recurs over strokes: twice its rms, which holds 95 % of it.
+
+    ``low`` and ``high`` are its interval of 90 %, all in N m (N); ``low`` is 0 where nothing stands
+    out, and ``high`` what any one term of the library could still hide.
+    """
+
+    size: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
 class Critique:
-    """What the critic proposes, and a sentence on what it searched and found."""
+    """What the critic proposes, a sentence on what it did, and the structure that is left.
+
+    ``torque`` (n,) is what the proposals add to the law at each bin. Structure and torque are None
+    where the critic did not look.
+    """
 
     proposals: tuple[Proposal, ...]
     sentence: str
+    structure: Structure | None = None
+    torque: Array | None = None
 
 
 def criticise(
     what: Literal["friction", "cut"],
     chosen: FittedCandidate,
-    motion: Motion,
+    bins: Bins,
+    load: Array | None,
     joint: Joint,
     rng: np.random.Generator,
+    known: Sequence[str] = (),
 ) -> Critique:
-    """Search a law's residuals for terms of the shared library that it lacks.
+    """Search a law's residuals for terms of the library that it lacks.
 
     A static search (Brunton, Proctor and Kutz 2016, doi:10.1073/pnas.1517384113, with the residual
-    in the place of the derivative) by FROLS (Billings 2013) on columns of unit rms, cut off by the
-    extended BIC over independent observations (Chen and Chen 2008, doi:10.1093/biomet/asn034).
-    What the law itself could imitate by other values of its parameters is projected out first. The
-    search is repeated over resamples of whole strokes, never of single bins, whose errors depend
-    on each other; strokes longer than most count as several, lest all excited motion be missing
-    from every third resample. A term is proposed where it is found in at least ``RECURS`` of them,
-    and lowers the error on unseen strokes consistently (:func:`is_consistent`) and by
-    ``LEAST_GAIN`` at least, the law's parameters being refitted with it, by one Gauss-Newton step,
-    as they are without it.
+    in the place of the derivative) by PySINDy's FROLS (Billings 2013), cut off by the extended BIC
+    over independent observations (Chen and Chen 2008, doi:10.1093/biomet/asn034). What the law
+    itself could imitate by other values of its parameters is projected out first. There is a search
+    over all strokes, and one without each quarter of them: whole strokes, never single bins, whose
+    errors depend on each other. A term is proposed where it is found in ``RECURS`` of the latter,
+    goes along with the residual as no term of the library does by chance
+    (:meth:`Leftover.chances`), and is strong evidence on unseen strokes, the law's parameters being
+    refitted with it, by one Gauss-Newton step, as they are without it.
 
-    ``motion`` holds the (n,) bins that the law was fitted to.
+    ``bins`` (n,) are those that the law was fitted to, ``load`` (n,) what the joint bore. Terms
+    that are ``known`` by name are judged elsewhere and count as the law's.
     """
     labels = np.unique(chosen.strokes)
     if len(labels) < FEWEST_STROKES:
@@ -73,283 +97,205 @@ def criticise(
             f"The critic needs {FEWEST_STROKES} strokes at least to tell what recurs, and there "
             f"are {len(labels)}.",
         )
-    terms = _candidates(motion, joint)
-    table = _tabulate(chosen, motion, terms, labels)
-    twins = _twins(table)
-    pieces = len(table.bins)
-    even = np.full(pieces, 1.0 / pieces)
-    found = [
-        _search(table, rng.multinomial(pieces, even).astype(np.float64)) for _ in range(RESAMPLES)
-    ]
-    accepted: list[int] = []
-    proposals: list[Proposal] = []
-    for index in _search(table, np.ones(pieces)):
-        inclusion = float(np.mean([bool(twins[index] & set(support)) for support in found]))
-        gain, nats = _held_out(table, accepted, index)
-        if inclusion < RECURS or not is_consistent(nats) or gain < LEAST_GAIN:
-            continue
-        accepted.append(index)
-        proposals.append(
-            _propose(what, chosen, table, accepted, twins[index], joint, inclusion, gain, nats)
-        )
-    names = f"{len(table.terms)} terms over {RESAMPLES} resamples of {len(labels)} strokes"
-    if not proposals:
-        return Critique((), f"The critic tried {names} and proposes none.")
+    terms = [term for term in _candidates(load, joint) if term.name not in known]
+    already = [LIBRARY[name] for name in known]
+    left = tabulate(chosen, course_of(bins, load), terms, already, labels)
+    tried = f"The critic tried {len(left.terms)} terms over {len(labels)} strokes"
+    quiet = Structure(0.0, 0.0, left.hidden())
+    least = min(left.chances().values(), default=1.0)
+    if least >= FALSE_ALARM:
+        sentence = f"{tried} and proposes none: none stands out of chance ({least:.0%})."
+        return Critique((), sentence, quiet)
+    findings = _accepted(left)
+    if not findings:
+        sentence = f"{tried} and proposes none: what stands out does not recur in unseen strokes."
+        return Critique((), sentence, quiet)
+    accepted = [index for finding in findings for index in finding.terms]
+    coefficients, covariance = left.refitted(accepted)
+    draws = rng.multivariate_normal(coefficients, covariance, DRAWS, method="eigh")
+    low, high = np.quantile(left.sizes(accepted, draws), [0.05, 0.95])
+    size = float(left.sizes(accepted, coefficients[None])[0])
+    proposals = tuple(
+        _propose(what, chosen, left, findings[: place + 1], joint) for place in range(len(findings))
+    )
     listed = ", ".join(proposal.name for proposal in proposals)
-    return Critique(tuple(proposals), f"The critic tried {names} and proposes {listed}.")
+    return Critique(
+        proposals,
+        f"{tried} and proposes {listed}.",
+        Structure(size, float(low), float(high)),
+        left.torque(accepted, coefficients),
+    )
+
+
+def structure_verdict(
+    scope: str, critique: Critique, drive: float, unit: str, tolerance: float
+) -> Verdict:
+    """Judge what recurs and the law lacks by the share of torque that the scene tolerates.
+
+    ``drive`` is the drive's rms. It fails where the structure's lower limit exceeds the tolerance,
+    and is not determined where only its upper one does.
+    """
+    found = critique.structure
+    if found is None:
+        asked = critique.sentence != NOT_ASKED
+        why = critique.sentence if asked else "The critic was not asked; --critic asks it."
+        return not_evaluated(scope, "structure left", why, tolerance)
+    low, size, high = (value / drive for value in (found.low, found.size, found.high))
+    names = ", ".join(proposal.name for proposal in critique.proposals)
+    most = f"{found.high:.2g} {unit} ({high:.1%} of the drive)"
+    said = f"No term of the critic's library stands out; it could hide {most} at most."
+    if names:
+        said = (
+            f"What the law lacks recurs over strokes with {found.size:.2g} {unit} ({size:.1%} of "
+            f"the drive, {low:.1%} to {high:.1%}; twice the rms): {names}."
+        )
+    if low > tolerance:
+        why = (
+            f"{said} That is more than the scene's tolerance of {100 * tolerance:g}%: adopt the "
+            "term if it is friction; if it is of the day or the rig, cure it (warm up, repair the "
+            "encoder) and capture again."
+        )
+        return Verdict(scope, "structure left", "fail", low, tolerance, why)
+    if high > tolerance:
+        why = (
+            f"{said} Whether that exceeds the scene's tolerance of {100 * tolerance:g}% is not "
+            "determined: capture more strokes."
+        )
+        return not_evaluated(scope, "structure left", why, tolerance, low)
+    return Verdict(scope, "structure left", "pass", low, tolerance, said)
+
+
+def _candidates(load: Array | None, joint: Joint) -> tuple[Term, ...]:
+    return tuple(
+        term
+        for term in LIBRARY.values()
+        if not (term.needs_load and load is None) and not (term.rotary and joint.kind == "linear")
+    )
 
 
 @dataclass(frozen=True)
-class _Table:
-    """Products of columns by piece, (pieces, m, m): the law's slopes, the terms, the residual.
+class _Finding:
+    """Terms that are found together, what speaks for them, and findings that say nearly the same.
 
-    A piece is a stroke, or a stretch of a long one. Columns are in unit rms but the residual;
-    ``scale`` (terms,) is what the terms were divided by, ``law`` counts the law's slopes, ``bins``
-    (pieces,) are the bins of each piece, ``stroke`` (pieces,) its stroke's number. ``share`` is the
-    share of bins that are independent once all terms together have explained what they can: what
-    is missing from a law is correlated too, and must not pass for noise.
+    ``name`` is the term's, or that of both phases of a wave.
     """
 
-    gram: Array
-    terms: tuple[Term, ...]
-    scale: Array
-    law: int
-    bins: Array
-    stroke: Integers
-    share: float
+    name: str
+    terms: tuple[int, ...]
+    inclusion: float
+    gain: float
+    nats: float
+    twins: tuple[str, ...]
 
 
-def is_consistent(gained: Array) -> bool:
-    """Whether log density gained by stroke (strokes,) is strong evidence, and in most strokes.
-
-    The search tries many terms, so that a sum over strokes alone would propose those that a few
-    strokes favour: Wilcoxon's signed-rank test (doi:10.2307/3001968) at 5 % counts too, where there
-    are strokes enough for it.
-    """
-    if float(gained.sum()) < POSITIVE_EVIDENCE:
-        return False
-    return len(gained) < FEWEST_FOR_RANKS or signed_rank_chance(gained) < FALSE_ALARM
-
-
-def signed_rank_chance(gained: Array) -> float:
-    """Chance that values (n,) without a preferred sign have such a sum of positive ranks, or more.
-
-    Exact, by counting the sums of all choices of signs: gains are real numbers, so that none are
-    zero or equal. (Importing scipy.stats, which has it, costs half a second.)
-
-    >>> signed_rank_chance(np.array([0.3, 0.1, -0.2, 0.5]))
-    0.1875
-    """
-    ranks = np.argsort(np.argsort(np.abs(gained))) + 1
-    chances = np.ones(1)
-    for rank in range(1, len(gained) + 1):
-        chances = 0.5 * (np.pad(chances, (0, rank)) + np.pad(chances, (rank, 0)))
-    return float(chances[int(ranks[gained > 0].sum()) :].sum())
-
-
-def _candidates(motion: Motion, joint: Joint) -> tuple[Term, ...]:
-    return tuple(
-        term
-        for term in TERMS.values()
-        if not (term.needs_load and motion.load is None)
-        and not (term.rotary and joint.kind == "linear")
+def _accepted(left: Leftover) -> list[_Finding]:
+    """What is found, recurs, stands out of chance and helps on unseen strokes, in order."""
+    folds = split_strokes(np.unique(left.stroke))
+    seen = [(~np.isin(left.stroke, fold)).astype(np.float64) for fold in folds]
+    every, *without = (
+        list(dict.fromkeys(left.terms[i].part or left.terms[i].name for i in _search(left, one)))
+        for one in (np.ones(len(left.bins)), *seen)
     )
+    twins = left.twins(TWINS)
+    found: list[_Finding] = []
+    for name in every:
+        within = [index for finding in found for index in finding.terms]
+        terms = left.findings[name]
+        recurs = float(np.mean([bool(twins[name] & set(others)) for others in without]))
+        gain, nats = left.held_out(within, terms)
+        if recurs < RECURS or nats.sum() < POSITIVE_EVIDENCE:
+            continue
+        if left.chances(within).get(name, 1.0) >= FALSE_ALARM:
+            continue
+        others = tuple(sorted(twins[name] - {name}))
+        found.append(_Finding(name, tuple(terms), recurs, gain, float(nats.sum()), others))
+    return found
 
 
-def _tabulate(
-    chosen: FittedCandidate, motion: Motion, terms: Sequence[Term], labels: Integers
-) -> _Table:
-    """Reduce all bins to products by stroke, leaving out terms that the law has already."""
-    point = chosen.optimum.point
-    residuals = chosen.candidate.likelihood.residuals
-    slopes = -gradient(residuals, point, 1e-3 * chosen.candidate.layout.sd)
-    law = slopes[:, np.any(slopes != 0, axis=0)]
-    law = law / _rms(law)
-    columns = evaluate(tuple(term.name for term in terms), motion)
-    scale = _rms(columns)
-    alive = np.flatnonzero(scale > 0)
-    columns = columns[:, alive] / scale[alive]
-    basis = np.linalg.svd(law, full_matrices=False)
-    basis_columns = basis[0][:, basis[1] > 1e-8 * basis[1].max()]
-    left = columns - basis_columns @ (basis_columns.T @ columns)
-    new = np.flatnonzero(np.mean(left**2, axis=0) > KNOWN_TO_LAW)
-    every = np.column_stack([law, columns[:, new], residuals(point)])
-    solution = np.linalg.lstsq(every[:, :-1], every[:, -1], rcond=1e-8)[0]
-    white = ljung_box(every[:, -1] - every[:, :-1] @ solution, chosen.series)
-    strokes = [np.flatnonzero(chosen.strokes == label) for label in labels]
-    usual = float(np.median([len(here) for here in strokes]))
-    split = [np.array_split(here, max(1, round(len(here) / usual))) for here in strokes]
-    pieces = [piece for stroke in split for piece in stroke]
-    return _Table(
-        gram=np.stack([every[here].T @ every[here] for here in pieces]),
-        terms=tuple(terms[alive[i]] for i in new),
-        scale=scale[alive[new]],
-        law=law.shape[1],
-        bins=np.array([len(here) for here in pieces], dtype=np.float64),
-        stroke=np.repeat(np.arange(len(split)), [len(stroke) for stroke in split]),
-        share=white.share,
-    )
-
-
-def _twins(table: _Table) -> list[set[int]]:
-    """For each term those that, with the law taken out, say nearly the same, itself among them."""
-    if not table.terms:
-        return []
-    design, _ = _without_law(table, table.gram.sum(axis=0))
-    unit = design / np.sqrt(np.sum(design**2, axis=0))
-    alike = np.abs(unit.T @ unit) > TWINS
-    return [set(np.flatnonzero(row).tolist()) | {i} for i, row in enumerate(alike)]
-
-
-def _rms(columns: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(columns**2, axis=0)))
-
-
-def _search(table: _Table, weights: Array) -> tuple[int, ...]:
-    """Terms that FROLS and the extended BIC take, given how often each piece counts."""
-    if not table.terms:
-        return ()
-    design, target = _without_law(table, np.tensordot(weights, table.gram, axes=1))
+def _search(left: Leftover, weights: Array) -> tuple[int, ...]:
+    """Terms that FROLS and the extended BIC take, the first first, over pieces with ``weights``."""
+    design, target = left.weighed(weights)
     size = np.sqrt(np.sum(design**2, axis=0))
-    usable = np.flatnonzero(size**2 > KNOWN_TO_LAW * float(weights @ table.bins))
+    counted = float(weights @ left.bins)
+    usable = np.flatnonzero(size**2 > 1e-3 * counted)
     if len(usable) == 0:
         return ()
-    count = float(weights @ table.bins) * table.share
+    count = counted * left.share
     best: tuple[int, ...] = ()
     lowest = count * np.log(float(target @ target))
-    for support in forward_path(design[:, usable] / size[usable], target):
+    for support in _supports(design[:, usable] / size[usable], target):
         kept = design[:, usable[list(support)]]
-        left = target - kept @ np.linalg.lstsq(kept, target, rcond=None)[0]
+        rest = target - kept @ np.linalg.lstsq(kept, target, rcond=None)[0]
         penalty = len(support) * (np.log(count) + 2 * np.log(len(usable)))
-        criterion = count * np.log(max(float(left @ left), 1e-300)) + penalty
+        criterion = count * np.log(max(float(rest @ rest), 1e-300)) + penalty
         if criterion < lowest:
             best, lowest = tuple(int(usable[i]) for i in support), criterion
     return best
 
 
-def _without_law(table: _Table, gram: Array) -> tuple[Array, Array]:
-    """Few rows with the products of all bins: terms (m, terms) and residual (m,), law taken out."""
-    values, vectors = np.linalg.eigh(gram)
-    rows = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
-    basis, singular, _ = np.linalg.svd(rows[:, : table.law], full_matrices=False)
-    basis = basis[:, singular > 1e-6 * singular.max(initial=0.0)]
-    rest = rows[:, table.law :]
-    rest = rest - basis @ (basis.T @ rest)
-    return rest[:, :-1], rest[:, -1]
+def _supports(design: Array, target: Array) -> list[tuple[int, ...]]:
+    """Supports of growing size, each in the order in which FROLS took its terms."""
+    with warnings.catch_warnings():
+        # What it imports announces changes of its own that do not concern the search.
+        warnings.simplefilter("ignore")
+        from pysindy.optimizers import FROLS
 
-
-def forward_path(design: Array, target: Array, most: int = MOST_TERMS) -> list[tuple[int, ...]]:
-    """Supports of growing size by forward regression orthogonal least squares.
-
-    Each step takes the column of ``design`` (m, k) that, made orthogonal to those before, explains
-    most of ``target`` (m,): the largest error reduction ratio (Billings 2013, ISBN 9781119943594,
-    section 3.2; FROLS in PySINDy). Columns that those before make up already are never taken.
-    """
-    left = np.array(design, dtype=np.float64)
-    before = np.sum(left**2, axis=0)
-    chosen: list[int] = []
+        search = FROLS(max_iter=min(MOST_TERMS, design.shape[1]), alpha=0.0, unbias=False)
+        search.fit(design, target[:, None])
+    order: list[int] = []
     supports = []
-    for _ in range(min(most, design.shape[1])):
-        size = np.sum(left**2, axis=0)
-        new = size > WITHIN_ROUNDING * before
-        new[chosen] = False
-        if not np.any(new):
-            break
-        explained = np.where(new, (left.T @ target) ** 2 / np.where(new, size, 1.0), -1.0)
-        chosen.append(int(np.argmax(explained)))
-        supports.append(tuple(sorted(chosen)))
-        along = left[:, chosen[-1]] / np.sqrt(size[chosen[-1]])
-        left -= np.outer(along, along @ left)
+    for step in search.history_:
+        taken = [int(i) for i in np.flatnonzero(step[0]) if i not in order]
+        if len(taken) == 1:
+            order += taken
+            supports.append(tuple(order))
     return supports
-
-
-def _solve(gram: Array, columns: Sequence[int]) -> Array:
-    """Least-squares coefficients (columns,) of the residual, from products."""
-    chosen = np.asarray(columns)
-    normal, slope = gram[np.ix_(chosen, chosen)], gram[chosen, -1]
-    return np.asarray(np.linalg.lstsq(normal, slope, rcond=1e-12)[0])
-
-
-def _squares(gram: Array, columns: Sequence[int], coefficients: Array) -> Array:
-    """Sum of squares (pieces,) that a solution leaves in each piece."""
-    across = np.zeros(gram.shape[-1])
-    across[list(columns)] = -coefficients
-    across[-1] = 1.0
-    return np.asarray(np.einsum("i,sij,j->s", across, gram, across))
-
-
-def _held_out(table: _Table, accepted: Sequence[int], index: int) -> tuple[float, Array]:
-    """What a term gains on unseen strokes: share of the rms, and nats by stroke (strokes,)."""
-    before = [*range(table.law), *(table.law + i for i in accepted)]
-    errors = np.zeros((2, len(table.gram)))
-    for fold in split_strokes(np.unique(table.stroke)):
-        unseen = np.isin(table.stroke, fold)
-        gram = table.gram[~unseen].sum(axis=0)
-        for row, columns in enumerate((before, [*before, table.law + index])):
-            solution = _solve(gram, columns)
-            errors[row, unseen] = _squares(table.gram[unseen], columns, solution)
-    variance = errors[0].sum() / table.bins.sum()
-    nats = 0.5 * table.share * (errors[0] - errors[1]) / variance
-    gain = 1.0 - float(np.sqrt(errors[1].sum() / errors[0].sum()))
-    return gain, np.bincount(table.stroke, nats).astype(np.float64)
 
 
 def _propose(
     what: Literal["friction", "cut"],
     chosen: FittedCandidate,
-    table: _Table,
-    accepted: Sequence[int],
-    twins: set[int],
+    left: Leftover,
+    found: Sequence[_Finding],
     joint: Joint,
-    inclusion: float,
-    gain: float,
-    nats: Array,
 ) -> Proposal:
-    """Refit law and accepted terms over all strokes, and word the last term as a proposal."""
-    columns = [*range(table.law), *(table.law + i for i in accepted)]
-    gram = table.gram.sum(axis=0)
-    solution = _solve(gram, columns)
-    sd = _clustered_sd(table, columns, solution)
-    index = accepted[-1]
-    term = table.terms[index]
-    coefficient = float(solution[-1] / table.scale[index])
-    coefficient_sd = float(sd[-1] / table.scale[index])
+    """Refit law and accepted terms over all strokes, and word the last finding as a proposal.
+
+    The coefficient of a wave is its amplitude.
+    """
+    finding = found[-1]
+    own = list(finding.terms)
+    every, covariances = left.refitted([index for one in found for index in one.terms])
+    coefficients = every[-len(own) :] / left.scale[own]
+    covariance = covariances[-len(own) :, -len(own) :] / np.outer(left.scale[own], left.scale[own])
+    coefficient = float(coefficients[0] if len(own) == 1 else np.linalg.norm(coefficients))
+    along = coefficients / np.linalg.norm(coefficients)
+    size = float(left.sizes(own, every[None, -len(own) :])[0])
+    term = left.terms[own[0]]
     unit = term.unit(joint.position_unit, joint.effort_unit)
     adopted = [str(name) for name in chosen.candidate.key.get("adopt", ())]
-    adopted += [table.terms[i].name for i in accepted]
+    adopted += [one.name for one in found if left.terms[one.terms[0]].adoptable]
     adoptable = what == "friction" and term.adoptable
     line = f"fit.friction.adopt = {json.dumps(adopted)}" if adoptable else ""
-    how = f"adopt it by {line}" if line else f"no {what} candidate has it yet"
+    how = f"adopt it by {line}" if line else f"no {what} candidate has it"
     sentence = (
-        f"{chosen.name} leaves {coefficient:.3g} {unit} times {term.name} ({term.meaning}) "
-        f"unexplained: found in {inclusion:.0%} of the resamples of strokes, and it lowers the "
-        f"error on unseen strokes by {gain:.1%} ({nats.sum():.0f} nats); {how}."
+        f"{chosen.name} leaves {coefficient:.3g} {unit} times {finding.name} ({term.meaning}) "
+        f"unexplained, {size:.2g} {joint.effort_unit} of torque (twice its rms): found in "
+        f"{finding.inclusion:.0%} of the searches without a quarter of the strokes, and it lowers "
+        f"the error on unseen strokes by {finding.gain:.1%} ({finding.nats:.0f} nats); {how}."
     )
-    others = ", ".join(table.terms[i].name for i in sorted(twins - {index}))
-    if others:
-        sentence += f" These strokes hardly tell it from {others}."
+    if finding.twins:
+        sentence += f" These strokes hardly tell it from {', '.join(finding.twins)}."
     return Proposal(
-        name=term.name,
-        formula=f"{term.meaning}: coefficient times {term.name}",
+        name=finding.name,
+        formula=f"{term.meaning}: coefficient times {finding.name}",
         coefficient=coefficient,
-        coefficient_sd=coefficient_sd,
+        coefficient_sd=float(np.sqrt(along @ covariance @ along)),
         unit=unit,
-        inclusion=inclusion,
-        held_out_gain=gain,
-        held_out_nats=float(nats.sum()),
+        size=size,
+        inclusion=finding.inclusion,
+        held_out_gain=finding.gain,
+        held_out_nats=finding.nats,
         adopted_by=line,
         sentence=sentence,
     )
-
-
-def _clustered_sd(table: _Table, columns: Sequence[int], solution: Array) -> Array:
-    """Standard deviations (columns,) that let errors depend on each other within a stroke.
-
-    Liang and Zeger 1986, doi:10.1093/biomet/73.1.13.
-    """
-    chosen, gram = np.asarray(columns), table.gram
-    normal = gram.sum(axis=0)[np.ix_(chosen, chosen)]
-    inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
-    by_piece = gram[:, chosen, -1] - gram[:, chosen[:, None], chosen] @ solution
-    scores = np.stack([by_piece[table.stroke == k].sum(axis=0) for k in np.unique(table.stroke)])
-    return np.asarray(np.sqrt(np.diag(inverse @ scores.T @ scores @ inverse)))

@@ -261,8 +261,9 @@ class Proposal:
     """A term that the critic found in the residuals, as a proposal for the model.
 
     The term ``name`` (``formula`` in words) has a ``coefficient`` in ``unit`` with the standard
-    deviation ``coefficient_sd``. ``inclusion`` is the share of resamples of whole strokes in which
-    the search found it, ``held_out_gain`` the share by which it lowers the rms hold-out error,
+    deviation ``coefficient_sd``. ``size`` is twice the rms of what it adds to the law, in the unit
+    of the measured effort. ``inclusion`` is the share of searches without a quarter of the strokes
+    that found it, ``held_out_gain`` the share by which it lowers the rms hold-out error,
     ``held_out_nats`` its gain in log density, independent points only. ``adopted_by`` is the line
     of the recipe that adds it to the model; empty where there is none.
     """
@@ -272,6 +273,7 @@ class Proposal:
     coefficient: float
     coefficient_sd: float
     unit: str
+    size: float
     inclusion: float
     held_out_gain: float
     held_out_nats: float
@@ -369,7 +371,8 @@ class FitResult(Result):
     with ``name``, ``bic``, ``held_out_rms``, ``held_out_score``, ``loo``, ``loo_se``,
     ``loo_k_hat``, ``chosen`` (it is the one used) and ``equivalent`` (not distinguishable from the
     best); ``selection`` is the same in words. ``critic`` holds the terms that the critic proposes,
-    ``replay`` the comparison with record-and-replay. ``prior_draws`` (k, parameters) are the
+    ``proposed`` (n,) what they add to the law at the points of ``series``, ``replay`` the
+    comparison with record-and-replay. ``prior_draws`` (k, parameters) are the
     prior's, in SI. ``nuisance`` and ``nuisance_draws`` (draws, nuisance) are parameters that are
     inferred and not reported, row by row with ``draws``. ``derived`` follow from parameters and the
     recipe, with ``derived_draws`` (draws, derived) row by row; no model needs them. ``diagnostics``
@@ -399,6 +402,7 @@ class FitResult(Result):
     notes: tuple[str, ...] = field(default=())
     selection: str = ""
     critic: tuple[Proposal, ...] = ()
+    proposed: Annotated[Array | None, Stored(("point",), "/posterior_predictive")] = None
     replay: ReplayComparison | None = None
     prior_draws: Annotated[Array | None, by_name("/prior", "parameters")] = None
     nuisance: tuple[FittedParameter, ...] = ()

@@ -58,6 +58,13 @@ def text(outcome: "FitOutcome") -> str:
     return "\n".join(line for line in said if line)
 
 
+def critic_text(outcome: "FitOutcome") -> str:
+    """What the critic of a fit tried, and how much torque recurs that the law lacks."""
+    fitted: FitResult = outcome.result
+    judged = [one.why for one in fitted.verdicts if one.check == "structure left"]
+    return "\n".join(["", str(fitted.diagnostics["critic"]), *judged])
+
+
 def _reported(outcome: "FitOutcome") -> "tuple[FittedParameter, ...]":
     return (*outcome.result.parameters, *outcome.result.derived)
 

@@ -306,7 +306,8 @@ _ADOPTED = (
 PARAMETERS = {term.name: term for term in (*_LAW, *_NUISANCE)}
 """Rows of a friction fit by the name of their parameter, without its direction."""
 TERMS = {term.name: term for term in _ADOPTED}
-"""Terms that the critic proposes and a recipe adopts, by name, simple ones first."""
+"""Terms that the critic proposes and a recipe adopts, by name, simple ones first; what it searches
+besides is in :mod:`~scissorcal.model.course_terms`."""
 NUISANCE = tuple(term.name for term in _NUISANCE)
 NEAR_REST = tuple(n for t in _LAW if t.scale for n in (t.name, t.scale))
 """Parameters that matter below the slowest sweep alone, where no sweep is slow enough."""

@@ -72,7 +72,8 @@ class FitFriction(FrictionLaws):
     ``adopt`` adds terms that the critic proposed, by name. ``cutoff_Hz`` is where the weights of
     the windows, over which data and law are averaged alike, pass half; they are longer where the
     encoder is too coarse for that.
-    ``critic`` searches the residuals for terms that the law lacks (not at draft effort).
+    ``critic`` searches the residuals for terms that the law lacks (at draft effort only where the
+    command line asks for it).
     ``between_recordings_percent`` is by how much two recordings of one rig usually differ: the
     scale of the prior of their scatter, which counts from two recordings on.
     """

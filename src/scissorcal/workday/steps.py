@@ -96,12 +96,14 @@ def _in_fits(name: str) -> Callable[[Workspace, Recipe], Path]:
 
 
 def _friction_settings(recipe: Recipe) -> object:
-    return recipe.fit.friction.model_dump(mode="json")
+    settings = recipe.fit.friction.model_dump(mode="json")
+    return {**settings, "tolerance_percent": recipe.scene.tolerance_percent}
 
 
 def _friction_advance_settings(recipe: Recipe) -> object:
     priors = recipe.fit.friction.priors.linear.model_dump(mode="json")
-    return [recipe.fit.friction_advance.model_dump(mode="json"), priors]
+    settings = recipe.fit.friction_advance.model_dump(mode="json")
+    return [settings, priors, recipe.scene.tolerance_percent]
 
 
 def _camera_settings(recipe: Recipe) -> object:

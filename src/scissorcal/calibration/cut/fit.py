@@ -344,7 +344,7 @@ def _assembled(
         joint=recordings[0].joint,
         nuisance=NUISANCE,
         rng=rng,
-        critic=data.recipe.fit.cut.critic,
+        critic=data.recipe.fit.cut.critic and effort != "draft",
         usage=usage,
         brief=data.known.prior is not None,
         extra_verdicts=verdicts,

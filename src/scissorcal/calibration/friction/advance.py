@@ -16,6 +16,7 @@ from scissorcal.calibration.friction.commanded import (
 )
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.result import Effort, FitResult, Proposal
+from scissorcal.calibration.signals.zeros import FELT
 from scissorcal.errors import InputError
 from scissorcal.inference import Stop
 from scissorcal.recipe.friction import AdvanceSettings
@@ -38,6 +39,8 @@ def fit_friction_advance(
     checkpoint: Path | None = None,
     last_chosen: str | None = None,
     stop: Stop | None = None,
+    critic: bool = False,
+    tolerance: float = FELT,
 ) -> FitResult:
     """Identify mass, friction and offset of the sledge from empty motion of it.
 
@@ -63,6 +66,8 @@ def fit_friction_advance(
             checkpoint=checkpoint,
             last_chosen=last_chosen,
             stop=stop,
+            critic=critic,
+            tolerance=tolerance,
         )
     except InputError as error:
         raise InputError(_renamed(str(error))) from error

@@ -56,7 +56,7 @@ from scissorcal.calibration.signals.steadiness import Steadiness, steadiness
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.calibration.signals.window_length import HALF_AT
-from scissorcal.calibration.signals.zeros import DriveZero, without_zeros, zero_verdicts
+from scissorcal.calibration.signals.zeros import FELT, DriveZero, without_zeros, zero_verdicts
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import Posterior, Stop, infer
 from scissorcal.model.friction_terms import NUISANCE, needs_load
@@ -89,6 +89,8 @@ def fit_friction(
     last_chosen: str | None = None,
     stop: Stop | None = None,
     prior: StatedPrior | None = None,
+    critic: bool = False,
+    tolerance: float = FELT,
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
@@ -100,8 +102,9 @@ def fit_friction(
     ``checkpoint`` is a file from which an interrupted thorough fit goes on, ``last_chosen`` the law
     of draft effort where the recipe leaves several, ``prior`` that of a study of simulated data,
     which goes without the verdicts and diagnostics of this fit alone; ``stop`` says whether the
-    time is used up. Raises InputError where there is too little motion, a
-    value is no measurement, or a stroke is a copy of another.
+    time is used up. ``critic`` asks for the critic at draft effort too; ``tolerance`` is the share
+    of torque by which what it finds is judged. Raises InputError where there is too little motion,
+    a value is no measurement, or a stroke is a copy of another.
     """
     tell = progress or (lambda done, sentence: None)
     refuse_unsound(recordings)
@@ -161,7 +164,9 @@ def fit_friction(
         joint=joint,
         nuisance=NUISANCE,
         rng=rng,
-        critic=settings.critic,
+        critic=critic or (settings.critic and effort != "draft"),
+        tolerance=None if prior else tolerance,
+        known=("time",) if zero and np.isfinite(zero.drift) else (),
         usage=usage,
         brief=prior is not None,
         extra_verdicts=verdicts,

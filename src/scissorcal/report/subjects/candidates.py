@@ -96,9 +96,9 @@ def critic_panel(fit: FitResult, part: str) -> Panel:
     title, id_ = "Terms that the critic proposes", f"{part}-critic"
     if not fit.critic:
         why = (
-            "The critic proposes nothing: no term recurred over resampled strokes and lowered the "
-            f"hold-out error, or the fit was made without it. `scissorcal fit {fit.words} --force` "
-            "runs it again."
+            "The critic proposes nothing: no term recurred over strokes and lowered the hold-out "
+            f"error, or the fit was made without it. `scissorcal fit {fit.words} --force` runs it "
+            "again."
         )
         return absent(id_, part, title, str(fit.diagnostics.get("critic") or why))
     rows = tuple(
@@ -106,7 +106,8 @@ def critic_panel(fit: FitResult, part: str) -> Panel:
             p.formula,
             (
                 number("coefficient", p.coefficient, p.unit, sd=p.coefficient_sd),
-                percent_of("found in resamples", p.inclusion),
+                number("torque, twice the rms", p.size, fit.effort_unit, digits=2),
+                percent_of("found without a quarter of the strokes", p.inclusion),
                 percent_of("hold-out error falls by", p.held_out_gain),
                 number("log density gained", p.held_out_nats),
                 words("to adopt it", p.adopted_by or "no candidate has it"),
@@ -115,8 +116,9 @@ def critic_panel(fit: FitResult, part: str) -> Panel:
         for p in fit.critic
     )
     note = (
-        "The critic searches what the law leaves unexplained, over resamples of whole strokes. A "
-        "line in the recipe adopts a term."
+        "The critic searches what the law leaves unexplained, over whole strokes. A line in the "
+        "recipe adopts a term; drift, waves, hysteresis and bumps over the speed are of the rig or "
+        "the day, and no law has them."
     )
     sentence = " ".join(p.sentence for p in fit.critic[:3])
     return Panel(id_, part, title, sentence, rows, notes=(note,))

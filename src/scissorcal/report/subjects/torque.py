@@ -43,11 +43,13 @@ MOST_STROKES = 12
 MOST_CHARTS = 12
 MOST_CARDS = 12
 MOST_BARS = 20
+PROPOSED_BLOCKS = 40
 SPREAD_DOTS = 900
 OPENING_BLOCKS, TIME_BLOCKS = 60, 300
 SAME_SPEED = 0.05
 
 Against = Literal["opening", "time"]
+Over = Literal["opening", "rate", "time"]
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,7 @@ def strokes_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -
         charts.append(_spread(fit, strokes, "opening", f"{part}-spread"))
         if fit.what != "cut":
             charts.append(_spread(fit, strokes, "rate", f"{part}-spread-rate"))
+            charts.append(_spread(fit, strokes, "time", f"{part}-spread-time"))
     charts += [_card(fit, stroke) for stroke in ranked[:MOST_CARDS]]
     worst = max(ranked, key=lambda one: _shown(fit, one, len(ranked)))
     sentence = (
@@ -385,13 +388,15 @@ def _bars(fit: FitResult, ranked: Sequence[StrokeSamples], rows: Sequence[Row], 
     )
 
 
-def _spread(
-    fit: FitResult, strokes: Sequence[StrokeSamples], against: Literal["opening", "rate"], id_: str
-) -> Chart:
+def _spread(fit: FitResult, strokes: Sequence[StrokeSamples], against: Over, id_: str) -> Chart:
+    """Residuals over a quantity, and what the critic's proposals add to the law there."""
     series, words = fit.series, channels_of(fit)
     residual = series.measured - series.predicted
-    over = against == "opening"
-    where = words.scale * series.opening if over else series.opening_rate
+    where, x = {
+        "opening": (words.scale * series.opening, Axis(words.position, words.unit)),
+        "rate": (series.opening_rate, Axis(f"{words.position} rate", words.rate_unit)),
+        "time": (_elapsed(fit), Axis("time", "s")),
+    }[against]
     kinds = list(dict.fromkeys(stroke.name.kind for stroke in strokes))
     marks = []
     for kind in kinds:
@@ -399,12 +404,28 @@ def _spread(
         some = thinned(places, SPREAD_DOTS // len(kinds))
         name = kind_word(kind, fit.position_unit)
         marks.append(points(name, where[some], residual[some], look_of(kind), toggle=True))
-    label = words.position if over else f"{words.position} rate"
-    return Chart(
-        id_,
-        f"Residuals over the {label}",
-        Axis(label, words.unit if over else words.rate_unit),
-        Axis("measured − model", fit.effort_unit),
-        tuple(marks),
-        "All strokes. A bend or a step that recurs is structure that the model lacks.",
-    )
+    caption = "All strokes. A bend or a step that recurs is structure that the model lacks."
+    if fit.proposed is not None:
+        names = ", ".join(proposal.name for proposal in fit.critic)
+        for way, opens in (("closing", False), ("opening", True)):
+            here = np.flatnonzero((series.opening_rate > 0.0) == opens)
+            line = _means(where[here], fit.proposed[here])
+            marks.append(curve(f"{names}, {way}", *line, look_of(way), toggle=True))
+        caption += f" Lines: what the critic's {names} would add, the mean over each direction."
+    title = f"Residuals over the {x.label}"
+    return Chart(id_, title, x, Axis("measured − model", fit.effort_unit), tuple(marks), caption)
+
+
+def _means(where: Array, torque: Array) -> tuple[Array, Array]:
+    """Means of a quantity and a torque (n,) over stretches of the former with as many points."""
+    order = np.argsort(where, kind="stable")
+    x, y = (block_means(values[order], PROPOSED_BLOCKS) for values in (where, torque))
+    return x, y
+
+
+def _elapsed(fit: FitResult) -> Array:
+    """Time (n,) with the recordings one after the other."""
+    series = fit.series
+    ends = np.zeros(int(series.recording.max(initial=0)) + 1)
+    np.maximum.at(ends, series.recording, series.time_s)
+    return np.asarray(series.time_s + (np.cumsum(ends) - ends)[series.recording])

@@ -26,7 +26,7 @@ class Request:
 
     ``checkpoint`` is a file from which a thorough fit that was interrupted goes on, ``last_model``
     the model that the stored fit chose, empty where there is none. ``stop`` says whether the time
-    allowed is used up.
+    allowed is used up, ``critic`` asks for the critic of friction at any effort.
     """
 
     effort: "Effort"
@@ -36,6 +36,7 @@ class Request:
     last_model: str
     progress: Progress
     stop: Stop
+    critic: bool = False
 
 
 @dataclass(frozen=True)
@@ -144,8 +145,12 @@ def fit_step(
     progress: Progress | None = None,
     stop: Stop | None = None,
     save_to: Path | None = None,
+    critic: bool = False,
 ) -> FitOutcome:
     """Run one fit, or read it back where its identity is the stored one's, unless ``force``.
+
+    ``critic`` asks for the critic of friction, at draft effort too; a stored fit without it is made
+    again.
 
     Where the workspace cannot be written, the fit is kept in ``save_to`` (`workday.elsewhere`).
     """
@@ -157,8 +162,9 @@ def fit_step(
     stored = _stored(engine, step)
     current = stored.get("inputs") == identity or stored.get("imported")
     if stored and current and not force and engine.state(step.name).state != "stale":
-        state = engine.state(step.name)
-        return FitOutcome(step.what, _load(step, path), path, pictures_beside(path), True, state)
+        state, result = engine.state(step.name), _load(step, path)
+        if not (critic and _unasked(result)):
+            return FitOutcome(step.what, result, path, pictures_beside(path), True, state)
     _refuse_without_data(engine, BY_NAME[step.inputs[0]])
     refuse_unwritable(engine, save_to)
     request = Request(
@@ -169,6 +175,7 @@ def fit_step(
         last_model=str(stored.get("model", "")),
         progress=progress or (lambda done, sentence: None),
         stop=stop or (lambda: False),
+        critic=critic,
     )
     made = cast(FitModule, import_module(step.run)).fit(engine, request)
     result = _with_scatter_on_record(engine, step, made.result)
@@ -273,6 +280,13 @@ def _refuse_without_data(engine: Engine, capture: Step) -> None:
         f"Nothing to fit ({capture.name}: {state.found}).{notes} Run '{capture.command}'{sim} "
         "first."
     )
+
+
+def _unasked(result: Any) -> bool:
+    """Whether the critic was not asked in a fit."""
+    from scissorcal.calibration.critic import NOT_ASKED
+
+    return bool(getattr(result, "diagnostics", {}).get("critic") == NOT_ASKED)
 
 
 def _load(step: Step, path: Path) -> Any:

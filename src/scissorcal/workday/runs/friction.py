@@ -48,6 +48,8 @@ def fitted(
         checkpoint=request.checkpoint,
         last_chosen=request.last_model or None,
         stop=request.stop,
+        critic=request.critic,
+        tolerance=0.01 * engine.recipe.scene.tolerance_percent,
     )
     return Made(finished(result, request))
 
