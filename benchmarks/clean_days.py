@@ -37,6 +37,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 RECIPES = ("paper-80gsm", "cotton-cloth", "press-only")
 PHOTOGRAPHED, EVERY = "paper-photographed", 10
 RATES_rad_per_s = (0.05, 0.1, 0.3, 1.0)
+LEVELS = (
+    *("coulomb_pos", "coulomb_neg", "viscous_pos", "viscous_neg"),
+    *("stribeck", "stribeck_rate", "angle_slope", "angle_curvature"),
+)
 Truth = dict[str, float]
 
 
@@ -123,6 +127,7 @@ def _row(seed: int, name: str, fits: list[FitResult], verdicts: list[Any], truth
 def _friction(fit: FitResult, truth: Any) -> list[Estimate]:
     centre = float(fit.structure["angle_center"])
     true = truth(angle_center=centre)
+    levels = {name: np.asarray(true[name]) for name in LEVELS}
     if not fit.structure["symmetric"]:  # unequal levels contain the offset of the sensors
         true["coulomb_pos"] += true["offset"]
         true["coulomb_neg"] -= true["offset"]
@@ -133,16 +138,14 @@ def _friction(fit: FitResult, truth: Any) -> list[Estimate]:
         true = {**true, **both}
         known = [p for p in fit.parameters if p.name in both and p.name != "offset"]
     rows = [_of_draws(p.name, true[p.name], fit.column(p.name)) for p in known]
-    draws = {p.name: fit.column(p.name) for p in fit.parameters}
-    exact = {k: np.asarray(v) for k, v in truth(angle_center=centre).items() if k != "load_share"}
-    for name in ("presliding_share", "presliding_length"):
-        exact.pop(name, None)
+    # Friction as it is rendered: an offset is what is left of the sensors' zeros.
+    draws = {p.name: fit.column(p.name) for p in fit.parameters if p.name != "offset"}
     for rate in RATES_rad_per_s:
         opening, closing = (
             friction_and_offset(draws, centre, sign * rate) * np.ones(len(fit.draws))
             for sign in (1.0, -1.0)
         )
-        ahead, back = (float(friction_and_offset(exact, centre, s * rate)) for s in (1.0, -1.0))
+        ahead, back = (float(friction_and_offset(levels, centre, s * rate)) for s in (1.0, -1.0))
         rows.append(_of_draws(f"torque at {rate:g}", (ahead - back) / 2, (opening - closing) / 2))
         half = f"half difference at {rate:g}"
         rows.append(_of_draws(half, (ahead + back) / 2, (opening + closing) / 2))

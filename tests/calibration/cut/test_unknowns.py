@@ -122,7 +122,7 @@ def test_friction_with_an_offset_parameter_has_no_zero_error():
 
 def test_a_fitted_load_share_leaves_no_error_while_closing():
     recipe = paper(load_share="fit")
-    share = FittedParameter("load_share", "1", 0.05, 0.01, 0.03, 0.05, 0.07, 0.1)
+    share = FittedParameter("load_share", "1", 0.05, 0.01, 0.0336, 0.05, 0.0664, 0.1)
     fit = replace(cut_fit(recipe), nuisance=(share,))
     verdict = checks(recipe, fit)[0]["friction by load"]
     assert (verdict.status, verdict.value) == ("pass", 0.0)

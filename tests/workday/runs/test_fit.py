@@ -100,7 +100,7 @@ def test_a_changed_setting_of_the_fit_makes_it_stale(copied: Workspace) -> None:
 
 
 def test_a_change_elsewhere_in_the_recipe_leaves_it_fresh(copied: Workspace) -> None:
-    edit(copied, "tolerance_percent = 7.0", "tolerance_percent = 5.0")
+    edit(copied, "contact_mm = [15.0, 60.0]", "contact_mm = [15.0, 50.0]")
     plan = make_plan(copied)
     assert states(plan)["capture friction"] == "done"
     assert states(plan)["fit friction"] == "unverified"

@@ -118,15 +118,12 @@ def _refuse_copies(recordings: tuple[Recording, ...]) -> None:
         edges = np.flatnonzero(np.diff(stroke)) + 1
         for low, high in zip([0, *edges], [*edges, len(stroke)], strict=True):
             torque = np.asarray(recording.samples["motor_torque"][low:high], dtype=np.float64)
-            between = stroke[low] < 0 and bool(np.any(stroke >= 0))
-            if low == high or between or len(np.unique(torque)) < FEWEST_LEVELS:
+            if low == high or stroke[low] < 0 or len(np.unique(torque)) < FEWEST_LEVELS:
                 continue
             opening = np.asarray(recording.samples["opening"][low:high], dtype=np.float64)
             force = np.asarray(recording.samples["handle_force"][low:high], dtype=np.float64)
             key = hashlib.sha256(opening.tobytes() + torque.tobytes() + force.tobytes()).digest()
-            here = _name(recording)
-            if stroke[low] >= 0:
-                here = f"stroke {stroke[low]} of {here}"
+            here = f"stroke {stroke[low]} of {_name(recording)}"
             if key in seen:
                 raise InputError(
                     f"{here} is a copy of {seen[key]}: every opening and torque is the same to the "

@@ -105,7 +105,7 @@ def locate_board(
     try:
         begun = _both(corners.where(used), camera)
         refined = [_refine(start, corners, camera, used) for start in begun]
-        used = _near(min(refined, key=_square).residuals, used)
+        used = near(min(refined, key=_square).residuals, used)
         refined = sorted(
             (_refine(found.pose, corners, camera, used) for found in refined), key=_square
         )
@@ -212,7 +212,7 @@ def _square(found: _Refined) -> float:
     return found.square
 
 
-def _near(residuals: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def near(residuals: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
     distance = np.sqrt(np.sum(residuals**2, axis=1))
     robust = float(np.median(distance[used])) / 1.1774
     return np.asarray(used & (distance < FAR_OFF * max(robust, LEAST_SD_PX) * np.sqrt(2.0)))

@@ -1,6 +1,6 @@
 """The camera's pose in the rig's frame, from a card of markers on the moving rig."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from scissorcal.vision.geometry.board_pose import (
     BoardPose,
     Corners,
     locate_board,
+    near,
     print_slopes,
     project_pose,
 )
@@ -29,6 +30,10 @@ UNTOLD = 0.1
 the motion."""
 
 STEP = 1e-6
+REJECTIONS = 4
+"""Least squares, each without the corners that the one before left far off."""
+MOST_REJECTED = 0.1
+"""Share of corners beyond which it is not single corners that are wrong, but what was stated."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,8 @@ def locate_rig(
     """Find the rig's frame from pictures of a card that moves in a known way.
 
     T_camera_card(i) = T_camera_rig Shift(advance_i) Turn_z(blade_angle_i) T_rig_card, by least
-    squares on all corners, both poses unknown at once. Advances determine the x axis, turns the
+    squares on all corners, both poses unknown at once; corners that the other pictures contradict
+    (a blade's edge taken for one of a marker's) are left out. Advances determine the x axis, turns the
     pivot's axis and place; with one of them only, ``untold`` names the undetermined directions. The
     covariance includes the camera's and that of the card's print.
     ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
@@ -97,10 +103,22 @@ def locate_rig(
         )
     located = [locate_board(view.corners, camera) for view in views]
     start = _start(views, tuple(found.pose for found in located), middle_m)
-    rows = _Rows(views, camera, middle_m, tuple(found.used for found in located))
-    point = least_squares(
-        rows.residuals, start, jac=rows.by_point, method="lm", x_scale="jac", xtol=1e-14, ftol=1e-12
-    ).x
+    rows, point = _Rows(views, camera, middle_m, tuple(found.used for found in located)), start
+    for left in reversed(range(REJECTIONS)):
+        point = least_squares(
+            rows.residuals,
+            point,
+            jac=rows.by_point,
+            method="lm",
+            x_scale="jac",
+            xtol=1e-14,
+            ftol=1e-12,
+        ).x
+        away = rows.residuals(point).reshape(-1, 2)
+        sound = near(away, np.ones(len(away), dtype=bool))
+        if left == 0 or np.all(sound) or np.mean(~sound) > MOST_REJECTED:
+            break
+        rows = rows.where(sound)
     residual, slope, shared = rows.residuals(point), rows.by_point(point), rows.by_shared(point)
     square, normal, slopes = float(residual @ residual), slope.T @ slope, slope.T @ shared
     noise = max(square / max(len(residual) - len(point), 1), LEAST_SD_PX**2)
@@ -195,6 +213,16 @@ class _Rows:
     camera: Camera
     middle_m: Array
     used: tuple[NDArray[np.bool_], ...]
+
+    def where(self, sound: NDArray[np.bool_]) -> "_Rows":
+        """The rows of those of the used corners that ``sound`` (corners,) selects."""
+        ends = np.cumsum([int(mask.sum()) for mask in self.used])[:-1]
+        kept = []
+        for mask, here in zip(self.used, np.split(sound, ends), strict=True):
+            fewer = mask.copy()
+            fewer[mask] = here
+            kept.append(fewer)
+        return replace(self, used=tuple(kept))
 
     def residuals(self, point: Array) -> Array:
         """Predicted minus measured pixels (n,) at parameters (11,)."""
