@@ -127,8 +127,7 @@ def _row(seed: int, name: str, fits: list[FitResult], verdicts: list[Any], truth
 def _friction(fit: FitResult, truth: Any) -> list[Estimate]:
     centre = float(fit.structure["angle_center"])
     true = truth(angle_center=centre)
-    levels = {name: np.asarray(true[name]) for name in LEVELS}
-    if not fit.structure["symmetric"]:  # unequal levels contain the offset of the sensors
+    if not fit.structure["symmetric"]:
         true["coulomb_pos"] += true["offset"]
         true["coulomb_neg"] -= true["offset"]
         true["offset"] = 0.0
@@ -138,7 +137,9 @@ def _friction(fit: FitResult, truth: Any) -> list[Estimate]:
         true = {**true, **both}
         known = [p for p in fit.parameters if p.name in both and p.name != "offset"]
     rows = [_of_draws(p.name, true[p.name], fit.column(p.name)) for p in known]
-    # Friction as it is rendered: an offset is what is left of the sensors' zeros.
+    # Friction as it is rendered: unequal levels contain an offset of the joint, and the fit's own
+    # offset is what is left of the sensors' zeros.
+    levels = {name: np.asarray(true[name]) for name in LEVELS}
     draws = {p.name: fit.column(p.name) for p in fit.parameters if p.name != "offset"}
     for rate in RATES_rad_per_s:
         opening, closing = (

@@ -86,10 +86,10 @@ def locate_rig(
     """Find the rig's frame from pictures of a card that moves in a known way.
 
     T_camera_card(i) = T_camera_rig Shift(advance_i) Turn_z(blade_angle_i) T_rig_card, by least
-    squares on all corners, both poses unknown at once; corners that the other pictures contradict
-    (a blade's edge taken for one of a marker's) are left out. Advances determine the x axis, turns the
-    pivot's axis and place; with one of them only, ``untold`` names the undetermined directions. The
-    covariance includes the camera's and that of the card's print.
+    squares on all corners, both poses unknown at once. Corners that the other pictures contradict
+    (a blade's edge taken for one of a marker's) are left out. Advances determine the x axis, turns
+    the pivot's axis and place; with one of them only, ``untold`` names the undetermined directions.
+    The covariance includes the camera's and that of the card's print.
     ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
     be located at all, or where fewer than two different stances were seen.
     """
