@@ -309,8 +309,12 @@ TERMS = {term.name: term for term in _ADOPTED}
 """Terms that the critic proposes and a recipe adopts, by name, simple ones first; what it searches
 besides is in :mod:`~scissorcal.model.course_terms`."""
 NUISANCE = tuple(term.name for term in _NUISANCE)
-NEAR_REST = tuple(n for t in _LAW if t.scale for n in (t.name, t.scale))
-"""Parameters that matter below the slowest sweep alone, where no sweep is slow enough."""
+NEAR_REST = (
+    *(n for t in _LAW if t.scale for n in (t.name, t.scale)),
+    *(t.name for t in _LAW if t.part == "presliding"),
+)
+"""Parameters that matter below the slowest sweep alone, where no sweep is slow enough, or next to a
+turn, where no window counts."""
 
 ADOPTED = Prior(
     (0.0, 0.1, "five times the usual Coulomb friction, at 1 rad, 1 rad/s and 0.1 N m"),
