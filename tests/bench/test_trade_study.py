@@ -8,11 +8,14 @@ import pytest
 from scissorcal.bench.trade import fits, study
 from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade.assemble import curve_of, limit_of, reference_of
+from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.knob import KNOBS, make_knob
 from scissorcal.bench.trade.knobs.effort import Effort
+from scissorcal.bench.trade.point import Sample, Setting
+from scissorcal.bench.trade.prospects import without_prospect
 from scissorcal.bench.trade.schedule import Schedule
 from scissorcal.bench.trade.study import PRESENT_TASK, Record, Task, run_task, tasks_of
-from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, made_case
+from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, Steps, made_case
 
 
 @pytest.fixture(autouse=True)
@@ -99,6 +102,44 @@ def test_measured_times_take_the_place_of_expected_ones() -> None:
 def test_without_a_budget_everything_is_measured() -> None:
     tasks = tasks_of(made_case(), ["steps"])
     assert list(Schedule(tasks, {})) == list(tasks)
+
+
+class Barred(Steps):
+    """A knob of which every cheaper setting fails a check."""
+
+    name = "barred"
+
+    def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
+        """Reject all but the present one."""
+        found = super().measure(case, replace(setting, label="coarse"), repeat)
+        return replace(found, rejected=() if setting.present else ("bound share",))
+
+
+def test_what_can_recommend_nothing_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = {"barred": f"{__name__}:Barred", "plate": f"{__name__}:Unfelt"}
+    monkeypatch.setattr(knobs, "KNOBS", {**MADE, **here})
+    case, names = made_case(), ["steps", "barred", "plate"]
+    tasks = tasks_of(case, names)
+    waiting = without_prospect(case, names, [])
+    assert {task for task in tasks if task.knob == "plate"} <= waiting
+    # what is listed after the present setting is dearer, and no reference
+    first = {task for task in waiting if task.knob == "steps"}
+    assert {task.label for task in first} == {FAILING}
+    made = [run_task(case, task) for task in tasks if task.label in ("fine", "coarse")]
+    waiting = without_prospect(case, names, [record for record in made if record])
+    assert {task for task in tasks if task.knob == "barred"} <= waiting
+    assert Task("steps", "middle") not in waiting
+    schedule = Schedule(tasks, dict.fromkeys(tasks, 1.0), time.time() + 1e3)
+    schedule.later = waiting
+    order = list(schedule)
+    assert set(order) == set(tasks)
+    assert set(order[-len(waiting) :]) == waiting
+
+
+class Unfelt(Steps):
+    """A knob whose error is not one of torque."""
+
+    name, of_torque = "plate", False
 
 
 def test_a_setting_that_fails_is_recorded_with_its_reason() -> None:

@@ -39,8 +39,9 @@ Progress = Callable[[float, str], None]
 FINISH_S = 2.0
 """Time within a budget for writing the results."""
 
-RESERVED_SHARE = 0.3
-"""At most this share of a budget is kept for measuring all recommended settings at once."""
+RESERVED_SHARE = 0.4
+"""At most this share of a budget is kept for simulated captures, and for measuring all recommended
+settings at once."""
 
 STRETCH = 2.0
 """All recommended settings are begun where this many times the time left is expected for them."""
@@ -110,14 +111,12 @@ def trade_workspace(
         left_out = {} if cluster is None else dict.fromkeys(LOCAL_KNOBS, ON_A_CLUSTER)
         run = _Run(case, file, chosen.budget_s, deadline, tell, left_out)
         with open_pool(workers, cluster) as pool:
-            run.measure(pool, names, keep_time=len(names) > 1)
-            curves = run.curves(shown)
-            made = run.made
-            together = run.together(pool, curves) if len(names) > 1 else None
-            # time that was kept, and that nothing new was compared in, goes to the knobs
-            if run.made == made and run.measure(pool, names, keep_time=False):
-                curves = run.curves(shown)
-                together = run.together(pool, curves) if len(names) > 1 else None
+            together = None
+            for keep_time in (True, False):  # time that was kept and not needed goes to the knobs
+                if run.measure(pool, names, keep_time=keep_time) or keep_time:
+                    run.simulate(pool, names)
+                    curves = run.curves(shown)
+                    together = run.together(pool, curves) if len(names) > 1 else None
         trade = run.result(engine, curves, together, time.time() - start, pool.workers)
         notes = (file.note,) if file.note else ()
     for path, text in (
@@ -172,6 +171,8 @@ class _Run:
 
         With ``keep_time`` some of a budget is left for all recommended settings at once.
         """
+        from scissorcal.bench.trade.next_capture import CAPTURES
+        from scissorcal.bench.trade.prospects import without_prospect
         from scissorcal.bench.trade.schedule import Schedule
         from scissorcal.bench.trade.study import (
             PRESENT_TASK,
@@ -200,12 +201,18 @@ class _Run:
             # without the present fits there is nothing to compare all settings at once with
             if self._budget_s is None or not keep_time or PRESENT_TASK in schedule.left:
                 return 0.0
-            wanted = together.expected_s(self._case, present) * schedule.factor(TOGETHER)
-            return min(wanted, RESERVED_SHARE * self._budget_s)
+            once = together.expected_s(self._case, present) * schedule.factor(TOGETHER)
+            # all settings at once, and captures with the present and two recommended ones
+            return min((1 + 3 * CAPTURES) * once, RESERVED_SHARE * self._budget_s)
 
         schedule.reserve = reserve
+
+        def order() -> None:
+            schedule.later = without_prospect(self._case, names, self._records)
+
+        order()
         before = self.made
-        self._work(pool, schedule, len(left))
+        self._work(pool, schedule, len(left), order)
         if not self._file.records and self._budget_s is not None and left:
             fixed = self._budget_s - (self._deadline or 0.0) + self._began
             least = max(fixed + 2.0 * schedule.least_s(), 3.0 * self._budget_s)
@@ -215,6 +222,65 @@ class _Run:
             )
         return self.made > before
 
+    def simulate(self, pool: Pool, names: Sequence[str]) -> None:
+        """Try the settings that would be recommended on simulated captures, the cheapest first.
+
+        The present settings come before all others, which are compared with them in pairs.
+        """
+        from scissorcal.bench.trade.knob import make_knob
+        from scissorcal.bench.trade.study import capture_tasks
+
+        if self._case.friction_fit is None:
+            return
+        if any(make_knob(name).combined for name in names):
+            self._captured(pool, capture_tasks())
+        while wanted := self._unsimulated(names):
+            if not self._captured(pool, [t for one in wanted for t in capture_tasks(one)]):
+                return
+
+    def _unsimulated(self, names: Sequence[str]) -> list[tuple[str, str]]:
+        """The choice of each knob that is to be tried on simulated captures next, if any."""
+        from scissorcal.bench.trade.assemble import (
+            captures_of,
+            limit_of,
+            measured_curve,
+            on_captures,
+        )
+        from scissorcal.bench.trade.knob import make_knob
+        from scissorcal.bench.trade.recommend import unsimulated
+
+        captures, limit, found = self._captures(), limit_of(self._case), []
+        for name in names:
+            knob = make_knob(name)
+            curve = on_captures(measured_curve(self._case, knob, self._of(name)), captures)
+            point = unsimulated(curve, limit, captures_of(self._case, knob, captures))
+            if point is not None:
+                found.append((name, point.setting.label))
+        return found
+
+    def _captured(self, pool: Pool, tasks: "Sequence[Task]") -> bool:
+        """Measure simulated captures that have no record yet; whether any was."""
+        from scissorcal.bench.trade.schedule import Schedule
+        from scissorcal.bench.trade.study import key_of, knob_of, setting_of
+
+        known = {key_of(record) for record in self._records}
+        left = [task for task in tasks if task.key not in known]
+        expected = {}
+        for task in left:
+            knob = knob_of(task)
+            expected[task] = knob.expected_s(self._case, setting_of(knob, self._case, task.label))
+        schedule = Schedule(left, expected, self._deadline, share=1.0)
+        for record in self._known():
+            schedule.learn(record)
+        before = self.made
+        self._work(pool, schedule, len(left))
+        return self.made > before
+
+    def _captures(self) -> list[Record]:
+        from scissorcal.bench.trade.next_capture import NEXT_CAPTURE
+
+        return [record for record in self._records if record["knob"] == NEXT_CAPTURE]
+
     def curves(self, names: Sequence[str]) -> "tuple[Curve, ...]":
         """The curves of the knobs named, from all records; of those left out, why."""
         from scissorcal.bench.trade.assemble import curve_of, limit_of
@@ -223,7 +289,8 @@ class _Run:
         case, limit = self._case, limit_of(self._case)
         found = []
         for name in names:
-            curve = curve_of(case, make_knob(name), self._of(name), limit)
+            captures = self._captures()
+            curve = curve_of(case, make_knob(name), self._of(name), limit, captures)
             if name in self._left_out and not curve.missing:
                 why = self._left_out[name]
                 curve = replace(curve, points=(), unmeasured=(), sentences=(), missing=why)
@@ -335,8 +402,17 @@ class _Run:
 
         return records_of(self._case, name, self._records)
 
-    def _work(self, pool: Pool, schedule: "Schedule", count: int) -> None:
-        """Make measurements, and keep each; within a budget no worker is handed a second one."""
+    def _work(
+        self,
+        pool: Pool,
+        schedule: "Schedule",
+        count: int,
+        learned: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Make measurements, keep each, and call ``learned`` after it.
+
+        Within a budget no worker is handed a second one.
+        """
         from scissorcal.bench.trade.study import key_of
 
         jobs = (
@@ -354,6 +430,7 @@ class _Run:
             self._failed.discard(key_of(record))
             schedule.learn(record)
             self.made += 1
+            learned()
             share = done / max(count, done)
             if self._budget_s is not None:
                 spent = time.time() - (self._deadline or 0.0) + self._budget_s

@@ -1,0 +1,37 @@
+"""Which measurements can lead to a recommendation, so that a budget is spent on them first."""
+
+from collections.abc import Iterable, Sequence
+
+from scissorcal.bench.trade.assemble import measured_curve
+from scissorcal.bench.trade.case import Case
+from scissorcal.bench.trade.knob import make_knob
+from scissorcal.bench.trade.recommend import barred
+from scissorcal.bench.trade.study import Record, Task, records_of
+
+
+def without_prospect(case: Case, names: Sequence[str], records: Iterable[Record]) -> set[Task]:
+    """The tasks of the knobs named that can lead to no recommendation; all others come first.
+
+    A setting can be recommended where the error is one of torque and it is cheaper than the present
+    one; the present setting and the reference are needed beside it. Once every cheaper setting of a
+    knob that was measured fails a check, or needs more than is allowed, the others of it wait, and
+    so do repeats of such a setting.
+    """
+    every, found = list(records), set[Task]()
+    for name in names:
+        knob = make_knob(name)
+        settings = knob.settings(case)
+        place = next(i for i, one in enumerate(settings) if one.present)
+        cheaper = {one.label for one in settings[:place]} if knob.of_torque else set[str]()
+        best = max(settings, key=lambda one: one.accuracy)
+        wanted = {*cheaper, settings[place].label, best.label} if cheaper else set[str]()
+        own = records_of(case, name, every)
+        bad = barred(measured_curve(case, knob, own))
+        tried = cheaper & {record["label"] for record in own}
+        if tried and tried <= bad:
+            wanted = set()
+        for setting in settings:
+            for repeat in range(knob.repeats(case, setting)):
+                if setting.label not in wanted or (repeat and setting.label in bad):
+                    found.add(Task(name, setting.label, repeat))
+    return found
