@@ -8,7 +8,8 @@ Each setting that is recommended in place of the present one is then applied to 
 the same specimen, which have other noise and other sheets, fitted and compiled as a package is.
 The torque of the tables is compared with the specimen's own over the scene: the worst error, as a
 share of the largest torque. A recommendation holds on a capture where that error is at most what
-its sentence states for 9 of 10 captures. The second share counts captures on which the setting
+its sentence states for 9 of 10 captures (tables change no fit: with the present settings, and what
+they add). The second share counts captures on which the setting
 adds no more than the limit of one knob to the error that the present settings have there. Loop
 rates and candidates of the edge change no fit, and are not tried.
 """
@@ -18,6 +19,7 @@ import json
 import sys
 import tempfile
 import warnings
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -28,6 +30,7 @@ from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.fits import fit_case
 from scissorcal.bench.trade.knob import make_knob
 from scissorcal.bench.trade.models import held_law, model_of_law, tables_of
+from scissorcal.bench.trade.point import Curve
 from scissorcal.bench.trade.together import Together, rendered_torque
 from scissorcal.bench.trade.torque import scene_places
 from scissorcal.cli.bench_trade import seconds_of
@@ -84,13 +87,7 @@ def day(seed: int, budget_s: float, fresh: int, workers: int) -> list[Row]:
         print(f"day {seed}, {name}: {trade.measured} measurements in {trade.seconds:g} s")
         for sentence in trade.sentences:
             print(f"  {sentence}", flush=True)
-        stated: dict[Choice, float] = {
-            (curve.knob, point.setting.label): point.next_capture.error
-            for curve in trade.curves
-            for point in curve.points
-            if point.recommended and not point.setting.present and point.next_capture
-            if make_knob(curve.knob).combined
-        }
+        stated = {choice: share for curve in trade.curves for choice, share in stated_by(curve)}
         rows = []
         for capture in range(1, fresh + 1 if stated else 1):
             again = create_workspace(Path(folder) / f"again{capture}", name)
@@ -101,6 +98,23 @@ def day(seed: int, budget_s: float, fresh: int, workers: int) -> list[Row]:
                 error = error_of(case, specimen, (choice,))
                 rows.append(Row(seed, name, *choice, capture, share, error, present, trade.limit))
     return rows
+
+
+def stated_by(curve: Curve) -> Iterator[tuple[Choice, float]]:
+    """The recommended setting of a curve, if another than the present one, and what is stated.
+
+    That is its error on the next capture; where it changes no fit, that of the present settings and
+    its own.
+    """
+    known = next((p.next_capture for p in curve.points if p.setting.present), None)
+    for point in curve.points:
+        own = point.next_capture
+        if point.recommended and not point.setting.present and make_knob(curve.knob).combined:
+            if own is not None:
+                yield (curve.knob, point.setting.label), own.error
+            elif known is not None:
+                share = point.errors[curve.error].share or 0.0
+                yield (curve.knob, point.setting.label), known.error + share
 
 
 def error_of(case: Case, specimen: Specimen, choices: tuple[Choice, ...]) -> float:

@@ -222,7 +222,8 @@ def test_a_setting_that_saves_nothing_must_be_better_on_every_capture() -> None:
 
 def test_an_error_inside_what_captures_differ_by_is_not_determined() -> None:
     said = on_captures(COARSE, FINE, scatter=0.3).sentences[0]
-    assert "its error is 20 %, which is not determined: from one capture to the next" in said
+    assert "its error is 20 %, inside the 30 % by which captures differ." in said
+    assert said.endswith("is not determined: capture again and repeat the benchmark.")
     assert "not determined" not in on_captures(COARSE, FINE, scatter=0.1).sentences[0]
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from statistics import median
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.bench.trade.knob import Knob, make_knob, scene_knobs
+from scissorcal.bench.trade.knob import SAME_FITS, Knob, make_knob, scene_knobs
 from scissorcal.bench.trade.next_capture import (
     FEWEST_CAPTURES,
     PRESENT_CHOICE,
@@ -82,13 +82,13 @@ def on_captures(curve: Curve, captures: Sequence[Record]) -> Curve:
 def captures_of(case: Case, knob: Knob, captures: Sequence[Record]) -> Captures:
     """Whether a knob's settings need simulated captures, and how far its main error scatters.
 
-    Settings that change what the whole chain gives need them where a capture can be simulated.
+    Settings that change the fits need them, where a capture can be simulated.
     """
     tried = by_choice(captures, knob.error if knob.error in SCATTERING else WORST)
     shares = list(tried.get(PRESENT_CHOICE, {}).values())
     fitted = knob.error in SCATTERING and len(shares) >= FEWEST_CAPTURES
     return Captures(
-        knob.combined and case.friction_fit is not None,
+        refits(knob) and case.friction_fit is not None,
         upper_limit(shares) if fitted else None,
     )
 
@@ -172,6 +172,11 @@ def _reference(case: Case, knob: Knob, records: Sequence[Record]) -> _Reference:
 
 def _rejected(records: Sequence[Record]) -> set[str]:
     return {check for record in records for check in record["rejected"]}
+
+
+def refits(knob: Knob) -> bool:
+    """Whether settings of a knob change the fits, so that the next capture may judge otherwise."""
+    return knob.combined and knob.name not in SAME_FITS
 
 
 def _point(

@@ -14,7 +14,7 @@ from scissorcal.bench.trade.models import held_law, model_of_law, tables_of
 from scissorcal.bench.trade.point import Error, NextCapture, Sample, Setting
 from scissorcal.bench.trade.together import Together, expected_chain_s, rendered_torque
 from scissorcal.bench.trade.torque import band_errors, fitted_torque, torque_errors
-from scissorcal.calibration import FitResult, cut_experiment, friction_experiment
+from scissorcal.calibration import FitResult
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.zeros import without_zeros
 from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
@@ -32,6 +32,9 @@ FEWEST_CAPTURES = 2
 """One capture shows no scatter."""
 
 CONFIDENCE = 0.9
+
+BY_NAME = Layout(())
+"""Truths are given by name, so that simulators need no layout of their coordinates."""
 
 STREAM = 7
 """Random numbers of simulated captures are others than those of fits."""
@@ -90,17 +93,14 @@ def recaptured(case: Case, repeat: int) -> Case:
     settings, fit = case.recipe.fit.friction, case.friction_fit
     kind = case.friction[0].joint.kind
     unmeasured_sd = settings.priors.of(kind).zero(kind)
-    design = friction_experiment(case.friction, settings, fit)
     still, zero = without_zeros(case.friction, unmeasured_sd)
-    simulator = friction_simulator(still, settings, fit, design.layout)
-    friction = simulator.simulate(_centre(design.layout, fit), rng)
+    friction = friction_simulator(still, settings, fit, BY_NAME).recordings_of(_centre(fit), rng)
     if case.cut_fit is None:
         return replace(case, friction=friction)
-    cut = cut_experiment(case.cut, case.recipe, fit, case.cut_fit, case.edge)
     still, _ = without_zeros(case.cut, unmeasured_sd, zero) if zero else (case.cut, None)
-    cuts = cut_simulator(still, case.recipe, fit, case.cut_fit, cut.layout, case.edge)
-    sheets = cuts.simulate(_centre(cut.layout, case.cut_fit), rng)
-    return replace(case, friction=friction, cut=sheets)
+    simulator = cut_simulator(still, case.recipe, fit, case.cut_fit, BY_NAME, case.edge)
+    cut = simulator.recordings_of(_centre(case.cut_fit), rng)
+    return replace(case, friction=friction, cut=cut)
 
 
 def next_capture(present: Sequence[float], own: Sequence[float]) -> NextCapture:
@@ -145,8 +145,7 @@ def upper_limit(values: Sequence[float] | NDArray[np.float64]) -> float:
     return float(np.mean(values) + factor * np.std(values, ddof=1))
 
 
-def _centre(layout: Layout, fit: FitResult) -> NDArray[np.float64]:
-    """The most probable point of a fit in its design's unconstrained coordinates (p,)."""
+def _centre(fit: FitResult) -> dict[str, float]:
+    """The most probable point of a fit by name, with the means of its nuisance parameters."""
     values = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
-    values |= {p.name: p.mean for p in fit.nuisance}
-    return layout.unconstrained({name: values[name] for name in layout.names})
+    return values | {p.name: p.mean for p in fit.nuisance}

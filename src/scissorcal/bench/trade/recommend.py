@@ -67,6 +67,7 @@ def recommend(
         _limit(curve, chosen, limit, tolerance),
         _on_the_next(chosen, present),
         _passed(judge, able, chosen),
+        _undetermined(judge, able, chosen),
         _unguarded(able, present),
         chosen.setting.remark,
     ]
@@ -124,13 +125,14 @@ class _Judge:
         if share is None:
             return f"its {error} is not known"
         said = f"its {error} is {_percent(share)}"
-        scatter = self.captures.scatter
-        if scatter is not None and share <= scatter:
-            said += (
-                f", which is not determined: from one capture to the next it differs by up to "
-                f"{_percent(scatter)} with the present settings, so capture again to tell"
-            )
+        if self.undetermined(point):
+            said += f", inside the {_percent(self.captures.scatter)} by which captures differ"
         return said
+
+    def undetermined(self, point: Point) -> bool:
+        """Whether an error beyond the limit is no larger than what another capture changes."""
+        share, scatter = _share(self.curve, point), self.captures.scatter
+        return share is not None and scatter is not None and self.limit < share <= scatter
 
     def unheld(self, point: Point) -> str:
         """Why a setting does not hold on the next capture; empty where it does.
@@ -266,6 +268,15 @@ def _passed(judge: _Judge, able: Sequence[Point], chosen: Point) -> str:
         reasons.setdefault(judge.why_not(point), []).append(point.setting.label)
     told = [f"{', '.join(labels)}: {why}" for why, labels in reasons.items()]
     return f"Cheaper, but passed over: {'; '.join(told)}." if told else ""
+
+
+def _undetermined(judge: _Judge, able: Sequence[Point], chosen: Point) -> str:
+    """What to do where a cheaper setting is passed over for an error inside the scatter."""
+    cost = chosen.costs[judge.curve.cost].median
+    cheaper = [p for p in able if p.costs[judge.curve.cost].median < cost]
+    if not any(judge.undetermined(p) for p in cheaper):
+        return ""
+    return "An error inside that is not determined: capture again and repeat the benchmark."
 
 
 def _on_the_next(chosen: Point, present: Point | None) -> str:

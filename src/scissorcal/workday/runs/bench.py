@@ -227,12 +227,13 @@ class _Run:
 
         The present settings come before all others, which are compared with them in pairs.
         """
+        from scissorcal.bench.trade.assemble import refits
         from scissorcal.bench.trade.knob import make_knob
         from scissorcal.bench.trade.study import capture_tasks
 
         if self._case.friction_fit is None:
             return
-        if any(make_knob(name).combined for name in names):
+        if any(refits(make_knob(name)) for name in names):
             self._captured(pool, capture_tasks())
         while wanted := self._unsimulated(names):
             if not self._captured(pool, [t for one in wanted for t in capture_tasks(one)]):
