@@ -1,4 +1,4 @@
-"""Simulated captures: of the fits' own law, equal for all settings, and what they let expect."""
+"""Simulated captures: of the fitted law, equal for all settings, and what follows for the next."""
 
 from dataclasses import replace
 

@@ -104,7 +104,7 @@ def recaptured(case: Case, repeat: int) -> Case:
 
 
 def next_capture(present: Sequence[float], own: Sequence[float]) -> NextCapture:
-    """What errors on equal simulated captures, shares (n,) by capture, let expect of the next one.
+    """What the next capture gives, by errors on equal simulated captures, shares (n,) by capture.
 
     ValueError where there are fewer than two, or not as many of each.
 

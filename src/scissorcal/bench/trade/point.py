@@ -114,7 +114,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class NextCapture:
-    """What simulated ``captures`` let expect of a setting on the next one.
+    """What a setting gives on the next capture, by so many simulated ``captures``.
 
     In shares of the scene's largest torque: the limits that the worst error of the torque against
     the truth (``error``), and how much larger it is than with the present setting (``loss``, 0
