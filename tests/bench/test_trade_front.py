@@ -220,6 +220,13 @@ def test_a_setting_that_saves_nothing_must_be_better_on_every_capture() -> None:
     assert choices_of([found]) == (("made", "dear"),)
 
 
+def test_a_setting_that_mends_the_present_one_must_be_better_even_where_it_saves() -> None:
+    present = point("present", spread(5.0), 0.2, present=True)
+    assert choices_of([on_captures(simulated(MIDDLE, 0.1, 0.001), present)]) == ()
+    said = on_captures(simulated(MIDDLE, 0.1, 0.0), present).sentences[0]
+    assert said.startswith("middle is needed: ")
+
+
 def test_an_error_inside_what_captures_differ_by_is_not_determined() -> None:
     said = on_captures(COARSE, FINE, scatter=0.3).sentences[0]
     assert "its error is 20 %, inside the 30 % by which captures differ." in said

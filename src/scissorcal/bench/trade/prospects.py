@@ -14,8 +14,8 @@ def without_prospect(case: Case, names: Sequence[str], records: Iterable[Record]
 
     A setting can be recommended where the error is one of torque and it is cheaper than the present
     one; the present setting and the reference are needed beside it. Once every cheaper setting of a
-    knob that was measured fails a check, or needs more than is allowed, the others of it wait, and
-    so do repeats of such a setting.
+    knob that was measured fails a check, or needs more than is allowed, the others of it wait.
+    Repeats wait too: they tell how certain a cost is, and the first measurement tells most of it.
     """
     every, found = list(records), set[Task]()
     for name in names:
@@ -32,6 +32,6 @@ def without_prospect(case: Case, names: Sequence[str], records: Iterable[Record]
             wanted = set()
         for setting in settings:
             for repeat in range(knob.repeats(case, setting)):
-                if setting.label not in wanted or (repeat and setting.label in bad):
+                if repeat or setting.label not in wanted:
                     found.add(Task(name, setting.label, repeat))
     return found

@@ -137,9 +137,9 @@ class _Judge:
     def unheld(self, point: Point) -> str:
         """Why a setting does not hold on the next capture; empty where it does.
 
-        In place of a present setting it may add no more than the limit to the worst torque error on
-        9 of 10 captures. One that saves nothing must have less error on each simulated capture:
-        chance alone does so on n captures in 1 of 2^n cases.
+        One that saves may add no more than the limit to the worst torque error on 9 of 10 captures.
+        One that saves nothing, or is to mend the error of the present setting, must have no more
+        error than that on each simulated capture: on n captures chance does so in 1 of 2^n cases.
         """
         present = self.present
         if not self.captures.needed or point.setting.present or present is None:
@@ -147,7 +147,8 @@ class _Judge:
         found = point.next_capture
         if found is None:
             return "no other capture was simulated with it within the budget"
-        allowed = self.limit if _saves(self.curve, point, present) else 0.0
+        spared = _saves(self.curve, point, present) and not self.objection(present)
+        allowed = self.limit if spared else 0.0
         if found.loss <= allowed:
             return ""
         return (
@@ -207,7 +208,7 @@ def _nothing(judge: _Judge, judged: Sequence[Point], within: Sequence[Point]) ->
     """Why no setting is recommended although some were measured."""
     curve, limit = judge.curve, judge.limit
     if within:
-        nearest = min(within, key=lambda p: _share(curve, p) or 0.0)
+        nearest = _nearest(judge, within)
         return f"No setting is recommended: {nearest.setting.label}: {judge.why_not(nearest)}."
     lowest = min(judged, key=lambda p: _share(curve, p) or 0.0)
     if (_share(curve, lowest) or 0.0) <= limit:
@@ -238,7 +239,7 @@ def _reason(judge: _Judge, able: Sequence[Point], chosen: Point) -> str:
                 f"{label} stays: no measured setting costs less {curve.cost} by more than the "
                 f"repeats differ{least}."
             )
-        best = min(clear, key=lambda p: _share(curve, p) or 0.0)
+        best = _nearest(judge, clear)
         saved = _percent(1.0 - best.costs[curve.cost].median / cost.median)
         return (
             f"{label} stays: {best.setting.label} would save {saved} {curve.cost}, but "
@@ -253,6 +254,14 @@ def _reason(judge: _Judge, able: Sequence[Point], chosen: Point) -> str:
     return f"{label} is enough: {change}, {_percent(1.0 - cost.median / own.median)} less."
 
 
+def _nearest(judge: _Judge, points: Sequence[Point]) -> Point:
+    """The cheapest that only the next capture speaks against, else the one of the lowest error."""
+    cost, share = judge.curve.cost, lambda p: _share(judge.curve, p) or 0.0
+    if able := [p for p in points if not judge.objection(p)]:
+        return min(able, key=lambda p: p.costs[cost].median)
+    return min(points, key=share)
+
+
 def _passed(judge: _Judge, able: Sequence[Point], chosen: Point) -> str:
     """Name cheaper settings with an objection, each with the reason; empty where none is left.
 
@@ -262,7 +271,7 @@ def _passed(judge: _Judge, able: Sequence[Point], chosen: Point) -> str:
     cheaper = [p for p in able if p.costs[curve.cost].median < cost.median and judge.why_not(p)]
     clear = [p for p in cheaper if _saves(curve, p, chosen)]
     if chosen.setting.present and clear:
-        cheaper.remove(min(clear, key=lambda p: _share(curve, p) or 0.0))
+        cheaper.remove(_nearest(judge, clear))
     reasons: dict[str, list[str]] = {}
     for point in cheaper:
         reasons.setdefault(judge.why_not(point), []).append(point.setting.label)
@@ -280,7 +289,9 @@ def _undetermined(judge: _Judge, able: Sequence[Point], chosen: Point) -> str:
 
 
 def _on_the_next(chosen: Point, present: Point | None) -> str:
-    """What the next capture gives, with the present setting beside it; empty where not known."""
+    """What the next capture gives with another setting; empty where not known, or where none is."""
+    if chosen.setting.present:
+        return ""
     own, known = chosen.next_capture, present.next_capture if present else None
     found = own or known
     if found is None:
@@ -288,7 +299,7 @@ def _on_the_next(chosen: Point, present: Point | None) -> str:
     said = "On 9 of 10 captures of the same specimen the worst torque error is at most "
     whose = "with it" if own else "with the present settings"
     said += f"{_percent(found.error)} {whose}"
-    if own and known and present and present is not chosen:
+    if own and known and present:
         said += f" and {_percent(known.error)} with {present.setting.label}"
     return f"{said} ({found.captures} captures simulated from the fits)."
 

@@ -20,9 +20,10 @@ class Schedule:
     ``expected`` are seconds of each task before anything was measured. Seconds that records tell
     take their place, for the same setting as they are, for others of the knob as a factor.
     ``reserve`` gives the seconds at the end that are not handed out, and ``later`` holds the tasks
-    that wait for all others. Without ``deadline`` (of ``clock``) every task is handed out. No task
-    may be expected to take more than ``share`` of the time that there is at the start (the present
-    fits: than `PRESENT_SHARE`), nor ``stretch`` times what is left.
+    that wait for all others, and with ``hold`` are not handed out at all. Without ``deadline`` (of
+    ``clock``) every task is handed out. No task may be expected to take more than ``share`` of the
+    time that there is at the start (the present fits: than `PRESENT_SHARE`), nor ``stretch`` times
+    what is left.
     """
 
     def __init__(
@@ -38,6 +39,7 @@ class Schedule:
         self.left = list(tasks)
         self.reserve: Callable[[], float] = lambda: 0.0
         self.later: Container[Task] = ()
+        self.hold = False
         self._expected = dict(expected)
         self._deadline, self._clock, self._stretch = deadline, clock, stretch
         self._whole = float("inf") if deadline is None else deadline - clock()
@@ -82,7 +84,8 @@ class Schedule:
             return self.left[0] if self.left else None
         left = self._deadline - self.reserve() - self._clock()
         able = [task for task in self.left if self._fits(task, left)]
-        return next((task for task in able if task not in self.later), next(iter(able), None))
+        first = next((task for task in able if task not in self.later), None)
+        return first if first or self.hold else next(iter(able), None)
 
     def _fits(self, task: Task, left: float) -> bool:
         share = max(self._share, PRESENT_SHARE) if task == PRESENT_TASK else self._share

@@ -39,7 +39,7 @@ Progress = Callable[[float, str], None]
 FINISH_S = 2.0
 """Time within a budget for writing the results."""
 
-RESERVED_SHARE = 0.4
+RESERVED_SHARE = 0.5
 """At most this share of a budget is kept for simulated captures, and for measuring all recommended
 settings at once."""
 
@@ -169,7 +169,8 @@ class _Run:
     def measure(self, pool: Pool, names: Sequence[str], *, keep_time: bool = True) -> bool:
         """Measure the tasks of the knobs named that have no record yet; whether any was.
 
-        With ``keep_time`` some of a budget is left for all recommended settings at once.
+        With ``keep_time`` some of a budget is left for simulated captures and for all recommended
+        settings at once, and only what can lead to a recommendation is measured.
         """
         from scissorcal.bench.trade.next_capture import CAPTURES
         from scissorcal.bench.trade.prospects import without_prospect
@@ -206,6 +207,7 @@ class _Run:
             return min((1 + 3 * CAPTURES) * once, RESERVED_SHARE * self._budget_s)
 
         schedule.reserve = reserve
+        schedule.hold = keep_time and self._budget_s is not None
 
         def order() -> None:
             schedule.later = without_prospect(self._case, names, self._records)
@@ -213,7 +215,7 @@ class _Run:
         order()
         before = self.made
         self._work(pool, schedule, len(left), order)
-        if not self._file.records and self._budget_s is not None and left:
+        if not self._file.records and self._budget_s is not None and left and not keep_time:
             fixed = self._budget_s - (self._deadline or 0.0) + self._began
             least = max(fixed + 2.0 * schedule.least_s(), 3.0 * self._budget_s)
             raise InputError(
@@ -236,7 +238,8 @@ class _Run:
         if any(refits(make_knob(name)) for name in names):
             self._captured(pool, capture_tasks())
         while wanted := self._unsimulated(names):
-            if not self._captured(pool, [t for one in wanted for t in capture_tasks(one)]):
+            tasks = [task for one in wanted for task in capture_tasks(one)]
+            if not self._captured(pool, sorted(tasks, key=lambda task: task.repeat)):
                 return
 
     def _unsimulated(self, names: Sequence[str]) -> list[tuple[str, str]]:
