@@ -115,3 +115,12 @@ def test_a_simulated_capture_is_of_the_law_that_was_fitted(fitted: Case) -> None
 def test_no_capture_is_simulated_without_a_fit_of_friction() -> None:
     with pytest.raises(MissingError, match="no fit of friction"):
         recaptured(made_case(), 0)
+
+
+def test_draft_is_measured_without_the_law_that_another_fit_chose(fitted: Case) -> None:
+    assert fitted.cut_fit is not None
+    usual = fitted.cut_fit.rung
+    other = f"{usual}, load-dependent friction"
+    cut, _, _, _ = fit_case(replace(fitted, cut_fit=replace(fitted.cut_fit, rung=other)), 0)
+    assert cut is not None
+    assert cut.rung == usual == "power response, rippled fracture"
