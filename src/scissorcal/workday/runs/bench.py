@@ -169,8 +169,8 @@ class _Run:
     def measure(self, pool: Pool, names: Sequence[str], *, keep_time: bool = True) -> bool:
         """Measure the tasks of the knobs named that have no record yet; whether any was.
 
-        With ``keep_time`` some of a budget is left for simulated captures and for all recommended
-        settings at once, and only what can lead to a recommendation is measured.
+        Of a budget some is left for all recommended settings at once. With ``keep_time`` some is
+        left for simulated captures too, and only what can lead to a recommendation is measured.
         """
         from scissorcal.bench.trade.next_capture import CAPTURES
         from scissorcal.bench.trade.prospects import without_prospect
@@ -200,11 +200,17 @@ class _Run:
 
         def reserve() -> float:
             # without the present fits there is nothing to compare all settings at once with
-            if self._budget_s is None or not keep_time or PRESENT_TASK in schedule.left:
+            at_once = len(names) > 1
+            if (
+                self._budget_s is None
+                or PRESENT_TASK in schedule.left
+                or not (keep_time or at_once)
+            ):
                 return 0.0
             once = together.expected_s(self._case, present) * schedule.factor(TOGETHER)
             # all settings at once, and captures with the present and two recommended ones
-            return min((1 + 3 * CAPTURES) * once, RESERVED_SHARE * self._budget_s)
+            count = at_once + (3 * CAPTURES if keep_time else 0)
+            return min(count * once, RESERVED_SHARE * self._budget_s)
 
         schedule.reserve = reserve
         schedule.hold = keep_time and self._budget_s is not None
