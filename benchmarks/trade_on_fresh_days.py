@@ -8,10 +8,10 @@ Each setting that is recommended in place of the present one is then applied to 
 the same specimen, which have other noise and other sheets, fitted and compiled as a package is.
 The torque of the tables is compared with the specimen's own over the scene: the worst error, as a
 share of the largest torque. A recommendation holds on a capture where that error is at most what
-its sentence states for 9 of 10 captures (tables change no fit: with the present settings, and what
-they add). The second share counts captures on which the setting
-adds no more than the limit of one knob to the error that the present settings have there. Loop
-rates and candidates of the edge change no fit, and are not tried.
+its sentence states: its error on the traded capture and the limit of 90 % on simulated ones. The
+second share counts captures on which the setting adds no more than the limit of one knob to the
+error that the present settings have there. Loop rates and candidates of the edge change no fit, and
+are not tried.
 """
 
 import argparse
@@ -31,6 +31,7 @@ from scissorcal.bench.trade.fits import fit_case
 from scissorcal.bench.trade.knob import make_knob
 from scissorcal.bench.trade.models import held_law, model_of_law, tables_of
 from scissorcal.bench.trade.point import Curve
+from scissorcal.bench.trade.recommend import stated
 from scissorcal.bench.trade.together import Together, rendered_torque
 from scissorcal.bench.trade.torque import scene_places
 from scissorcal.cli.bench_trade import seconds_of
@@ -87,34 +88,26 @@ def day(seed: int, budget_s: float, fresh: int, workers: int) -> list[Row]:
         print(f"day {seed}, {name}: {trade.measured} measurements in {trade.seconds:g} s")
         for sentence in trade.sentences:
             print(f"  {sentence}", flush=True)
-        stated = {choice: share for curve in trade.curves for choice, share in stated_by(curve)}
+        claims = {choice: share for curve in trade.curves for choice, share in stated_by(curve)}
         rows = []
-        for capture in range(1, fresh + 1 if stated else 1):
+        for capture in range(1, fresh + 1 if claims else 1):
             again = create_workspace(Path(folder) / f"again{capture}", name)
             make_day(again, seed=seed, capture=capture)
             case = load_case(Engine.of(again))
             present = error_of(case, specimen, ())
-            for choice, share in stated.items():
+            for choice, share in claims.items():
                 error = error_of(case, specimen, (choice,))
                 rows.append(Row(seed, name, *choice, capture, share, error, present, trade.limit))
     return rows
 
 
 def stated_by(curve: Curve) -> Iterator[tuple[Choice, float]]:
-    """The recommended setting of a curve, if another than the present one, and what is stated.
-
-    That is its error on the next capture; where it changes no fit, that of the present settings and
-    its own.
-    """
-    known = next((p.next_capture for p in curve.points if p.setting.present), None)
+    """The recommended setting of a curve, if another than the present one, and what is stated."""
     for point in curve.points:
-        own = point.next_capture
-        if point.recommended and not point.setting.present and make_knob(curve.knob).combined:
-            if own is not None:
-                yield (curve.knob, point.setting.label), own.error
-            elif known is not None:
-                share = point.errors[curve.error].share or 0.0
-                yield (curve.knob, point.setting.label), known.error + share
+        share = stated(curve, point)
+        tried = point.recommended and not point.setting.present
+        if tried and share is not None and make_knob(curve.knob).combined:
+            yield (curve.knob, point.setting.label), share
 
 
 def error_of(case: Case, specimen: Specimen, choices: tuple[Choice, ...]) -> float:

@@ -176,7 +176,8 @@ def test_a_setting_is_recommended_with_what_the_next_capture_gives() -> None:
     assert choices_of([found]) == (("made", "middle"),)
     assert found.sentences[0].endswith(
         "On 9 of 10 captures of the same specimen the worst torque error is at most 3 % with it "
-        "and 4 % with fine (4 captures simulated from the fits)."
+        "and 4 % with fine (4 captures simulated from the fits): expect up to 3.4 %, both "
+        "together, against the truth."
     )
 
 

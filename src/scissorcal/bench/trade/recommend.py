@@ -65,7 +65,7 @@ def recommend(
     parts = [
         _reason(judge, able, chosen),
         _limit(curve, chosen, limit, tolerance),
-        _on_the_next(chosen, present),
+        _on_the_next(curve, chosen, present),
         _passed(judge, able, chosen),
         _undetermined(judge, able, chosen),
         _unguarded(able, present),
@@ -138,7 +138,7 @@ class _Judge:
         """Why a setting does not hold on the next capture; empty where it does.
 
         One that saves may add no more than the limit to the worst torque error on 9 of 10 captures.
-        One that saves nothing, or is to mend the error of the present setting, must have no more
+        One that saves nothing, or replaces a present one beyond the limit, must have no more
         error than that on each simulated capture: on n captures chance does so in 1 of 2^n cases.
         """
         present = self.present
@@ -288,20 +288,33 @@ def _undetermined(judge: _Judge, able: Sequence[Point], chosen: Point) -> str:
     return "An error inside that is not determined: capture again and repeat the benchmark."
 
 
-def _on_the_next(chosen: Point, present: Point | None) -> str:
+def stated(curve: Curve, point: Point) -> float | None:
+    """What the sentence of a recommended setting states of its worst error on 9 of 10 captures.
+
+    Its main error on this capture, and what simulated captures give on top: with it, or, where it
+    changes no fit, with the present settings. A share of the scene's largest torque; None where no
+    capture was simulated.
+    """
+    known = next((p.next_capture for p in curve.points if p.setting.present), None)
+    found = point.next_capture or known
+    return None if found is None else (_share(curve, point) or 0.0) + found.error
+
+
+def _on_the_next(curve: Curve, chosen: Point, present: Point | None) -> str:
     """What the next capture gives with another setting; empty where not known, or where none is."""
-    if chosen.setting.present:
-        return ""
+    whole = stated(curve, chosen)
     own, known = chosen.next_capture, present.next_capture if present else None
     found = own or known
-    if found is None:
+    if chosen.setting.present or found is None or whole is None:
         return ""
-    said = "On 9 of 10 captures of the same specimen the worst torque error is at most "
-    whose = "with it" if own else "with the present settings"
-    said += f"{_percent(found.error)} {whose}"
+    said = f"{_percent(found.error)} {'with it' if own else 'with the present settings'}"
     if own and known and present:
         said += f" and {_percent(known.error)} with {present.setting.label}"
-    return f"{said} ({found.captures} captures simulated from the fits)."
+    return (
+        f"On 9 of 10 captures of the same specimen the worst torque error is at most {said} "
+        f"({found.captures} captures simulated from the fits): expect up to {_percent(whole)}, "
+        "both together, against the truth."
+    )
 
 
 def _bar(point: Point, present: Point | None) -> str:

@@ -200,16 +200,11 @@ class _Run:
 
         def reserve() -> float:
             # without the present fits there is nothing to compare all settings at once with
-            at_once = len(names) > 1
-            if (
-                self._budget_s is None
-                or PRESENT_TASK in schedule.left
-                or not (keep_time or at_once)
-            ):
+            if self._budget_s is None or PRESENT_TASK in schedule.left:
                 return 0.0
             once = together.expected_s(self._case, present) * schedule.factor(TOGETHER)
             # all settings at once, and captures with the present and two recommended ones
-            count = at_once + (3 * CAPTURES if keep_time else 0)
+            count = (len(names) > 1) + (3 * CAPTURES if keep_time else 0)
             return min(count * once, RESERVED_SHARE * self._budget_s)
 
         schedule.reserve = reserve
