@@ -11,11 +11,14 @@ from scissorcal.bench.trade.assemble import curve_of, limit_of, reference_of
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.knob import KNOBS, make_knob
 from scissorcal.bench.trade.knobs.effort import Effort
+from scissorcal.bench.trade.next_capture import NEXT_CAPTURE
 from scissorcal.bench.trade.point import Sample, Setting
-from scissorcal.bench.trade.prospects import without_prospect
+from scissorcal.bench.trade.prospects import to_simulate, without_prospect
 from scissorcal.bench.trade.schedule import Schedule
-from scissorcal.bench.trade.study import PRESENT_TASK, Record, Task, run_task, tasks_of
+from scissorcal.bench.trade.study import PRESENT_TASK, Record, Task, records_of, run_task, tasks_of
+from scissorcal.bench.trade.torque import WORST
 from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, Steps, made_case
+from tests.package.fits import friction_fit
 
 
 @pytest.fixture(autouse=True)
@@ -138,6 +141,27 @@ def test_what_can_recommend_nothing_waits(monkeypatch: pytest.MonkeyPatch) -> No
     held = Schedule(tasks, dict.fromkeys(tasks, 1.0), time.time() + 1e3)
     held.later, held.hold = waiting, True
     assert set(held) == set(tasks) - waiting
+
+
+def test_what_would_be_recommended_is_tried_on_simulated_captures() -> None:
+    case = replace(made_case(), friction_fit=friction_fit(symmetric=False))
+    records = [record for task in tasks_of(case, ["steps"]) if (record := run_task(case, task))]
+    assert to_simulate(case, ["steps"], records) == [("steps", "middle")]
+    assert to_simulate(made_case(), ["steps"], records) == []
+    for choices in ([], [["steps", "middle"]]):
+        records += [
+            {
+                "knob": NEXT_CAPTURE,
+                "label": "",
+                "repeat": k,
+                "choices": choices,
+                "outcome": {WORST: e},
+            }
+            for k, e in enumerate((0.01, 0.02))
+        ]
+    assert to_simulate(case, ["steps"], records) == []
+    curve = curve_of(case, make_knob("steps"), records_of(case, "steps", records), 0.02, records)
+    assert "2 captures simulated from the fits" in curve.sentences[0]
 
 
 class Unfelt(Steps):

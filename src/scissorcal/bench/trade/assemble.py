@@ -45,7 +45,7 @@ def curve_of(
     """The curve of one knob from its records, with the setting that is recommended.
 
     Settings without a record are named as unmeasured. ``limit`` is that of one knob (`limit_of`);
-    ``captures`` are records of simulated captures.
+    ``captures`` hold the records of simulated captures.
     """
     curve = on_captures(measured_curve(case, knob, records), captures)
     if curve.missing:

@@ -1,11 +1,16 @@
-"""Which measurements can lead to a recommendation, so that a budget is spent on them first."""
+"""Which measurements can lead to a recommendation: a budget is spent on them before others."""
 
 from collections.abc import Iterable, Sequence
 
-from scissorcal.bench.trade.assemble import measured_curve
+from scissorcal.bench.trade.assemble import (
+    captures_of,
+    limit_of,
+    measured_curve,
+    on_captures,
+)
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.knob import make_knob
-from scissorcal.bench.trade.recommend import barred
+from scissorcal.bench.trade.recommend import barred, unsimulated
 from scissorcal.bench.trade.study import Record, Task, records_of
 
 
@@ -34,4 +39,22 @@ def without_prospect(case: Case, names: Sequence[str], records: Iterable[Record]
             for repeat in range(knob.repeats(case, setting)):
                 if repeat or setting.label not in wanted:
                     found.add(Task(name, setting.label, repeat))
+    return found
+
+
+def to_simulate(
+    case: Case, names: Sequence[str], records: Sequence[Record]
+) -> list[tuple[str, str]]:
+    """Of each knob named, the setting that is to be tried on simulated captures next, if any.
+
+    As (knob, label): the cheapest one that would be recommended if it holds there.
+    """
+    limit, found = limit_of(case), []
+    for name in names:
+        knob = make_knob(name)
+        curve = measured_curve(case, knob, records_of(case, name, records))
+        judged = on_captures(curve, records)
+        point = unsimulated(judged, limit, captures_of(case, knob, records))
+        if point is not None:
+            found.append((name, point.setting.label))
     return found

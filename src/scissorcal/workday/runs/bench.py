@@ -232,36 +232,17 @@ class _Run:
         """
         from scissorcal.bench.trade.assemble import refits
         from scissorcal.bench.trade.knob import make_knob
+        from scissorcal.bench.trade.prospects import to_simulate
         from scissorcal.bench.trade.study import capture_tasks
 
         if self._case.friction_fit is None:
             return
         if any(refits(make_knob(name)) for name in names):
             self._captured(pool, capture_tasks())
-        while wanted := self._unsimulated(names):
+        while wanted := to_simulate(self._case, names, self._records):
             tasks = [task for one in wanted for task in capture_tasks(one)]
             if not self._captured(pool, sorted(tasks, key=lambda task: task.repeat)):
                 return
-
-    def _unsimulated(self, names: Sequence[str]) -> list[tuple[str, str]]:
-        """The choice of each knob that is to be tried on simulated captures next, if any."""
-        from scissorcal.bench.trade.assemble import (
-            captures_of,
-            limit_of,
-            measured_curve,
-            on_captures,
-        )
-        from scissorcal.bench.trade.knob import make_knob
-        from scissorcal.bench.trade.recommend import unsimulated
-
-        captures, limit, found = self._captures(), limit_of(self._case), []
-        for name in names:
-            knob = make_knob(name)
-            curve = on_captures(measured_curve(self._case, knob, self._of(name)), captures)
-            point = unsimulated(curve, limit, captures_of(self._case, knob, captures))
-            if point is not None:
-                found.append((name, point.setting.label))
-        return found
 
     def _captured(self, pool: Pool, tasks: "Sequence[Task]") -> bool:
         """Measure simulated captures that have no record yet; whether any was."""
@@ -281,11 +262,6 @@ class _Run:
         self._work(pool, schedule, len(left))
         return self.made > before
 
-    def _captures(self) -> list[Record]:
-        from scissorcal.bench.trade.next_capture import NEXT_CAPTURE
-
-        return [record for record in self._records if record["knob"] == NEXT_CAPTURE]
-
     def curves(self, names: Sequence[str]) -> "tuple[Curve, ...]":
         """The curves of the knobs named, from all records; of those left out, why."""
         from scissorcal.bench.trade.assemble import curve_of, limit_of
@@ -294,8 +270,7 @@ class _Run:
         case, limit = self._case, limit_of(self._case)
         found = []
         for name in names:
-            captures = self._captures()
-            curve = curve_of(case, make_knob(name), self._of(name), limit, captures)
+            curve = curve_of(case, make_knob(name), self._of(name), limit, self._records)
             if name in self._left_out and not curve.missing:
                 why = self._left_out[name]
                 curve = replace(curve, points=(), unmeasured=(), sentences=(), missing=why)
