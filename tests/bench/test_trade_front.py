@@ -6,8 +6,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.bench.trade.pareto import pareto_front
-from scissorcal.bench.trade.point import Curve, Error, Point, Quantity, Setting, Spread
-from scissorcal.bench.trade.recommend import choices_of, recommend, together_sentence
+from scissorcal.bench.trade.point import (
+    Curve,
+    Error,
+    NextCapture,
+    Point,
+    Quantity,
+    Setting,
+    Spread,
+)
+from scissorcal.bench.trade.recommend import (
+    Captures,
+    choices_of,
+    recommend,
+    together_sentence,
+    unsimulated,
+)
 
 NUMBERS = st.floats(0.0, 10.0).map(lambda value: round(value, 1))
 
@@ -48,7 +62,7 @@ def test_the_cheapest_setting_within_the_limit_is_recommended() -> None:
     assert found.sentences[0] == (
         "middle is enough: 2.1 s time in place of 5 s with fine, 58 % less. Its error is 0.4 % of "
         "the scene's largest torque against the truth; the limit of one knob is 1 %, its part of "
-        "the tolerance of 7 %."
+        "the tolerance of 7 %. Cheaper, but passed over: coarse: its error is 20 %."
     )
 
 
@@ -134,6 +148,91 @@ def test_a_setting_with_a_guarded_error_beyond_the_present_one_is_not_recommende
     worse = recommended(guarded(MIDDLE, 4.0), guarded(FINE, 2.0))
     assert choices_of([worse]) == (("made", "fine"),)
     assert "but its needed is 4 in place of 2." in worse.sentences[0]
+
+
+def test_every_cheaper_setting_that_is_passed_over_has_its_reason() -> None:
+    refused = replace(point("refused", spread(0.5), 0.004), rejected=("bound share",))
+    also = replace(point("also refused", spread(0.6), 0.004), rejected=("bound share",))
+    said = recommended(refused, also, COARSE, MIDDLE, FINE).sentences[0]
+    assert said.endswith(
+        "Cheaper, but passed over: refused, also refused: it fails the check bound share; coarse: "
+        "its error is 20 %."
+    )
+    said = recommended(refused, COARSE, FINE).sentences[0]
+    assert "fine stays: refused would save 90 % time, but it fails the check bound share." in said
+    assert said.endswith("passed over: coarse: its error is 20 %.")
+
+
+def simulated(one: Point, error: float, loss: float) -> Point:
+    return replace(one, next_capture=NextCapture(4, error, loss))
+
+
+def on_captures(*points: Point, scatter: float | None = None) -> Curve:
+    return recommend(replace(CURVE, points=points), 0.01, 0.07, captures=Captures(True, scatter))
+
+
+def test_a_setting_is_recommended_with_what_the_next_capture_gives() -> None:
+    found = on_captures(simulated(MIDDLE, 0.03, 0.002), simulated(FINE, 0.04, 0.0))
+    assert choices_of([found]) == (("made", "middle"),)
+    assert found.sentences[0].endswith(
+        "On 9 of 10 captures of the same specimen the worst torque error is at most 3 % with it "
+        "and 4 % with fine (4 captures simulated from the fits): expect up to 3.4 %, both "
+        "together, against the truth."
+    )
+
+
+def test_a_setting_that_the_next_capture_may_reverse_is_not_recommended() -> None:
+    found = on_captures(simulated(MIDDLE, 0.03, 0.02), simulated(FINE, 0.02, 0.0))
+    assert choices_of([found]) == (("made", "fine"),)
+    assert (
+        "but on the next capture its worst torque error may be 2 % larger than with fine (4 "
+        "captures simulated)." in found.sentences[0]
+    )
+
+
+def test_a_setting_without_simulated_captures_is_not_recommended() -> None:
+    found = on_captures(MIDDLE, FINE)
+    assert choices_of([found]) == (("made", "fine"),)
+    assert "but no other capture was simulated with it within the budget." in found.sentences[0]
+    without = recommend(replace(CURVE, points=(MIDDLE, simulated(FINE, 0.02, 0.0))), 0.01, 0.07)
+    assert choices_of([without]) == (("made", "middle"),)
+    assert "at most 2 % with the present settings" in without.sentences[0]
+
+
+def test_the_cheapest_setting_without_captures_is_simulated_next() -> None:
+    cheap = point("cheap", spread(1.0), 0.004)
+
+    def wanted(*points: Point, needed: bool = True) -> str:
+        found = unsimulated(replace(CURVE, points=points), 0.01, Captures(needed))
+        return found.setting.label if found else ""
+
+    assert wanted(cheap, MIDDLE, FINE) == "cheap"
+    assert wanted(simulated(cheap, 0.1, 0.1), MIDDLE, FINE) == "middle"
+    assert wanted(simulated(cheap, 0.01, 0.0), MIDDLE, FINE) == ""
+    assert wanted(COARSE, FINE) == ""
+    assert wanted(cheap, FINE, needed=False) == ""
+
+
+def test_a_setting_that_saves_nothing_must_be_better_on_every_capture() -> None:
+    present = point("present", spread(2.0), 0.2, present=True)
+    dear = point("dear", spread(2.5), 0.001)
+    assert choices_of([on_captures(simulated(dear, 0.1, 0.001), present)]) == ()
+    found = on_captures(simulated(dear, 0.1, 0.0), present)
+    assert choices_of([found]) == (("made", "dear"),)
+
+
+def test_a_setting_that_mends_the_present_one_must_be_better_even_where_it_saves() -> None:
+    present = point("present", spread(5.0), 0.2, present=True)
+    assert choices_of([on_captures(simulated(MIDDLE, 0.1, 0.001), present)]) == ()
+    said = on_captures(simulated(MIDDLE, 0.1, 0.0), present).sentences[0]
+    assert said.startswith("middle is needed: ")
+
+
+def test_an_error_inside_what_captures_differ_by_is_not_determined() -> None:
+    said = on_captures(COARSE, FINE, scatter=0.3).sentences[0]
+    assert "its error is 20 %, inside the 30 % by which captures differ." in said
+    assert said.endswith("is not determined: capture again and repeat the benchmark.")
+    assert "not determined" not in on_captures(COARSE, FINE, scatter=0.1).sentences[0]
 
 
 def test_nothing_is_recommended_beyond_the_limit_or_without_a_share() -> None:

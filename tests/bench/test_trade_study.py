@@ -8,11 +8,17 @@ import pytest
 from scissorcal.bench.trade import fits, study
 from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade.assemble import curve_of, limit_of, reference_of
+from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.knob import KNOBS, make_knob
 from scissorcal.bench.trade.knobs.effort import Effort
+from scissorcal.bench.trade.next_capture import NEXT_CAPTURE
+from scissorcal.bench.trade.point import Sample, Setting
+from scissorcal.bench.trade.prospects import to_simulate, without_prospect
 from scissorcal.bench.trade.schedule import Schedule
-from scissorcal.bench.trade.study import PRESENT_TASK, Record, Task, run_task, tasks_of
-from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, made_case
+from scissorcal.bench.trade.study import PRESENT_TASK, Record, Task, records_of, run_task, tasks_of
+from scissorcal.bench.trade.torque import WORST
+from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, Steps, made_case
+from tests.package.fits import friction_fit
 
 
 @pytest.fixture(autouse=True)
@@ -99,6 +105,69 @@ def test_measured_times_take_the_place_of_expected_ones() -> None:
 def test_without_a_budget_everything_is_measured() -> None:
     tasks = tasks_of(made_case(), ["steps"])
     assert list(Schedule(tasks, {})) == list(tasks)
+
+
+class Barred(Steps):
+    """A knob of which every cheaper setting fails a check."""
+
+    name = "barred"
+
+    def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
+        """Reject all but the present one."""
+        found = super().measure(case, replace(setting, label="coarse"), repeat)
+        return replace(found, rejected=() if setting.present else ("bound share",))
+
+
+def test_what_can_recommend_nothing_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = {"barred": f"{__name__}:Barred", "plate": f"{__name__}:Unfelt"}
+    monkeypatch.setattr(knobs, "KNOBS", {**MADE, **here})
+    case, names = made_case(), ["steps", "barred", "plate"]
+    tasks = tasks_of(case, names)
+    waiting = without_prospect(case, names, [])
+    assert {task for task in tasks if task.knob == "plate"} <= waiting
+    # what is listed after the present setting is dearer, and no reference
+    first = {task for task in waiting if task.knob == "steps"}
+    assert {task.label for task in first if not task.repeat} == {FAILING}
+    assert {task for task in tasks if task.repeat} <= waiting
+    made = [run_task(case, task) for task in tasks if task.label in ("fine", "coarse")]
+    waiting = without_prospect(case, names, [record for record in made if record])
+    assert {task for task in tasks if task.knob == "barred"} <= waiting
+    assert Task("steps", "middle") not in waiting
+    schedule = Schedule(tasks, dict.fromkeys(tasks, 1.0), time.time() + 1e3)
+    schedule.later = waiting
+    order = list(schedule)
+    assert set(order) == set(tasks)
+    assert set(order[-len(waiting) :]) == waiting
+    held = Schedule(tasks, dict.fromkeys(tasks, 1.0), time.time() + 1e3)
+    held.later, held.hold = waiting, True
+    assert set(held) == set(tasks) - waiting
+
+
+def test_what_would_be_recommended_is_tried_on_simulated_captures() -> None:
+    case = replace(made_case(), friction_fit=friction_fit(symmetric=False))
+    records = [record for task in tasks_of(case, ["steps"]) if (record := run_task(case, task))]
+    assert to_simulate(case, ["steps"], records) == [("steps", "middle")]
+    assert to_simulate(made_case(), ["steps"], records) == []
+    for choices in ([], [["steps", "middle"]]):
+        records += [
+            {
+                "knob": NEXT_CAPTURE,
+                "label": "",
+                "repeat": k,
+                "choices": choices,
+                "outcome": {WORST: e},
+            }
+            for k, e in enumerate((0.01, 0.02))
+        ]
+    assert to_simulate(case, ["steps"], records) == []
+    curve = curve_of(case, make_knob("steps"), records_of(case, "steps", records), 0.02, records)
+    assert "2 captures simulated from the fits" in curve.sentences[0]
+
+
+class Unfelt(Steps):
+    """A knob whose error is not one of torque."""
+
+    name, of_torque = "plate", False
 
 
 def test_a_setting_that_fails_is_recorded_with_its_reason() -> None:

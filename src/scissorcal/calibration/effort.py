@@ -1,6 +1,6 @@
 """Which candidate models an effort fits: draft one, the others all of them."""
 
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from typing import Protocol, TypeVar
 
 from scissorcal.calibration.result import Effort
@@ -21,28 +21,25 @@ Candidate = TypeVar("Candidate", bound=Named)
 def candidates_for(
     effort: Effort,
     candidates: Sequence[Candidate],
+    usual: Callable[[Sequence[Candidate]], Candidate],
     last_chosen: str | None = None,
-    default: str | None = None,
     among: Container[str] = (),
 ) -> tuple[Candidate, ...]:
     """The candidates that are fitted at an effort, simplest first.
 
     Draft fits one: the only one that the recipe leaves, else the one that the last fit of the
-    workspace chose (``last_chosen``, its :attr:`FitResult.rung`), else ``default``, else the last
-    of all, which is the richest. Standard and thorough compare all of them, or those that
-    ``among`` names, if any. A name that no candidate has is passed over: the recipe may have
-    changed since. ValueError where there is no candidate.
+    workspace chose (``last_chosen``, its :attr:`FitResult.rung`), else the one that such data
+    usually support, which ``usual`` picks of them. Standard and thorough compare all of them, or
+    those that ``among`` names, if any. A name that no candidate has is passed over: the recipe may
+    have changed since. ValueError where there is no candidate.
     """
     candidates = [one for one in candidates if one.name in among] or candidates
     if not candidates:
         raise ValueError("The recipe allows no law, so there is no candidate model to fit.")
     if effort != "draft" or len(candidates) == 1:
         return tuple(candidates)
-    for wanted in (last_chosen, default):
-        for candidate in candidates:
-            if candidate.name == wanted:
-                return (candidate,)
-    return (candidates[-1],)
+    chosen = [one for one in candidates if one.name == last_chosen]
+    return tuple(chosen[:1]) or (usual(candidates),)
 
 
 def draft_note(

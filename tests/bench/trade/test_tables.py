@@ -37,7 +37,7 @@ def test_settings_go_from_coarse_to_fine_in_each_format_and_mark_the_present_one
     finer = replace(one, table_tolerance=3e-4, number_format="int16")
     assert labels_present(finer) == ["int16, tolerance 0.03 %"]
     assert labels_present(one) == [f"float32, tolerance {100.0 * TOLERANCE:g} %"]
-    searched = Tables().applied(one, settings[1])
+    searched = Tables().applied(one, settings[0])
     assert labels_present(searched) == ["int16, smallest that fit"]
 
 

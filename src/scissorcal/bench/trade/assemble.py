@@ -6,11 +6,22 @@ from dataclasses import dataclass, replace
 from statistics import median
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.bench.trade.knob import Knob, make_knob, scene_knobs
+from scissorcal.bench.trade.knob import SAME_FITS, Knob, make_knob, scene_knobs
+from scissorcal.bench.trade.next_capture import (
+    FEWEST_CAPTURES,
+    PRESENT_CHOICE,
+    by_choice,
+    next_capture,
+    upper_limit,
+)
 from scissorcal.bench.trade.pareto import pareto_front
 from scissorcal.bench.trade.point import Curve, Error, Point, Sample, Setting, Spread
-from scissorcal.bench.trade.recommend import recommend
+from scissorcal.bench.trade.recommend import Captures, recommend
 from scissorcal.bench.trade.study import Record, sample_of
+from scissorcal.bench.trade.torque import BAND_WORST, WORST
+
+SCATTERING = (BAND_WORST,)
+"""Main errors of fits against fits of the same capture: those that another capture changes."""
 
 
 def limit_of(case: Case) -> float:
@@ -24,12 +35,19 @@ def limit_of(case: Case) -> float:
     return case.recipe.scene.tolerance_percent / 100.0 / max(count, 1)
 
 
-def curve_of(case: Case, knob: Knob, records: Sequence[Record], limit: float) -> Curve:
+def curve_of(
+    case: Case,
+    knob: Knob,
+    records: Sequence[Record],
+    limit: float,
+    captures: Sequence[Record] = (),
+) -> Curve:
     """The curve of one knob from its records, with the setting that is recommended.
 
-    Settings without a record are named as unmeasured. ``limit`` is that of one knob (`limit_of`).
+    Settings without a record are named as unmeasured. ``limit`` is that of one knob (`limit_of`);
+    ``captures`` hold the records of simulated captures.
     """
-    curve = measured_curve(case, knob, records)
+    curve = on_captures(measured_curve(case, knob, records), captures)
     if curve.missing:
         return curve
     found = _reference(case, knob, records)
@@ -39,7 +57,40 @@ def curve_of(case: Case, knob: Knob, records: Sequence[Record], limit: float) ->
             f"No setting is recommended, since {found.gaps}: errors are to be counted against "
             f"{knob.against}."
         )
-    return recommend(curve, limit, case.recipe.scene.tolerance_percent / 100.0, unsure)
+    tolerance = case.recipe.scene.tolerance_percent / 100.0
+    return recommend(curve, limit, tolerance, unsure, captures_of(case, knob, captures))
+
+
+def on_captures(curve: Curve, captures: Sequence[Record]) -> Curve:
+    """The curve with what each setting gave on simulated captures, where two or more were made."""
+    tried = by_choice(captures, WORST)
+    known = tried.get(PRESENT_CHOICE, {})
+
+    def judged(point: Point) -> Point:
+        setting = point.setting
+        key = PRESENT_CHOICE if setting.present else (curve.knob, setting.label)
+        own = tried.get(key, {})
+        both = sorted(known.keys() & own.keys())
+        if len(both) < FEWEST_CAPTURES:
+            return point
+        found = next_capture([known[k] for k in both], [own[k] for k in both])
+        return replace(point, next_capture=found)
+
+    return replace(curve, points=tuple(judged(point) for point in curve.points))
+
+
+def captures_of(case: Case, knob: Knob, captures: Sequence[Record]) -> Captures:
+    """Whether a knob's settings need simulated captures, and how far its main error scatters.
+
+    Settings that change the fits need them, where a capture can be simulated.
+    """
+    tried = by_choice(captures, knob.error if knob.error in SCATTERING else WORST)
+    shares = list(tried.get(PRESENT_CHOICE, {}).values())
+    fitted = knob.error in SCATTERING and len(shares) >= FEWEST_CAPTURES
+    return Captures(
+        refits(knob) and case.friction_fit is not None,
+        upper_limit(shares) if fitted else None,
+    )
 
 
 def measured_curve(
@@ -121,6 +172,11 @@ def _reference(case: Case, knob: Knob, records: Sequence[Record]) -> _Reference:
 
 def _rejected(records: Sequence[Record]) -> set[str]:
     return {check for record in records for check in record["rejected"]}
+
+
+def refits(knob: Knob) -> bool:
+    """Whether settings of a knob change the fits, so that the next capture may judge otherwise."""
+    return knob.combined and knob.name not in SAME_FITS
 
 
 def _point(

@@ -23,8 +23,8 @@ MEAN, SD = "posterior mean, worst parameter", "posterior sd, worst parameter"
 QUANTILES = "5 and 95 % quantiles, worst parameter"
 
 DRAFT_NOTE = (
-    "Draft effort fits only the law that the workspace's fit chose; standard and thorough effort "
-    "compare all laws that the recipe allows."
+    "Draft effort fits one law, the one that such data usually support; standard and thorough "
+    "effort compare all laws that the recipe allows."
 )
 
 SECONDS_A_SAMPLE = {"draft": 2e-5, "standard": 5e-5, "thorough": 1e-3}
@@ -41,8 +41,8 @@ def expected_fits_s(case: Case) -> float:
 def measure_fits(case: Case, repeat: int) -> Sample:
     """Fit friction, then the cut, as the workspace would, and evaluate what they predict.
 
-    Draft effort fits the law that the workspace's fit chose, which a note says. Raises what the
-    fits raise.
+    As from the start: draft effort knows of no law that another fit chose, and a note says what it
+    fits. Raises what the fits raise.
     """
     cut, friction, costs, rejected = fit_case(case, repeat)
     notes = (DRAFT_NOTE,) if case.effort == "draft" else ()
@@ -59,7 +59,6 @@ def fit_case(
         case.recipe.fit.friction,
         effort=case.effort,
         rng=np.random.default_rng([case.seed, repeat, 0]),
-        last_chosen=case.friction_fit.rung if case.friction_fit else None,
     )
     fits = [friction]
     cut = None
@@ -72,7 +71,6 @@ def fit_case(
             rng=np.random.default_rng([case.seed, repeat, 1]),
             edge=case.edge,
             edge_verdicts=case.edge_verdicts,
-            last_chosen=case.cut_fit.rung if case.cut_fit else None,
         )
         fits.append(cut)
     spent_s = time.process_time() - before

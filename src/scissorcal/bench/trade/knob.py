@@ -28,6 +28,9 @@ PRESENT_ALIKE = ("effort", "window", "capture")
 """Knobs whose present settings are one and the same measurement, both fits as they are now: that
 of the present settings in `Together`, which is made once."""
 
+SAME_FITS = ("tables",)
+"""Knobs whose settings change no fit: what they cost in error is alike on every capture."""
+
 
 class Knob(Protocol):
     """One thing that a user may set, with what it costs and what error it leaves.

@@ -1,7 +1,7 @@
 """Which measurement is next, and which no longer fit into the time allowed."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from statistics import median
 
 from scissorcal.bench.trade.study import PRESENT_TASK, Record, Task
@@ -19,7 +19,8 @@ class Schedule:
 
     ``expected`` are seconds of each task before anything was measured. Seconds that records tell
     take their place, for the same setting as they are, for others of the knob as a factor.
-    ``reserve`` gives the seconds at the end that are not handed out. Without ``deadline`` (of
+    ``reserve`` gives the seconds at the end that are not handed out, and ``later`` holds the tasks
+    that wait for all others, and with ``hold`` are not handed out at all. Without ``deadline`` (of
     ``clock``) every task is handed out. No task may be expected to take more than ``share`` of the
     time that there is at the start (the present fits: than `PRESENT_SHARE`), nor ``stretch`` times
     what is left.
@@ -37,6 +38,8 @@ class Schedule:
     ) -> None:
         self.left = list(tasks)
         self.reserve: Callable[[], float] = lambda: 0.0
+        self.later: Container[Task] = ()
+        self.hold = False
         self._expected = dict(expected)
         self._deadline, self._clock, self._stretch = deadline, clock, stretch
         self._whole = float("inf") if deadline is None else deadline - clock()
@@ -80,7 +83,9 @@ class Schedule:
         if self._deadline is None:
             return self.left[0] if self.left else None
         left = self._deadline - self.reserve() - self._clock()
-        return next((task for task in self.left if self._fits(task, left)), None)
+        able = [task for task in self.left if self._fits(task, left)]
+        first = next((task for task in able if task not in self.later), None)
+        return first if first or self.hold else next(iter(able), None)
 
     def _fits(self, task: Task, left: float) -> bool:
         share = max(self._share, PRESENT_SHARE) if task == PRESENT_TASK else self._share

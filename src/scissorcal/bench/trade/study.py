@@ -12,8 +12,9 @@ from typing import Any
 from scissorcal.bench.trade.baseline import baseline_s
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.knob import PRESENT_ALIKE, Knob, make_knob
+from scissorcal.bench.trade.next_capture import CAPTURES, NEXT_CAPTURE, Recapture
 from scissorcal.bench.trade.point import Quantity, Sample, Setting
-from scissorcal.bench.trade.together import PRESENT, TOGETHER, Together
+from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, TOGETHER, Together
 from scissorcal.errors import ScissorcalError
 
 Record = Mapping[str, Any]
@@ -48,6 +49,8 @@ def key_of(record: Record) -> tuple[object, ...]:
 
 def knob_of(task: Task) -> Knob:
     """The knob that a task turns."""
+    if task.knob == NEXT_CAPTURE:
+        return Recapture(task.choices)
     return Together(task.choices) if task.knob == TOGETHER else make_knob(task.knob)
 
 
@@ -78,6 +81,13 @@ def tasks_of(case: Case, names: Sequence[str]) -> tuple[Task, ...]:
             spent += knob.expected_s(case, setting)
             found[task] = spent
     return tuple(sorted(found, key=lambda task: found[task]))
+
+
+def capture_tasks(choice: tuple[str, str] | None = None) -> tuple[Task, ...]:
+    """Simulated captures with the present settings, or with one knob (name, label) at a choice."""
+    choices = () if choice is None else (choice,)
+    label = PRESENT if choice is None else RECOMMENDED
+    return tuple(Task(NEXT_CAPTURE, label, repeat, choices) for repeat in range(CAPTURES))
 
 
 def records_of(case: Case, name: str, records: Iterable[Record]) -> list[Record]:

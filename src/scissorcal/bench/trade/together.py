@@ -71,7 +71,7 @@ class Together:
 
     def expected_s(self, case: Case, setting: Setting) -> float:
         """The fits as they are now, which the recommended ones seldom exceed, and the package."""
-        return expected_fits_s(case) + BUILD_S
+        return expected_chain_s(case)
 
     def repeats(self, case: Case, setting: Setting) -> int:
         """Once."""
@@ -79,14 +79,8 @@ class Together:
 
     def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
         """Fit, build as a package is built, time a step, and evaluate the tables over the scene."""
-        chosen = self.applied(case, setting)
+        chosen, seconds = self.prepared(case, setting, repeat)
         rng = np.random.default_rng([case.seed, repeat])
-        seconds = 0.0
-        if "photographs" in setting.value:
-            _, own = _choice(case, "photographs", setting.value["photographs"])
-            resolution = Resolution(own.value["count"], own.value["factor"])
-            edge, seconds = fit_edge(case, resolution, rng)
-            chosen = replace(chosen, edge=edge.belief)
         cut, friction, costs, rejected = fit_case(chosen, repeat)
         costs[PROCESSOR] = Quantity(costs[PROCESSOR].value + seconds, "s")
         outcome: dict[str, Any] = fits_outcome(chosen, cut, friction)
@@ -94,8 +88,19 @@ class Together:
             model = model_of_law(held_law(chosen, cut, friction))
             compiled = tables_of(chosen, model)
             costs |= package_costs(chosen, model, compiled, rng)
-            outcome["rendered"] = _rendered(chosen, model, compiled)
+            outcome["rendered"] = rendered_torque(chosen, model, compiled)
         return Sample(costs, outcome, rejected=rejected)
+
+    def prepared(self, case: Case, setting: Setting, repeat: int) -> tuple[Case, float]:
+        """The case with every choice, the edge of other photographs too; seconds for that edge."""
+        chosen = self.applied(case, setting)
+        if "photographs" not in setting.value:
+            return chosen, 0.0
+        _, own = _choice(case, "photographs", setting.value["photographs"])
+        resolution = Resolution(own.value["count"], own.value["factor"])
+        rng = np.random.default_rng([case.seed, repeat])
+        edge, seconds = fit_edge(case, resolution, rng)
+        return replace(chosen, edge=edge.belief), seconds
 
     def errors(self, case: Case, sample: Sample, reference: Sample | None) -> Mapping[str, Error]:
         """Of parameters, of the tables' torque, and of the fits' band."""
@@ -108,6 +113,11 @@ class Together:
         return fits_errors(case, replace(sample, outcome=outcome), reference)
 
 
+def expected_chain_s(case: Case) -> float:
+    """Seconds that the fits of a case and a package of them are expected to take."""
+    return expected_fits_s(case) + BUILD_S
+
+
 def _choice(case: Case, name: str, label: str) -> tuple[Any, Setting]:
     """A knob and one of its settings."""
     from scissorcal.bench.trade.knob import make_knob
@@ -116,7 +126,7 @@ def _choice(case: Case, name: str, label: str) -> tuple[Any, Setting]:
     return knob, next(one for one in knob.settings(case) if one.label == label)
 
 
-def _rendered(case: Case, model: ExactModel, compiled: Compiled) -> list[float | None]:
+def rendered_torque(case: Case, model: ExactModel, compiled: Compiled) -> list[float | None]:
     """Torque of the tables at the places of the scene; None beyond the blade."""
     points = scene_places(case)
     ranges = scene_ranges(case.recipe)

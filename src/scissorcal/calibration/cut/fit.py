@@ -28,7 +28,7 @@ from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import CoarseEncoderError, NoUnloadingError
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.lack_of_fit import budget_of
-from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws
+from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws, usual_law
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.path import PathMotion, path_motion
 from scissorcal.calibration.cut.scout import (
@@ -147,7 +147,7 @@ def fit_cut(
     data = _Data.of(recordings, recipe, friction, edge, prior)
     _refuse_no_contact(data)
     allowed = allowed_laws(recipe)
-    laws = candidates_for(effort, allowed, last_chosen, among=prior.laws if prior else ())
+    laws = candidates_for(effort, allowed, usual_law, last_chosen, prior.laws if prior else ())
     tell(0.05, "cut: finding where cracks rest and run")
     scouted = _scouted(data, laws)
     compared = _fit_laws(scouted, data, laws, tell, stop)
@@ -200,7 +200,7 @@ def cut_optimum(
     """
     data = _Data.of(recordings, recipe, friction, edge)
     _refuse_no_contact(data)
-    laws = candidates_for("draft", allowed_laws(recipe), last_chosen)
+    laws = candidates_for("draft", allowed_laws(recipe), usual_law, last_chosen)
     scouted = _scouted(data, laws)
     ((fitted, design),) = _fit_laws(scouted, data, laws, lambda done, sentence: None, None)
     return design, fitted.optimum.point

@@ -1,7 +1,7 @@
 """The laws of a cut that are compared, and their parameters with priors."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -97,6 +97,27 @@ def allowed_laws(recipe: Recipe) -> list[CutLaw]:
     dampings, loads = choices[settings.rate_damping], choices[settings.load_share]
     laws = itertools.product(loads, fractures, dampings, families)
     return [CutLaw(family, fracture, damped, loaded) for loaded, fracture, damped, family in laws]
+
+
+def usual_law(laws: Sequence[CutLaw]) -> CutLaw:
+    """The law that cuts (or presses) usually support, of candidates: what draft effort fits.
+
+    With the ripple of teeth; without damping and friction that depends on the load, which data are
+    to be asked for (standard effort does). Sheets have a power law, as the built-in recipes state;
+    soft things that are only pressed stiffen exponentially (Fung 1967,
+    doi:10.1152/ajplegacy.1967.213.6.1532; taken on 3 of 3 days of the virtual rig).
+
+    >>> from scissorcal.recipe.library import builtin_recipe
+    >>> usual_law(allowed_laws(builtin_recipe("paper-80gsm"))).name
+    'power response, rippled fracture'
+    """
+
+    def unlikely(law: CutLaw) -> tuple[bool, bool, bool, bool]:
+        family = "exponential" if law.fracture == "none" else "power"
+        smooth = law.fracture == "smooth"
+        return (law.loaded, law.damped, law.response != family, smooth)
+
+    return min(laws, key=unlikely)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The law that is used: chosen among candidates, fitted with the noise that its residuals have."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +12,14 @@ from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.search import scan_nodes
 from scissorcal.inference import Stop, gradient, tails_of
+from scissorcal.model.friction_terms import parts_of
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
+
+USUAL_LAWS = {"rotary": "stribeck+angle", "linear": "coulomb+viscous"}
+"""The law that evidence takes on most days, by the kind of joint: the pivot's on 12 of 12 days of
+the virtual rig (paper, cloth, presses)."""
 
 BUILD_UP = " + presliding"
 """What the name of a law with build-up after reversals has more than the same law without."""
@@ -22,6 +27,18 @@ BUILD_UP = " + presliding"
 OUTLIERS = 4.0
 """Student-t noise of at most this many degrees of freedom, whose kurtosis is infinite, takes the
 place of normal noise; milder tails are left to the widening by the scores."""
+
+
+def usual_law(laws: Sequence[FrictionExperiment]) -> FrictionExperiment:
+    """The law that sweeps usually support, of candidates (simplest first): what draft effort fits.
+
+    The richest without a term that `USUAL_LAWS` lacks, the simplest where each has one. Of its
+    symmetries it is the preferred one, which comes first.
+    """
+    usual = set(parts_of(USUAL_LAWS[laws[0].joint.kind]))
+    names = [str(law.key["law"]) for law in laws]
+    within = [name for name in names if usual.issuperset(parts_of(name))]
+    return laws[names.index(within[-1] if within else names[0])]
 
 
 def choose_law(

@@ -30,7 +30,7 @@ from scissorcal.calibration.friction.checks import (
     physical_verdict,
     start_verdict,
 )
-from scissorcal.calibration.friction.choice import choose_law
+from scissorcal.calibration.friction.choice import choose_law, usual_law
 from scissorcal.calibration.friction.cogging import NO_COGGING, Cogging, find_cogging
 from scissorcal.calibration.friction.lack_of_fit import with_lack_of_fit
 from scissorcal.calibration.friction.model import FrictionExperiment, design
@@ -66,12 +66,6 @@ from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict, not_evaluated
 
 Progress = Callable[[float, str], None]
-
-DRAFT_LAWS = {
-    "rotary": "stribeck + angle, asymmetric",
-    "linear": "coulomb + viscous, symmetric",
-}
-"""What draft effort fits to a joint where nothing says otherwise."""
 
 PRESLIDING = "presliding_fine_rad"
 """Fact of a probe: the shortest way over which friction builds up after a turn, which a fit of cuts
@@ -121,7 +115,7 @@ def fit_friction(
     settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
     near = prior.laws if prior else ()
-    laws = list(candidates_for(effort, every_law, last_chosen, DRAFT_LAWS[joint.kind], near))
+    laws = list(candidates_for(effort, every_law, usual_law, last_chosen, near))
     compared, chosen, law, passed = choose_law(laws, settings.lack_of_fit, stop, tell)
     infer_law = partial(infer, checkpoint=checkpoint, stop=stop, progress=_last_part(tell))
     problem = chosen.candidate.problem(law.series)

@@ -77,7 +77,12 @@ class FrictionSimulator:
 
     def simulate(self, truth: Array, rng: np.random.Generator) -> tuple[Recording, ...]:
         """Recordings of the same motion with the truth's friction."""
-        values = _plain(self.layout, truth)
+        return self.recordings_of(_plain(self.layout, truth), rng)
+
+    def recordings_of(
+        self, values: Mapping[str, float], rng: np.random.Generator
+    ) -> tuple[Recording, ...]:
+        """The same for a truth by the names of its parameters, in their units."""
         rig = friction_truth(values, self.structure, self.torque_noise, self.stroke_sd)
         return simulate_friction(self.motions, rig, rng)
 
@@ -127,9 +132,14 @@ class CutSimulator:
 
     def simulate(self, truth: Array, rng: np.random.Generator) -> tuple[Recording, ...]:
         """Recordings of the same motion through sheets of the truth's material."""
+        return self.recordings_of(_plain(self.layout, truth), rng)
+
+    def recordings_of(
+        self, values: Mapping[str, float], rng: np.random.Generator
+    ) -> tuple[Recording, ...]:
+        """The same for a truth by the names of its parameters, in their units."""
         tick_s = self.motions[0].pieces[0].tick_s
         known = KnownFriction.of(self.friction, self.recipe.fit.cut.priors)
-        values = _plain(self.layout, truth)
         return simulate_cut(self.motions, cut_truth(values, self.structure, known, tick_s), rng)
 
     def refit(

@@ -148,19 +148,21 @@ def make_day(
     workspace: Workspace,
     *,
     seed: int = 0,
+    capture: int = 0,
     effort: "Effort | None" = None,
     progress: Progress | None = None,
 ) -> tuple[tuple[FitOutcome, ...], tuple[FitOutcome, ...]]:
     """Capture and fit all that a new workspace's scene needs, on a virtual rig.
 
     Gives the fits of photographs and those of recordings. What is drawn for a ``seed``, and the
-    second process, are as in `run_demo`.
+    second process, are as in `run_demo`; another ``capture`` of the same specimen has other noise
+    and other sheets.
     """
     tell = progress or (lambda done, sentence: None)
     recipe = workspace.recipe()
     with open_pool(min(2, len(os.sched_getaffinity(0)))) as pool:
         tell(0.0, "capturing friction and cuts, beside the photographs where a second core is free")
-        captured = pool.executor.submit(_capture, workspace.root, seed)
+        captured = pool.executor.submit(_capture, workspace.root, seed, capture)
         photograph(workspace, recipe, seed, _part(tell, 0.05, 0.3))
         geometry = fit_photographs(workspace, recipe, seed, _part(tell, 0.3, 0.47))
         tell(0.47, "waiting for the captures")
@@ -243,8 +245,10 @@ def specimen_of(recipe: "Recipe", seed: int) -> "Specimen":
     return _drawn(recipe, seed)[0]
 
 
-def _drawn(recipe: "Recipe", seed: int) -> tuple["Specimen", list["np.random.Generator"]]:
-    """The specimen of a seed, and streams of noise for its captures and for rendering."""
+def _drawn(
+    recipe: "Recipe", seed: int, capture: int = 0
+) -> tuple["Specimen", list["np.random.Generator"]]:
+    """The specimen of a seed, and streams of noise for one of its captures and for rendering."""
     import numpy as np
 
     from scissorcal.device.sim.specimen import load_specimen
@@ -252,17 +256,17 @@ def _drawn(recipe: "Recipe", seed: int) -> tuple["Specimen", list["np.random.Gen
 
     rng = np.random.default_rng(seed)
     specimen = varied(load_specimen(recipe.specimen or recipe.name), rng)
-    return specimen, rng.spawn(2)
+    return specimen, rng.spawn(2 * capture + 2)[-2:]
 
 
-def _capture(root: Path, seed: int) -> None:
+def _capture(root: Path, seed: int, capture: int = 0) -> None:
     """Capture friction and cuts of a seed's specimen; another process may do it."""
     from scissorcal.device.capture import capture_cut, capture_friction, open_writer
     from scissorcal.device.lockstep import LockstepLink
 
     workspace = Workspace(root)
     recipe, text = workspace.recipe(), read_text(workspace.recipe_path)
-    specimen, streams = _drawn(recipe, seed)
+    specimen, streams = _drawn(recipe, seed, capture)
     link = LockstepLink(specimen, streams[0])
     probe = ensure_probed(workspace, link, recipe)
     path = workspace.new_recording("friction")

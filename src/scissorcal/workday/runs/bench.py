@@ -39,8 +39,9 @@ Progress = Callable[[float, str], None]
 FINISH_S = 2.0
 """Time within a budget for writing the results."""
 
-RESERVED_SHARE = 0.3
-"""At most this share of a budget is kept for measuring all recommended settings at once."""
+RESERVED_SHARE = 0.5
+"""At most this share of a budget is kept for simulated captures, and for measuring all recommended
+settings at once."""
 
 STRETCH = 2.0
 """All recommended settings are begun where this many times the time left is expected for them."""
@@ -110,14 +111,12 @@ def trade_workspace(
         left_out = {} if cluster is None else dict.fromkeys(LOCAL_KNOBS, ON_A_CLUSTER)
         run = _Run(case, file, chosen.budget_s, deadline, tell, left_out)
         with open_pool(workers, cluster) as pool:
-            run.measure(pool, names, keep_time=len(names) > 1)
-            curves = run.curves(shown)
-            made = run.made
-            together = run.together(pool, curves) if len(names) > 1 else None
-            # time that was kept, and that nothing new was compared in, goes to the knobs
-            if run.made == made and run.measure(pool, names, keep_time=False):
-                curves = run.curves(shown)
-                together = run.together(pool, curves) if len(names) > 1 else None
+            together = None
+            for keep_time in (True, False):  # time that was kept and not needed goes to the knobs
+                if run.measure(pool, names, keep_time=keep_time) or keep_time:
+                    run.simulate(pool, names)
+                    curves = run.curves(shown)
+                    together = run.together(pool, curves) if len(names) > 1 else None
         trade = run.result(engine, curves, together, time.time() - start, pool.workers)
         notes = (file.note,) if file.note else ()
     for path, text in (
@@ -170,8 +169,11 @@ class _Run:
     def measure(self, pool: Pool, names: Sequence[str], *, keep_time: bool = True) -> bool:
         """Measure the tasks of the knobs named that have no record yet; whether any was.
 
-        With ``keep_time`` some of a budget is left for all recommended settings at once.
+        Of a budget some is left for all recommended settings at once. With ``keep_time`` some is
+        left for simulated captures too, and only what can lead to a recommendation is measured.
         """
+        from scissorcal.bench.trade.next_capture import CAPTURES
+        from scissorcal.bench.trade.prospects import without_prospect
         from scissorcal.bench.trade.schedule import Schedule
         from scissorcal.bench.trade.study import (
             PRESENT_TASK,
@@ -198,21 +200,66 @@ class _Run:
 
         def reserve() -> float:
             # without the present fits there is nothing to compare all settings at once with
-            if self._budget_s is None or not keep_time or PRESENT_TASK in schedule.left:
+            if self._budget_s is None or PRESENT_TASK in schedule.left:
                 return 0.0
-            wanted = together.expected_s(self._case, present) * schedule.factor(TOGETHER)
-            return min(wanted, RESERVED_SHARE * self._budget_s)
+            once = together.expected_s(self._case, present) * schedule.factor(TOGETHER)
+            # all settings at once, and captures with the present and two recommended ones
+            count = (len(names) > 1) + (3 * CAPTURES if keep_time else 0)
+            return min(count * once, RESERVED_SHARE * self._budget_s)
 
         schedule.reserve = reserve
+        schedule.hold = keep_time and self._budget_s is not None
+
+        def order() -> None:
+            schedule.later = without_prospect(self._case, names, self._records)
+
+        order()
         before = self.made
-        self._work(pool, schedule, len(left))
-        if not self._file.records and self._budget_s is not None and left:
+        self._work(pool, schedule, len(left), order)
+        if not self._file.records and self._budget_s is not None and left and not keep_time:
             fixed = self._budget_s - (self._deadline or 0.0) + self._began
             least = max(fixed + 2.0 * schedule.least_s(), 3.0 * self._budget_s)
             raise InputError(
                 f"A budget of {self._budget_s:g} s is too small for any measurement of this scene: "
                 f'try --budget "{10 * math.ceil(0.1 * least)} s".'
             )
+        return self.made > before
+
+    def simulate(self, pool: Pool, names: Sequence[str]) -> None:
+        """Try the settings that would be recommended on simulated captures, the cheapest first.
+
+        The present settings come before all others, which are compared with them in pairs.
+        """
+        from scissorcal.bench.trade.assemble import refits
+        from scissorcal.bench.trade.knob import make_knob
+        from scissorcal.bench.trade.prospects import to_simulate
+        from scissorcal.bench.trade.study import capture_tasks
+
+        if self._case.friction_fit is None:
+            return
+        if any(refits(make_knob(name)) for name in names):
+            self._captured(pool, capture_tasks())
+        while wanted := to_simulate(self._case, names, self._records):
+            tasks = [task for one in wanted for task in capture_tasks(one)]
+            if not self._captured(pool, sorted(tasks, key=lambda task: task.repeat)):
+                return
+
+    def _captured(self, pool: Pool, tasks: "Sequence[Task]") -> bool:
+        """Measure simulated captures that have no record yet; whether any was."""
+        from scissorcal.bench.trade.schedule import Schedule
+        from scissorcal.bench.trade.study import key_of, knob_of, setting_of
+
+        known = {key_of(record) for record in self._records}
+        left = [task for task in tasks if task.key not in known]
+        expected = {}
+        for task in left:
+            knob = knob_of(task)
+            expected[task] = knob.expected_s(self._case, setting_of(knob, self._case, task.label))
+        schedule = Schedule(left, expected, self._deadline, share=1.0)
+        for record in self._known():
+            schedule.learn(record)
+        before = self.made
+        self._work(pool, schedule, len(left))
         return self.made > before
 
     def curves(self, names: Sequence[str]) -> "tuple[Curve, ...]":
@@ -223,7 +270,7 @@ class _Run:
         case, limit = self._case, limit_of(self._case)
         found = []
         for name in names:
-            curve = curve_of(case, make_knob(name), self._of(name), limit)
+            curve = curve_of(case, make_knob(name), self._of(name), limit, self._records)
             if name in self._left_out and not curve.missing:
                 why = self._left_out[name]
                 curve = replace(curve, points=(), unmeasured=(), sentences=(), missing=why)
@@ -335,8 +382,17 @@ class _Run:
 
         return records_of(self._case, name, self._records)
 
-    def _work(self, pool: Pool, schedule: "Schedule", count: int) -> None:
-        """Make measurements, and keep each; within a budget no worker is handed a second one."""
+    def _work(
+        self,
+        pool: Pool,
+        schedule: "Schedule",
+        count: int,
+        learned: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Make measurements, keep each, and call ``learned`` after it.
+
+        Within a budget no worker is handed a second one.
+        """
         from scissorcal.bench.trade.study import key_of
 
         jobs = (
@@ -354,6 +410,7 @@ class _Run:
             self._failed.discard(key_of(record))
             schedule.learn(record)
             self.made += 1
+            learned()
             share = done / max(count, done)
             if self._budget_s is not None:
                 spent = time.time() - (self._deadline or 0.0) + self._budget_s

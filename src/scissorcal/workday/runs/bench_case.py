@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from scissorcal.bench.trade.case import Case, Photographed
     from scissorcal.recording import Recording
 
-ALGORITHM = 3
+ALGORITHM = 4
 """Raised whenever a measurement of the same inputs would mean something else."""
 
 LOCAL_KNOBS = ("photographs", "plate")

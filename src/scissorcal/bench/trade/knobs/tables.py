@@ -66,7 +66,7 @@ class Tables:
                 f"{form}, smallest that fit",
                 (form, None) == own,
             )
-            for form in ("float32", "int16")
+            for form in ("int16", "float32")
         ]
         fixed = [
             Setting(
