@@ -172,7 +172,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         f"{_POSE}: standard error of the camera where the plate's target was, px",
     ),
     "fit.plate rig frame": ("at most", f"{_POSE}: directions left open, or sd of corners, px"),
-    "verify calibration": ("at least", f"{_INTERVALS}: p-value of uniform ranks"),
+    "verify calibration": (
+        "at least",
+        f"{_INTERVALS}: p-value of uniform ranks; below, 90 % intervals must hold 84 to 96 %",
+    ),
     "verify refits": ("at most", f"{_INTERVALS}: share of simulated fits that are unreliable"),
     "verify halves": ("at least", f"{_INTERVALS}: p-value of two halves' difference"),
     "verify halves-effort": (

@@ -135,6 +135,18 @@ def _identified(
         "strokes that excite them, or choose a model without them."
     )
     good = f"Every parameter is narrower than its prior; {worst} is the least certain one."
+    left = [name for name in layout.names if name in NEAR_REST]
+    open_ = [
+        name
+        for name in left
+        if posterior.draws[:, layout.names.index(name)].std(ddof=1)
+        > PRIOR_ONLY * layout.sd[layout.names.index(name)]
+    ]
+    if open_:
+        good += (
+            f" Not judged: {', '.join(open_)}, which the data leave to the prior, act below the "
+            "slowest sweep or next to a turn alone."
+        )
     return judge(scope, "identifiability", ratios[worst], PRIOR_ONLY, good, bad)
 
 

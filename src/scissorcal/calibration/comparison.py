@@ -68,7 +68,7 @@ def contenders(fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
     return [
         one
         for one, nats in zip(fitted, behind, strict=True)
-        if is_near(nats, len(one.optimum.point), most)
+        if one is best or is_near(nats, len(one.optimum.point), most)
     ]
 
 

@@ -47,13 +47,14 @@ def predictive_of(
     reference = densities.max(axis=(0, 2)) if sampled else np.zeros(densities.shape[1])
     densities -= reference[:, None]
     layout = own.candidate.layout
-    points = layout.columns(own.left_out.points[_resampled(own.left_out)]) if sampled else None
+    held = own in sampled
+    points = layout.columns(own.left_out.points[_resampled(own.left_out)]) if held else None
     means = predictions[:: max(1, len(predictions) // REPLICATES)]
     return Predictive(
         torque=_rounded(means + _noise(own, len(means), rng)[:, thin]),
         stroke=np.unique(own.strokes),
-        log_likelihood=densities[:, :, sampled.index(own)] if own in sampled else None,
-        log_likelihood_draws=points if own in sampled else None,
+        log_likelihood=densities[:, :, sampled.index(own)] if held else None,
+        log_likelihood_draws=points,
         parameters=layout.names,
         log_likelihood_reference=reference,
         independent_share=share,

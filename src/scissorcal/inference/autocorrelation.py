@@ -108,13 +108,17 @@ def robust_covariance_of_scores(scores: Array, series: Labels) -> Array:
 def _autocovariances(values: Array, series: Labels, longest: int) -> Array:
     """Sums of products (longest + 1,) of values (n,) at lags 0 to ``longest`` within a series.
 
-    By the power spectrum, runs of one series being kept apart by as many zeros.
+    By the power spectrum, runs of one series being kept apart by zeros. Beyond the longest run
+    there are no products; a label that comes back later is another series.
     """
     run = np.concatenate([[0], np.cumsum(np.diff(series) != 0)])
+    sums, longest = np.zeros(longest + 1), min(longest, int(np.bincount(run).max()) - 1)
     place = np.arange(len(values)) + run * longest
     apart = np.zeros(1 << (int(place[-1]) + longest).bit_length())
     apart[place] = values
-    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(apart)) ** 2, len(apart))[: longest + 1])
+    spectrum = np.abs(np.fft.rfft(apart)) ** 2
+    sums[: longest + 1] = np.fft.irfft(spectrum, len(apart))[: longest + 1]
+    return sums
 
 
 def _lagged(a: Array, b: Array, series: Labels, lag: int) -> Array:

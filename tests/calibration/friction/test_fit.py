@@ -278,3 +278,5 @@ def test_presliding_is_recovered_from_turns():
         parameter = found.parameter(name)
         assert abs(parameter.mean - value) < 4 * parameter.sd + 0.01 * value, name
         assert parameter.sd < 0.1 * value, name
+    every = FitFriction(symmetry="symmetric", critic=False)
+    assert "presliding" in fit_friction((recording,), every, effort="standard", rng=rng).rung

@@ -11,8 +11,9 @@ import pytest
 from scissorcal.calibration import FitResult
 from scissorcal.calibration.verify.check import assess, make_study, tasks_of
 from scissorcal.calibration.verify.generating import Generating, generating_prior, refit_prior
-from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.calibration.verify.result import RankedQuantity, VerifyResult
 from scissorcal.calibration.verify.study import Study, Task, run
+from scissorcal.calibration.verify.verdicts import held_by_90
 from scissorcal.errors import InputError, MissingError
 from scissorcal.inference import ArNoise, infer
 
@@ -166,3 +167,10 @@ def test_a_fit_without_nuisance_draws_must_be_repeated():
     fit.__dict__["nuisance_draws"] = None
     with pytest.raises(MissingError, match="scissorcal fit friction --force"):
         study_of(experiment, fit=fit)
+
+
+def test_ranks_that_are_all_alike_hold_everything_or_nothing():
+    """All truths beyond all draws: the worst fit has a width of zero, and ends in no division."""
+    for shift, held in ((3.0, 0.0), (0.0, 1.0)):
+        row = RankedQuantity("a", "m", (), (), 1e-9, None, 0.0, shift, ())
+        assert held_by_90(row) == held

@@ -216,6 +216,15 @@ def test_corners_that_other_pictures_contradict_are_left_out_of_the_rigs_frame()
     assert np.abs(away).max() < 4.5
 
 
+def test_a_picture_with_another_stance_than_stated_is_not_left_out():
+    """One advance of twelve is off by a millimetre: its corners are no outliers, and show it."""
+    stances = [(a, b) for a in (0.0, 0.02, 0.04, 0.06) for b in (0.1, 0.3, 0.5)]
+    _, views = card_views(stances, np.random.default_rng(5), noise=0.02)
+    wrong = CardView(views[4].corners, views[4].advance_m + 1e-3, views[4].blade_angle_rad)
+    found = locate_rig((*views[:4], wrong, *views[5:]), CAMERA, MIDDLE)
+    assert found.rms_px > 0.4
+
+
 def test_motion_that_determines_part_of_the_frame_names_the_rest():
     _, shifted = card_views([(a, 0.2) for a in (0.0, 0.03, 0.06)], np.random.default_rng(9))
     assert locate_rig(shifted, CAMERA, MIDDLE).untold

@@ -217,12 +217,12 @@ def _power_law(
         return np.concatenate([*prior, *rows(u)[0]])
 
     def jacobian(u: Array) -> Array:
-        found = np.zeros((len(misfit(u)), len(u)))
-        count = len(pulls)
+        blocks, count = rows(u)[1], len(pulls)
+        found = np.zeros((count + 1 + sum(map(len, blocks)), len(u)))
         found[:count, 2:] = np.eye(count) / 3.0
         found[count, 1] = 1.0 / log_sd_exponent
         first = count + 1
-        for place, block in enumerate(rows(u)[1], start=2):
+        for place, block in enumerate(blocks, start=2):
             found[first : first + len(block), [0, 1, place]] = block
             first += len(block)
         return found

@@ -91,19 +91,20 @@ def _notes(passed: Mapping[str, float]) -> tuple[str, ...]:
     most = max(passed.values())
     return (
         f"Not fitted: {', '.join(passed)}. Build-up of friction after reversals would add "
-        f"{most:.1f} nats at most, and evidence asks for {POSITIVE_EVIDENCE:g}.",
+        f"{most:.1f} nats by a score test, and evidence asks for {POSITIVE_EVIDENCE:g}.",
     )
 
 
 def gain_of_build_up(plain: FittedCandidate, rich: FrictionExperiment) -> float:
-    """Log density (nats) that build-up after reversals can add to a fitted law at most.
+    """Log density (nats) that build-up after reversals would add to a fitted law, by a score test.
 
     ``rich`` is the law of ``plain`` with build-up, over the same windows. At each length of the
     scan the score test of Rao (1948, doi:10.1017/S0305004100023987) is taken for the share of dry
     friction that builds up, all parameters of the plain law being free within their priors: half
-    the squared score over its variance, 0 where the share would be negative. The likelihood is
-    quadratic in the share, but for the shift of the law's own levels, so that this is what the fit
-    would gain on the data it is made of; unseen strokes gain less.
+    the squared score over its variance, with the noise at its best, 0 where the share would be
+    negative. Observations count by the plain law's share of independent ones, which falls where
+    something is missing from it: planted build-up of 0.6 to 30 % of friction over 0.15 rad has 6.5
+    to 21 nats here where fits gained 6 to 638 on unseen strokes, and none has 1.
     """
     candidate, point = plain.candidate, plain.optimum.point
     residuals = candidate.likelihood.residuals
@@ -116,14 +117,15 @@ def gain_of_build_up(plain: FittedCandidate, rich: FrictionExperiment) -> float:
     values = candidate.layout.natural(point)
     place = rich.layout.names.index("presliding_length")
     middle, sd = rich.layout.mean[place], rich.layout.sd[place]
-    best = 0.0
+    best, count = 0.0, plain.share * len(left)
     for node in scan_nodes(middle, sd, rich.basis.lag.spacing):
         column = rich.basis.lacking(values, rich.basis.lag.scale_of(node))
         score = -weight * float(column @ left)
         shared = weight * slopes.T @ column
         variance = weight * float(column @ column) - shared @ np.linalg.solve(precision, shared)
         if score > 0.0 and variance > 0.0:
-            best = max(best, 0.5 * score**2 / float(variance))
+            explained = min(score**2 / float(variance) / count, 1.0 - 1e-12)
+            best = max(best, -0.5 * count * float(np.log1p(-explained)))
     return best
 
 

@@ -213,6 +213,7 @@ def _square(found: _Refined) -> float:
 
 
 def near(residuals: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Those of the ``used`` corners (n,) that residuals (n, 2) do not show as outliers."""
     distance = np.sqrt(np.sum(residuals**2, axis=1))
     robust = float(np.median(distance[used])) / 1.1774
     return np.asarray(used & (distance < FAR_OFF * max(robust, LEAST_SD_PX) * np.sqrt(2.0)))

@@ -30,10 +30,11 @@ UNTOLD = 0.1
 the motion."""
 
 STEP = 1e-6
-REJECTIONS = 4
-"""Least squares, each without the corners that the one before left far off."""
-MOST_REJECTED = 0.1
-"""Share of corners beyond which it is not single corners that are wrong, but what was stated."""
+REJECTIONS = 3
+"""Times that corners which least squares leave far off are left out, and it is tried again."""
+MOST_OF_A_VIEW = 0.25
+"""Share of a picture's corners, those of one marker of the card's four, beyond which it is not
+single corners that are wrong, but the stance that was stated: then none is left out."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,6 @@ def locate_rig(
     ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
     be located at all, or where fewer than two different stances were seen.
     """
-    from scipy.optimize import least_squares
-
     stances = {(round(v.advance_m, 6), round(v.blade_angle_rad, 6)) for v in views}
     if len(stances) < 2:
         raise ValueError(
@@ -103,22 +102,18 @@ def locate_rig(
         )
     located = [locate_board(view.corners, camera) for view in views]
     start = _start(views, tuple(found.pose for found in located), middle_m)
-    rows, point = _Rows(views, camera, middle_m, tuple(found.used for found in located)), start
-    for left in reversed(range(REJECTIONS)):
-        point = least_squares(
-            rows.residuals,
-            point,
-            jac=rows.by_point,
-            method="lm",
-            x_scale="jac",
-            xtol=1e-14,
-            ftol=1e-12,
-        ).x
+    every = _Rows(views, camera, middle_m, tuple(found.used for found in located))
+    rows, point = every, every.nearest(start)
+    for _ in range(REJECTIONS):
         away = rows.residuals(point).reshape(-1, 2)
         sound = near(away, np.ones(len(away), dtype=bool))
-        if left == 0 or np.all(sound) or np.mean(~sound) > MOST_REJECTED:
+        if np.all(sound):
             break
         rows = rows.where(sound)
+        if rows.most_lost(every) > MOST_OF_A_VIEW:
+            rows, point = every, every.nearest(start)
+            break
+        point = rows.nearest(point)
     residual, slope, shared = rows.residuals(point), rows.by_point(point), rows.by_shared(point)
     square, normal, slopes = float(residual @ residual), slope.T @ slope, slope.T @ shared
     noise = max(square / max(len(residual) - len(point), 1), LEAST_SD_PX**2)
@@ -213,6 +208,26 @@ class _Rows:
     camera: Camera
     middle_m: Array
     used: tuple[NDArray[np.bool_], ...]
+
+    def nearest(self, start: Array) -> Array:
+        """The parameters (11,) that leave the least squares, sought from ``start``."""
+        from scipy.optimize import least_squares
+
+        found = least_squares(
+            self.residuals,
+            start,
+            jac=self.by_point,
+            method="lm",
+            x_scale="jac",
+            xtol=1e-14,
+            ftol=1e-12,
+        )
+        return np.asarray(found.x)
+
+    def most_lost(self, every: "_Rows") -> float:
+        """The largest share of one picture's corners that ``every`` uses and this does not."""
+        pairs = zip(self.used, every.used, strict=True)
+        return float(max(1.0 - now.sum() / max(begun.sum(), 1) for now, begun in pairs))
 
     def where(self, sound: NDArray[np.bool_]) -> "_Rows":
         """The rows of those of the used corners that ``sound`` (corners,) selects."""

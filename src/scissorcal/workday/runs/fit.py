@@ -163,7 +163,7 @@ def fit_step(
     current = stored.get("inputs") == identity or stored.get("imported")
     if stored and current and not force and engine.state(step.name).state != "stale":
         state, result = engine.state(step.name), _load(step, path)
-        if not (critic and _unasked(result)):
+        if not (critic and not stored.get("imported") and _unasked(result)):
             return FitOutcome(step.what, result, path, pictures_beside(path), True, state)
     _refuse_without_data(engine, BY_NAME[step.inputs[0]])
     refuse_unwritable(engine, save_to)
