@@ -329,8 +329,8 @@ class Predictive:
     :class:`FitSeries`: the mean by a draw of the posterior, and a draw of the noise. ``stroke``
     (strokes,) labels the log-likelihoods: whole strokes are the independent units.
     ``log_likelihood`` (draws, strokes) is the chosen candidate's, ``candidate_log_likelihoods``
-    (draws, strokes, candidates) those of all that came near the best; None at draft effort. They are
-    multiplied by ``independent_share``, the share of points that are independent, the same for all
+    (draws, strokes, candidates) those of all that came near the best; None at draft effort. They
+    are multiplied by ``independent_share``, the share of points that are independent, the same for all
     candidates of a fit, and relative to ``log_likelihood_reference`` (strokes,), each stroke's
     largest value, since their level depends on the unit of torque. ``log_likelihood_draws`` (draws,
     parameters), columns in the order of ``parameters``, in SI, are the draws of the chosen
