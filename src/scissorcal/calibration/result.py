@@ -330,8 +330,8 @@ class Predictive:
     (strokes,) labels the log-likelihoods: whole strokes are the independent units.
     ``log_likelihood`` (draws, strokes) is the chosen candidate's, ``candidate_log_likelihoods``
     (draws, strokes, candidates) those of all that came near the best; None at draft effort. They
-    are multiplied by ``independent_share``, the share of points that are independent, the same for all
-    candidates of a fit, and relative to ``log_likelihood_reference`` (strokes,), each stroke's
+    are multiplied by ``independent_share``, the share of points that are independent, the same for
+    all candidates of a fit, and relative to ``log_likelihood_reference`` (strokes,), each stroke's
     largest value, since their level depends on the unit of torque. ``log_likelihood_draws`` (draws,
     parameters), columns in the order of ``parameters``, in SI, are the draws of the chosen
     candidate at which they hold, row by row: equally weighted draws of the posterior whose
