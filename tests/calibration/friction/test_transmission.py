@@ -166,7 +166,7 @@ def test_share_and_gain_of_a_known_load_are_recovered_and_the_load_with_them():
 def test_a_ladder_with_a_load_finds_it_by_itself():
     recording = driven_tool(np.random.default_rng(3))
     settings = FitFriction(symmetry="symmetric")
-    fit = fit_friction((recording,), settings, effort="draft", rng=np.random.default_rng(4))
+    fit = fit_friction((recording,), settings, effort="standard", rng=np.random.default_rng(4))
     assert "load" in fit.rung
 
 
