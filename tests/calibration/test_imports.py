@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-HEAVY = ("arviz", "matplotlib", "pandas", "pyarrow", "dask", "xarray", "pysindy", "sklearn", "cv2")
+HEAVY = (
+    *("arviz", "matplotlib", "pandas", "pyarrow", "dask", "xarray", "pysindy", "sklearn", "cv2"),
+    *("scipy.signal", "scipy.stats"),  # half a second each, a fifth of a fit
+)
 
 SCRIPT = """
 import json, sys

@@ -61,9 +61,8 @@ def assemble(
     ``extra_notes`` and ``extra_diagnostics`` are what only the fit itself can say; they follow the
     common ones. ``critic`` has the residuals searched for what the law lacks, which is judged by
     the ``tolerance`` of torque, a share, where there is one, but for terms that are ``known`` by
-    name from elsewhere; ``load`` (n,) is what the joint bore,
-    where that was measured. ``usage`` says which samples the fit uses.
-    ``brief`` leaves out what only people read: replay and replicated data.
+    name from elsewhere; ``load`` (n,) is what the joint bore, where that was measured. ``usage``
+    says which samples the fit uses, ``brief`` leaves out replay and replicated data.
     """
     held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
     thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))

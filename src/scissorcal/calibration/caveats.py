@@ -87,7 +87,7 @@ def next_recording_sd(fit: FitResult, parameter: FittedParameter) -> float | Non
 
 
 def next_recording_words(fit: FitResult, parameter: FittedParameter) -> str:
-    """The same for a table: what a new recording's value lies within, or that it is not known."""
+    """The same for a table: in brackets by an earlier fit, or that it is not known."""
     sd = next_recording_sd(fit, parameter)
     if sd is None:
         return NOT_KNOWN

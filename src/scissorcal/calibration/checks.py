@@ -123,11 +123,9 @@ def _identified(
     scope: str, chosen: FittedCandidate, posterior: Posterior, nuisance: tuple[str, ...]
 ) -> Verdict:
     layout = chosen.candidate.layout
-    ratios = {
-        name: float(posterior.draws[:, i].std(ddof=1) / layout.sd[i])
-        for i, name in enumerate(layout.names)
-        if name not in nuisance
-    }
+    widths = posterior.draws.std(axis=0, ddof=1) / layout.sd
+    every = dict(zip(layout.names, widths.tolist(), strict=True))
+    ratios = {name: ratio for name, ratio in every.items() if name not in nuisance}
     worst = max(ratios, key=lambda name: ratios[name])
     silent = [name for name, ratio in ratios.items() if ratio > PRIOR_ONLY]
     bad = (
@@ -135,17 +133,11 @@ def _identified(
         "strokes that excite them, or choose a model without them."
     )
     good = f"Every parameter is narrower than its prior; {worst} is the least certain one."
-    left = [name for name in layout.names if name in NEAR_REST]
-    open_ = [
-        name
-        for name in left
-        if posterior.draws[:, layout.names.index(name)].std(ddof=1)
-        > PRIOR_ONLY * layout.sd[layout.names.index(name)]
-    ]
-    if open_:
+    unjudged = [name for name in NEAR_REST if every.get(name, 0.0) > PRIOR_ONLY]
+    if unjudged:
         good += (
-            f" Not judged: {', '.join(open_)}, which the data leave to the prior, act below the "
-            "slowest sweep or next to a turn alone."
+            f" Not judged, because only friction below the slowest sweep or next to a turn depends "
+            f"on it: {', '.join(unjudged)}, which the data leave to the prior."
         )
     return judge(scope, "identifiability", ratios[worst], PRIOR_ONLY, good, bad)
 

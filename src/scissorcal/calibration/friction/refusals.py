@@ -1,7 +1,7 @@
 """Motion and terms that cannot determine friction: refused, with what to record instead."""
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from scissorcal.calibration.signals.filtering import Bins, position_error
 from scissorcal.calibration.signals.interruptions import interruptions
@@ -157,7 +157,7 @@ def _refuse_drift(bins: Bins, recordings: tuple[Recording, ...], joint: Joint) -
         found, *_ = np.linalg.lstsq(columns, drive, rcond=None)
         size = np.sqrt(np.sum((drive - columns @ found) ** 2) / freedom)
         error = size * np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns)))
-        reach = float(student.isf(DRIFT_RATE / 2.0, freedom)) * error
+        reach = float(stdtrit(freedom, 1.0 - DRIFT_RATE / 2.0)) * error
         drift, friction = np.abs(found[:2]).tolist()
         if drift - reach[0] > friction + reach[1]:
             unit = joint.effort_unit

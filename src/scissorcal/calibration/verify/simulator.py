@@ -93,7 +93,7 @@ class FrictionSimulator:
         effort: Effort,
         rng: np.random.Generator,
     ) -> FitResult:
-        """The whole fit: sensors, windows, cogging, model comparison, posterior."""
+        """The fit: sensors, windows, cogging, comparison of the contenders, posterior."""
         return fit_friction(
             data,
             self.settings,
@@ -149,7 +149,10 @@ class CutSimulator:
         effort: Effort,
         rng: np.random.Generator,
     ) -> FitResult:
-        """The whole fit: sensors, segments, preliminary fit, teeth, model comparison, posterior."""
+        """The fit: sensors, segments, teeth, comparison of the contenders, posterior.
+
+        A power law's segments are begun at the mean of the truths, not at a first guess.
+        """
         return fit_cut(
             data,
             self.recipe,

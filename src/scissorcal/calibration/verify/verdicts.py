@@ -26,8 +26,6 @@ LEAST, MOST = 0.84, 0.96
 errors). A shift of 0.6 standard deviations alone reaches the lower one, widths off by a factor of
 1.17 or 0.8 either. Ranks of enough fits show smaller errors, too: encoder steps shift a cut's
 exponent by 0.3 standard deviations, and its intervals hold 88 %."""
-REACH_OF_90 = 1.6449
-"""Standard deviations to either end of a central 90 % interval."""
 UNRELIABLE_LIMIT = 0.05
 """Limit of the share of simulated fits that fail or do not pass their diagnostics."""
 
@@ -104,9 +102,9 @@ def held_by_90(quantity: RankedQuantity) -> float:
     >>> round(held_by_90(made), 3)
     0.9
     """
-    from scipy.special import ndtr
+    from scipy.special import ndtr, ndtri
 
-    reach = REACH_OF_90
+    reach = float(ndtri(0.95))
     if quantity.width == 0.0:
         return float(abs(quantity.shift) <= reach)
     low, high = ((side * reach - quantity.shift) / quantity.width for side in (-1.0, 1.0))

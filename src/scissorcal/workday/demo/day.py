@@ -40,9 +40,6 @@ if TYPE_CHECKING:
 Progress = Callable[[float, str], None]
 
 RENDER_S = 30.0
-VERIFY_FITS = 40
-"""Fits of simulated data with which a demo verifies each of its fits: they find intervals that are
-one standard deviation off in 98 of 100 cases, half as wide as they should be in 78."""
 RIG_FITS = {"rotary": ("friction", "cut"), "linear": ("friction",)}
 STROKE_RATES = 3
 PRESS_CONTACTS = 3
@@ -92,7 +89,7 @@ def run_demo(
     recipe_name: str = "paper-photographed",
     seed: int = 0,
     effort: "Effort | None" = None,
-    fits: int = VERIFY_FITS,
+    fits: int,
     progress: Progress | None = None,
 ) -> DemoResult:
     """Capture, fit, verify, report, package and render on a virtual rig; judge it by the truth.
