@@ -24,10 +24,6 @@ from scissorcal.recording.recording import Joint
 
 Array = NDArray[np.float64]
 
-NEGLIGIBLE = 0.0175
-"""Share of the signal below which an error does not matter: a quarter of the 7 % that people
-just notice in a force (Jones 2000, Kinesthetic sensing)."""
-
 PLACES = 5
 """Stretches of speed, and of contact or opening, among which the place of most difference lies."""
 FEWEST_BINS = 10
@@ -37,15 +33,16 @@ MOST_MORE = 20
 
 
 def choose(
-    fitted: Sequence[FittedCandidate], signal_rms: float = 0.0, negligible: float = NEGLIGIBLE
+    fitted: Sequence[FittedCandidate], signal_rms: float = 0.0, negligible: float = 0.0
 ) -> FittedCandidate:
     """Take the simplest candidate that is not distinguishable from the best.
 
     ``fitted`` stands simplest first. Hold-out strokes are judged twice (see
     :func:`~.candidates.compare`): by fits without them, and by the posterior without them (PSIS-LOO
-    over whole strokes, as far as its k-hats are good). Candidates whose error is larger by less
-    than the share ``negligible`` of ``signal_rms`` are equivalent too. That needs a ``signal_rms``,
-    and suits candidates that differ in their mean only. The result has ``equivalent`` filled in.
+    over whole strokes, as far as its k-hats are good). Where an error of the law is stated, as the
+    share ``negligible`` of ``signal_rms``, candidates whose error is larger by less than that are
+    equivalent too; what a person would not feel is decided where a model is rendered. The result
+    has ``equivalent`` filled in.
     """
     rows = _rows(fitted, signal_rms, negligible)
     (index,) = (index for index, row in enumerate(rows) if row.chosen)
@@ -100,7 +97,7 @@ def is_near(behind: float, parameters: int, of_best: int) -> bool:
 
 
 def _rows(
-    fitted: Sequence[FittedCandidate], signal_rms: float, negligible: float = NEGLIGIBLE
+    fitted: Sequence[FittedCandidate], signal_rms: float, negligible: float = 0.0
 ) -> tuple[CandidateRow, ...]:
     best = best_of(fitted)
     accounts = [Account(np.stack([one.scores for one in fitted]) * best.share)]
@@ -118,7 +115,7 @@ def _rows(
         [one.name for one in fitted],
         [len(one.optimum.point) for one in fitted],
         accounts,
-        [signal_rms > 0 and one.held_out_rms**2 - best.held_out_rms**2 <= limit for one in fitted],
+        [limit > 0 and one.held_out_rms**2 - best.held_out_rms**2 <= limit for one in fitted],
     )
 
 

@@ -14,7 +14,6 @@ from scissorcal.inference.autocorrelation import ljung_box
 from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.curvature import gradient, natural_step
 from scissorcal.inference.information import likelihood_information
-from scissorcal.inference.mixture import Shear
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.tails import log_density
@@ -87,6 +86,11 @@ class CandidateProblem(Problem):
     prior_precision: Array = field(default_factory=lambda: np.zeros((0, 0)))
     reduced: StrokeSums | None = None
 
+    def log_priors(self, points: Array) -> Array:
+        """Log-priors of points (k, p), shape (k,)."""
+        away = points - self.prior_mean
+        return np.asarray(-0.5 * np.einsum("ki,ij,kj->k", away, self.prior_precision, away))
+
     def log_likelihood(self, point: Array) -> float:
         """Sum of the likelihood's terms; -inf where it is not finite."""
         if self.reduced is None:
@@ -113,8 +117,8 @@ class Candidate:
     ``blocks`` and ``populations`` (n,) are as in :class:`scissorcal.inference.problem.Problem`.
     ``reduced`` is the same model over sums by stroke, where it has them. ``search`` finds the
     optimum where the model has a quicker way than :func:`~.optimise.find_optimum`. ``share`` is
-    the share of bins that count as independent, where it is known, ``shear`` coordinates in which a
-    ridge is straight.
+    the share of bins that count as independent, where it is known, ``curved`` the places of
+    parameters in which the model is not linear.
     """
 
     name: str
@@ -129,7 +133,7 @@ class Candidate:
     reduced: StrokeSums | None = None
     search: Callable[[CandidateProblem], Optimum] | None = None
     share: float | None = None
-    shear: Shear | None = None
+    curved: tuple[int, ...] = ()
 
     def problem(self, series: Integers, keep: NDArray[np.bool_] | None = None) -> CandidateProblem:
         """The posterior of this candidate, over the bins that ``keep`` selects."""
@@ -167,7 +171,7 @@ class Candidate:
             populations=kept(self.populations),
             blocks=kept(self.blocks),
             share=1.0 if self.share is None else self.share,
-            shear=self.shear,
+            curved=self.curved,
         )
 
     def optimum(self, series: Integers, stop: Stop | None = None) -> Optimum:

@@ -117,7 +117,7 @@ def _densities(
     within = np.all((draws >= problem.lower) & (draws <= problem.upper), axis=1)
     if by_stroke is not None:
         rows[within] = by_stroke(draws[within])
-        log_prior[within] = [float(problem.log_prior(draw)) for draw in draws[within]]
+        log_prior[within] = problem.log_priors(draws[within])
         return rows, log_prior
     for index in np.flatnonzero(within):
         draw = draws[index]

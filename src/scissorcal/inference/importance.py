@@ -159,6 +159,23 @@ def sample_by_mixture(
     return _adapted(log_posteriors, first, refit, count, rng, rounds, GOOD_MIXTURE_K, batches)
 
 
+def sample_by_proposal(
+    log_posteriors: Many, proposal: Mixture, count: int, rng: np.random.Generator, budget: int
+) -> Sampled:
+    """Sample from a proposal that was made without draws, until ``count`` of them are effective.
+
+    Half of the draws come from a mixture of a few components that is fitted to a first round, the
+    others from ``proposal``, so that no region that it has is lost. It takes about ``budget``
+    evaluations at most.
+    """
+    first = _once(log_posteriors, proposal, 2 * count, rng)
+    fitted = fit_mixture(first.draws, first.weights, COMPONENTS, rng)
+    batches = max(min(MORE_BATCHES, budget // (2 * count) - 2), 0)
+    joined = fitted.joined(proposal, 0.5)
+    found = _enough(log_posteriors, joined, count, rng, batches, K_HAT_LIMIT)
+    return replace(found, wanted=float(count))
+
+
 def _adapted(
     log_posteriors: Many,
     first: Sampled,
@@ -193,19 +210,7 @@ def _adapted(
         proposal = refit(pooled(seen))
     beyond = batches is not None
     judging = chosen.joined(wide_mixture(chosen, LOOKED_BEYOND), 0.5) if beyond else chosen
-    fresh = _once(log_posteriors, judging, 2 * count, rng)
-    for left in range(batches or 0, 0, -1):
-        drawn = len(fresh.draws)
-        # they grow in jumps, so go on while half of what is wanted is expected
-        hopeless = 2.0 * fresh.effective * (drawn + 2 * count * left) < count * drawn
-        if fresh.k_hat > ADAPTED_LIMIT or fresh.effective >= count or hopeless:
-            break
-        more = _once(log_posteriors, judging, 2 * count, rng)
-        fresh = _weigh(
-            np.concatenate([fresh.draws, more.draws]),
-            np.concatenate([fresh.log_ratio, more.log_ratio]),
-            judging,
-        )
+    fresh = _enough(log_posteriors, judging, count, rng, batches or 0, ADAPTED_LIMIT)
     if first.proposal is not None and _width(fresh, first.proposal) < COLLAPSED:
         fresh = replace(fresh, k_hat=np.inf)
     return replace(
@@ -214,6 +219,35 @@ def _adapted(
         limit=ADAPTED_LIMIT,
         wanted=float(count) if beyond else 0.0,
     )
+
+
+def _enough(
+    log_posteriors: Many,
+    proposal: Mixture,
+    count: int,
+    rng: np.random.Generator,
+    batches: int,
+    limit: float,
+) -> Sampled:
+    """Twice ``count`` draws, and as many again until ``count`` of all are effective.
+
+    It ends after so many ``batches`` more, where k-hat is beyond ``limit``, and where there is no
+    hope of as many.
+    """
+    fresh = _once(log_posteriors, proposal, 2 * count, rng)
+    for left in range(batches, 0, -1):
+        drawn = len(fresh.draws)
+        # they grow in jumps, so go on while half of what is wanted is expected
+        hopeless = 2.0 * fresh.effective * (drawn + 2 * count * left) < count * drawn
+        if fresh.k_hat > limit or fresh.effective >= count or hopeless:
+            break
+        more = _once(log_posteriors, proposal, 2 * count, rng)
+        fresh = _weigh(
+            np.concatenate([fresh.draws, more.draws]),
+            np.concatenate([fresh.log_ratio, more.log_ratio]),
+            proposal,
+        )
+    return fresh
 
 
 def _width(sampled: Sampled, proposal: Mixture) -> float:

@@ -1,6 +1,6 @@
 """One posterior at a chosen effort: draft (Laplace), standard (PSIS), thorough (ensembles)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,10 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.inference.counting import Counter, Stop, TimeUsedUpError
-from scissorcal.inference.importance import GOOD_K, Sampled, sample_by_importance, sample_by_mixture
+from scissorcal.inference.importance import (
+    DEFENSIVE,
+    GOOD_K,
+    Sampled,
+    sample_by_importance,
+    sample_by_mixture,
+    sample_by_proposal,
+)
 from scissorcal.inference.laplace import Laplace, Shape, laplace, local_covariance, polish
 from scissorcal.inference.long_run import long_run_covariance
-from scissorcal.inference.mixture import Mixture, Shear
+from scissorcal.inference.mixture import Mixture
+from scissorcal.inference.nested import nested_mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
@@ -92,8 +100,7 @@ def infer(
     proposal = _proposal(counted, best, local)
     if stop is not None:
         local = laplace(counter.over(problem, stop), shape, spread)
-    target = _target(problem.shear, local, proposal)
-    run = _Run(problem, local, target, counter, rng, count, tell)
+    run = _Run(problem, local, proposal, counter, rng, count, tell)
     try:
         found = run.at(effort, budget or BUDGET[effort], escalate, checkpoint)
     except NotFiniteError as error:
@@ -156,30 +163,24 @@ def _proposal(problem: Problem, best: Optimum, local: Laplace) -> Mixture:
     return Mixture.of(weights, np.stack(centres), np.stack(covariances))
 
 
-@dataclass(frozen=True)
-class _Target:
-    """What is sampled, in the coordinates in which it is: its density and the first proposal.
+def _following(local: Laplace, along: tuple[int, ...]) -> Iterator[Mixture]:
+    """Proposals that follow a bent posterior, made in two sets of coordinates.
 
-    ``bent`` leads back to the parameters' own coordinates.
+    In its own the prior is normal; in those of the likelihood before it was stretched the model is
+    linear in what does not bend. Either may be what counts.
     """
-
-    log_posterior: Callable[[Array], float]
-    log_posteriors: Callable[[Array], Array]
-    proposal: Mixture
-    bent: Callable[[Array], Array]
-
-
-def _target(shear: Shear | None, local: Laplace, proposal: Mixture) -> _Target:
-    one, many, centre = local.log_posterior, local.log_posteriors, local.centre
-    if shear is None or not shear.serves(centre):
-        return _Target(one, many, proposal, lambda draws: draws)
-    bent = shear.bent
-    return _Target(
-        log_posterior=lambda point: one(bent(point)),
-        log_posteriors=lambda points: many(bent(points)),
-        proposal=shear.mixture(proposal),
-        bent=bent,
+    many = local.log_posteriors
+    own = nested_mixture(many, local.centre, local.covariance, along)
+    if own is not None:
+        yield own
+    written = nested_mixture(
+        lambda points: many(local.stretched(points)),
+        local.written(local.centre),
+        local.stretch @ local.covariance @ local.stretch.T,
+        along,
     )
+    if written is not None:
+        yield written.mapped(local.stretched, np.asarray(np.linalg.inv(local.stretch)))
 
 
 @dataclass(frozen=True)
@@ -202,7 +203,7 @@ class _Found:
 class _Run:
     problem: Problem
     local: Laplace
-    target: _Target
+    proposal: Mixture
     counter: Counter
     rng: np.random.Generator
     count: int
@@ -243,11 +244,19 @@ class _Run:
 
     def standard(self, budget: int, escalate: bool, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "sampling")
-        target, proposal = self.target.log_posterior, self.target.proposal
+        target, proposal = self.local.log_posterior, self.proposal
         first = self.counter.calls
-        many = self.target.log_posteriors
-        sampled = sample_by_importance(target, proposal, self.count, self.rng, many=many)
+        many = self.local.log_posteriors
+        bends = bool(self.problem.curved) and escalate
+        rounds = 1 if bends else None
+        sampled = sample_by_importance(target, proposal, self.count, self.rng, rounds, many)
         said = f"k-hat {sampled.k_hat:.2f}"
+        followed = self.followed(said, budget) if bends and sampled.k_hat > GOOD_K else None
+        if followed is not None:
+            said += f", {followed.k_hat:.2f} with a proposal that follows the bend"
+            return self._weighed(followed, said)
+        if bends:
+            sampled = replace(sampled, limit=GOOD_K)
         if sampled.k_hat > GOOD_K and escalate:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
             left = budget - sampled.evaluations
@@ -271,15 +280,26 @@ class _Run:
         self.tell(0.6, f"{said}: running ensembles")
         return self._walked(left, checkpoint, sampled, f"Escalated from standard ({said}). ")
 
+    def followed(self, said: str, budget: int) -> Sampled | None:
+        """Draws of a proposal that follows the bend, where they can be trusted."""
+        self.tell(0.45, f"{said}: following the posterior where it bends")
+        for mixture in _following(self.local, self.problem.curved):
+            proposal = mixture.joined(self.proposal, DEFENSIVE)
+            many = self.local.log_posteriors
+            found = sample_by_proposal(many, proposal, self.count, self.rng, budget)
+            if found.trusted:
+                return found
+        return None
+
     def thorough(self, budget: int, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "checking the approximation")
         sampled = sample_by_importance(
-            self.target.log_posterior,
-            self.target.proposal,
+            self.local.log_posterior,
+            self.proposal,
             self.count,
             self.rng,
             rounds=1,
-            many=self.target.log_posteriors,
+            many=self.local.log_posteriors,
         )
         return self._walked(budget, checkpoint, sampled, "")
 
@@ -289,7 +309,7 @@ class _Run:
             status = SamplingStatus.TOO_FEW
         nothing = np.full(len(self.problem.names), np.nan)
         return _Found(
-            draws=self.target.bent(sampled.resample(self.count, self.rng)),
+            draws=sampled.resample(self.count, self.rng),
             reached="standard",
             status=status,
             sentence=f"{status.value} ({said}.)",
@@ -303,16 +323,16 @@ class _Run:
         self, budget: int, checkpoint: Path | None, sampled: Sampled, before: str
     ) -> _Found:
         chains = run_ensembles(
-            self.target.log_posterior,
-            self.target.proposal,
+            self.local.log_posterior,
+            self.proposal,
             self.rng,
             budget=budget,
             checkpoint=checkpoint,
-            many=self.target.log_posteriors,
+            many=self.local.log_posteriors,
             progress=lambda done, sentence: self.tell(0.5 + 0.5 * done, sentence),
         )
         return _Found(
-            draws=self.target.bent(_thinned(chains, self.count, self.rng)),
+            draws=_thinned(chains, self.count, self.rng),
             reached="thorough",
             status=chains.status,
             sentence=before + _said(chains, self.problem.names),

@@ -87,9 +87,13 @@ class Laplace:
             return near
         return far if self.log_posterior(far) > self.log_posterior(near) else near
 
-    def stretched(self, point: Array) -> Array:
-        """Where the posterior that is sampled has what the written one has at ``point``."""
-        return np.asarray(self.pivot + np.linalg.solve(self.stretch, point - self.pivot))
+    def stretched(self, points: Array) -> Array:
+        """Where the posterior that is sampled has what the written one has at ``points``."""
+        return np.asarray(self.pivot + np.linalg.solve(self.stretch, (points - self.pivot).T).T)
+
+    def written(self, points: Array) -> Array:
+        """Where the written posterior has what the one that is sampled has at ``points``."""
+        return np.asarray(self.pivot + (points - self.pivot) @ self.stretch.T)
 
 
 def shape_at(problem: Problem, point: Array, fall: float = 0.3) -> Shape:
@@ -198,8 +202,8 @@ def laplace(problem: Problem, shape: Shape, spread: Array | None) -> Laplace:
         heights = np.full(len(points), -np.inf)
         if np.any(inside):
             kept = points[inside]
-            prior = np.array([float(problem.log_prior(u)) for u in kept])
-            heights[inside] = prior + problem.log_likelihoods(point + (kept - point) @ stretch.T)
+            written = point + (kept - point) @ stretch.T
+            heights[inside] = problem.log_priors(kept) + problem.log_likelihoods(written)
         return np.where(np.isfinite(heights), heights, -np.inf)
 
     return Laplace(

@@ -1,4 +1,4 @@
-"""Mixtures of multivariate Student-t, and the coordinates in which one of them fits."""
+"""Mixtures of multivariate Student-t."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,8 +10,6 @@ Array = NDArray[np.float64]
 
 DEGREES_OF_FREEDOM = 7.0
 FITTING_ROUNDS = 12
-STEP = 1e-4
-"""Step by which a bend is differentiated."""
 FEWEST_EFFECTIVE = 20
 """Effective draws per parameter that a fit is made from; fewer are evened out first."""
 
@@ -51,6 +49,11 @@ class Mixture:
             np.concatenate([self.roots, other.roots]),
         )
 
+    def mapped(self, to: Callable[[Array], Array], slope: Array) -> "Mixture":
+        """The mixture of draws that a linear map ``to`` of slope (p, p) leads elsewhere."""
+        roots = slope @ self.roots
+        return Mixture.of(self.weights, to(self.centres), roots @ roots.transpose(0, 2, 1))
+
     def _by_component(self, draws: Array) -> Array:
         nu, size = DEGREES_OF_FREEDOM, draws.shape[1]
         columns = []
@@ -59,60 +62,6 @@ class Mixture:
             height = np.log(max(weight, 1e-300)) - np.log(np.diag(root)).sum()
             columns.append(height - 0.5 * (nu + size) * np.log1p(distance / nu))
         return np.stack(columns, axis=1)
-
-
-@dataclass(frozen=True)
-class Shear:
-    """The parameter at ``place`` less ``bend`` of the one at ``other``; the rest as they are.
-
-    Where data determine a combination of two parameters, the posterior is a curved ridge, and no
-    Student-t fits it. Such a change of one coordinate has a Jacobian of 1: densities are the same.
-    At points whose ``bend`` is beyond ``most`` there is no such ridge.
-    """
-
-    place: int
-    other: int
-    bend: Callable[[Array], Array]
-    most: float = np.inf
-
-    def serves(self, point: Array) -> bool:
-        """Whether a posterior with its optimum at ``point`` (p,) has the ridge."""
-        return bool(self.bend(point[self.other]) <= self.most)
-
-    def straight(self, points: Array) -> Array:
-        """Points (..., p) in the coordinates in which the ridge is straight.
-
-        >>> ridge = Shear(0, 1, np.square)
-        >>> ridge.straight(np.array([[9.0, 3.0], [4.0, 2.0]]))
-        array([[0., 3.],
-               [0., 2.]])
-        >>> ridge.bent(ridge.straight(np.array([5.0, 3.0])))
-        array([5., 3.])
-        """
-        moved = np.array(points, dtype=np.float64)
-        moved[..., self.place] -= self.bend(moved[..., self.other])
-        return moved
-
-    def bent(self, points: Array) -> Array:
-        """Points (..., p) back in the parameters' own coordinates."""
-        moved = np.array(points, dtype=np.float64)
-        moved[..., self.place] += self.bend(moved[..., self.other])
-        return moved
-
-    def mixture(self, mixture: Mixture) -> Mixture:
-        """A mixture of the parameters' own coordinates, component by component."""
-        slopes = np.stack([self._slope(centre) for centre in mixture.centres])
-        covariances = mixture.roots @ mixture.roots.transpose(0, 2, 1)
-        moved = slopes @ covariances @ slopes.transpose(0, 2, 1)
-        return Mixture.of(mixture.weights, self.straight(mixture.centres), moved)
-
-    def _slope(self, centre: Array) -> Array:
-        """Derivative (p, p) of straight coordinates at ``centre`` (p,)."""
-        slope = np.eye(len(centre))
-        at = centre[self.other]
-        above, below = self.bend(np.asarray(at + STEP)), self.bend(np.asarray(at - STEP))
-        slope[self.place, self.other] = -(above - below) / (2.0 * STEP)
-        return slope
 
 
 def wide_mixture(mixture: Mixture, factor: float) -> Mixture:

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.inference.mixture import Shear
-
 Array = NDArray[np.float64]
 
 
@@ -43,7 +41,8 @@ class Problem:
     ``smooth`` says that the log-posterior has continuous second derivatives, so that a search may
     go by differences where there are no squares.
 
-    ``shear`` are coordinates in which a known ridge is straight; samplers work in them.
+    ``curved`` are the places of parameters in which the model is not linear, three at most: a
+    posterior that bends is sampled by a proposal that follows it along these.
 
     ``tally`` is called before likelihoods that a subclass works out without their terms, with their
     number if they are several, so that counters see them too.
@@ -65,7 +64,7 @@ class Problem:
     independent: bool = False
     log_posterior_many: Callable[[Array], Array] | None = None
     smooth: bool = False
-    shear: Shear | None = None
+    curved: tuple[int, ...] = ()
     tally: Callable[..., None] | None = None
 
     def __post_init__(self) -> None:
@@ -99,11 +98,15 @@ class Problem:
             heights[inside] = many(points[inside])
         return np.where(np.isfinite(heights), heights, -np.inf)
 
+    def log_priors(self, points: Array) -> Array:
+        """Log-priors of points (k, p), shape (k,)."""
+        return np.array([float(self.log_prior(point)) for point in points])
+
     def log_likelihoods(self, points: Array) -> Array:
         """Sums of the likelihood's terms at points (k, p), shape (k,); bounds do not matter."""
         if self.log_posterior_many is None:
             return np.array([self.log_likelihood(point) for point in points])
-        prior = np.array([float(self.log_prior(point)) for point in points])
+        prior = self.log_priors(points)
         if not np.all(np.isfinite(prior)):
             sums = np.array([float(np.sum(self.log_likelihood_terms(u))) for u in points])
             return np.where(np.isfinite(sums), sums, -np.inf)

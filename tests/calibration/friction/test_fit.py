@@ -207,12 +207,16 @@ def test_emps_agrees_with_its_published_values(symmetry):
 
 
 @pytest.mark.slow
-def test_emps_prefers_the_asymmetric_law():
+def test_emps_prefers_an_asymmetric_law():
+    """Evidence decides: Coulomb and viscous friction alone are 161 nats behind."""
     found = fit_friction(
         (emps(),), FitFriction(critic=False), effort="standard", rng=np.random.default_rng(0)
     )
-    assert found.rung == "coulomb + viscous, asymmetric"
-    assert "nats behind the best" in found.selection
+    assert found.rung == "stribeck + angle + presliding, asymmetric"
+    behind = {row["name"]: row["behind"] for row in found.rungs}
+    assert behind["coulomb + viscous, asymmetric"] > 100.0
+    assert behind["coulomb + viscous, symmetric"] > behind["coulomb + viscous, asymmetric"] + 100.0
+    assert found.parameter("inertia").mean == pytest.approx(95.1, rel=0.01)
     assert found.effort_unit == "N"
 
 

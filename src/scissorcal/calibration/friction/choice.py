@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.candidates import POSITIVE_EVIDENCE
-from scissorcal.calibration.comparison import NEGLIGIBLE, choose
+from scissorcal.calibration.comparison import choose
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.search import scan_nodes
@@ -69,7 +69,7 @@ def choose_law(
         compared.append(fit_candidate(law.candidate(law.observed), law.series, law.strokes, stop))
         by_name[law.name] = compared[-1]
     drive = _rms(laws[0].observed)
-    chosen = choose(compared, drive, lack_of_fit or NEGLIGIBLE)
+    chosen = choose(compared, drive, lack_of_fit)
     place = next(i for i, one in enumerate(compared) if one.candidate is chosen.candidate)
     law = replace(laws[place], share=chosen.candidate.share)
     likelihood, point = chosen.candidate.likelihood, chosen.optimum.point

@@ -17,7 +17,6 @@ from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.inference.mixture import Shear
 from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, side_of, terms_of
 from scissorcal.model.terms import Role, Term
 from scissorcal.model.transforms import LOG
@@ -35,12 +34,9 @@ LEAST_OFFSET = 1e-3
 """Share of the drive's spread from which a search for the offset begins at least: beside zero it
 would end where it began."""
 
-MOST_FALLEN = 3.0
-"""Of Stribeck friction that has fallen by e^-3 5 % are left, about what laws lack: beyond, sweeps
-tell nothing of it, level and rate have the shape of their priors, and there is no ridge."""
-
-LARGE = 20.0
-"""Logarithm of the fall's exponent up to which it is worked out, to stay within numbers."""
+CURVED = ("stribeck", SCALES[0], "presliding_share")
+"""Parameters along which a posterior bends: motion shows what is left of Stribeck friction at the
+slowest rate, and the product of share and length of what builds up after a reversal."""
 
 SHORT = 0.03
 """Share of the range that is travelled, at which a search for Dahl's length begins."""
@@ -150,24 +146,12 @@ class FrictionExperiment:
             reduced=reduced,
             search=search if reduced else None,
             share=self.share,
-            shear=self._ridge(),
+            curved=self._curved if reduced else (),
         )
 
-    def _ridge(self) -> Shear | None:
-        """Coordinates in which Stribeck's level is what is left of it at the slowest rate.
-
-        That is what motion determines; the level at rest and its rate lie along a curved ridge, as
-        far as anything is left.
-        """
-        names = self.layout.names
-        if not {"stribeck", SCALES[0]} <= set(names):
-            return None
-        slowest = np.log(self.bins.slowest_rate)
-
-        def fallen(log_rate: Array) -> Array:
-            return np.asarray(np.exp(np.minimum(2.0 * (slowest - log_rate), LARGE)))
-
-        return Shear(names.index("stribeck"), names.index(SCALES[0]), fallen, MOST_FALLEN)
+    @property
+    def _curved(self) -> tuple[int, ...]:
+        return tuple(n for n, name in enumerate(self.layout.names) if name in CURVED)
 
     def _reduced(self, measured: Array) -> ReducedLaw | None:
         """The law over products of columns, where its noise is normal."""

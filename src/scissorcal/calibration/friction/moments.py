@@ -6,7 +6,7 @@ depend on how much was recorded, and leaving strokes out is leaving out their pr
 at once are scored stroke by stroke by their residuals.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -139,9 +139,7 @@ class ReducedLaw:
     def log_likelihoods(self, points: Array) -> Array:
         """Log-likelihoods (k,) at points (k, p), up to the same constant."""
         squares = np.empty(len(points))
-        cells = [self.cell_at(u) for u in points]
-        for cell in dict.fromkeys(cells):
-            here = [k for k, other in enumerate(cells) if other == cell]
+        for cell, here in self._by_cell(points):
             factors, products = self.factors(points[here], cell), self.summed(cell)
             found = np.einsum("kq,kq->k", factors @ products, factors)
             squares[here] = np.maximum(found, LEAST * products[0, 0])
@@ -162,9 +160,7 @@ class ReducedLaw:
         residuals of several draws.
         """
         squares = np.empty((len(draws), len(self.moments.labels)))
-        cells = [self.cell_at(draw) for draw in draws]
-        for cell in dict.fromkeys(cells):
-            every = [k for k, other in enumerate(cells) if other == cell]
+        for cell, every in self._by_cell(draws):
             for first in range(0, len(every), DRAWS_AT_ONCE):
                 here = every[first : first + DRAWS_AT_ONCE]
                 squares[here] = self.moments.squares(cell, self.factors(draws[here], cell))
@@ -207,6 +203,19 @@ class ReducedLaw:
             for place, scaled in zip(self._scales, (basis.stribeck, basis.lag), strict=True)
         )
         return first, second
+
+    def _by_cell(self, points: Array) -> Iterator[tuple[Cell, Integers]]:
+        """The cells that points (k, p) lie in, each with the places of its points."""
+        low = np.zeros((len(points), len(self._scales)))
+        basis = self.moments.basis
+        for column, (place, scaled) in enumerate(
+            zip(self._scales, (basis.stribeck, basis.lag), strict=True)
+        ):
+            if place is not None:
+                low[:, column] = np.floor(points[:, place] / scaled.spacing)
+        _, first, which = np.unique(low, axis=0, return_index=True, return_inverse=True)
+        for index, place in enumerate(first):
+            yield self.cell_at(points[place]), np.flatnonzero(which == index)
 
     def summed(self, cell: Cell) -> Array:
         """Products over the strokes that count, (q, q)."""
