@@ -37,7 +37,8 @@ def ridge() -> Problem:
 def test_moments_of_a_bent_ridge_are_exact() -> None:
     """2,000 draws: 4 standard errors of means and standard deviations."""
     found = infer(replace(ridge(), curved=(1,)), "standard", np.random.default_rng(1))
-    assert found.status.trusted and "follows the bend" in found.sentence
+    assert found.status.trusted
+    assert "follows the bend" in found.sentence
     assert found.draws.mean(axis=0) == pytest.approx([2.0, 0.0], abs=4.0 * 2.83 / np.sqrt(2000))
     assert found.draws[:, 1].std() == pytest.approx(1.0, rel=0.07)
     assert found.draws[:, 0].std() == pytest.approx(np.sqrt(8.0), rel=0.25)
@@ -64,7 +65,8 @@ def test_a_normal_posterior_has_components_along_its_own_axes() -> None:
     assert found is not None
     assert found.centres[:, 0] == pytest.approx(0.99 * found.centres[:, 1], abs=1e-6)
     inside = np.abs(found.centres[:, 1]) < np.sqrt(2.0 * DEPTH)
-    assert np.all(inside) and len(inside) == 7, "nodes at -3 to 3 sds: the next has 8 nats less"
+    assert np.all(inside)
+    assert len(inside) == 7, "nodes at -3 to 3 sds: the next has 8 nats less"
     spread = found.roots @ found.roots.transpose(0, 2, 1)
     assert spread[:, 0, 0] - 0.99**2 * spread[:, 1, 1] == pytest.approx(1 - 0.99**2, abs=1e-6)
 

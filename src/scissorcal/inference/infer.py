@@ -68,8 +68,9 @@ def infer(
 
     ``effort`` draft draws from the normal approximation; standard draws by Pareto-smoothed
     importance sampling around every optimum; thorough runs independent ensembles. Where standard
-    does not do well (k-hat above 0.5) it goes on by itself, unless ``escalate`` is false, with a
-    mixture that adapts to the posterior. Where that still fails its check (k-hat above 0.7, or 0.5
+    does not do well (k-hat above 0.5) it goes on by itself, unless ``escalate`` is false: with a
+    proposal that follows the posterior along its ``curved`` parameters (:func:`nested_mixture`), if
+    the problem names any, else with a mixture that adapts to it. Where that still fails its check (k-hat above 0.7, or 0.5
     for a proposal that was adapted to draws; fewer effective draws of a mixture than ``count``),
     and ``budget`` allows, it goes on with ensembles. What it became is said in the result.
     ``optimum`` may be passed if it is known already, ``count`` is the number of draws, ``budget``

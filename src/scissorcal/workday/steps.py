@@ -243,7 +243,7 @@ STEPS: tuple[Step, ...] = (
         _fit("friction"),
         inputs=("capture friction",),
         settings=_friction_settings,
-        version=16,
+        version=17,
         by_effort=True,
         file=_in_fits("friction.nc"),
         read=facts.fit,
