@@ -70,9 +70,10 @@ def infer(
     importance sampling around every optimum; thorough runs independent ensembles. Where standard
     does not do well (k-hat above 0.5) it goes on by itself, unless ``escalate`` is false: with a
     proposal that follows the posterior along its ``curved`` parameters (:func:`nested_mixture`), if
-    the problem names any, else with a mixture that adapts to it. Where that still fails its check (k-hat above 0.7, or 0.5
-    for a proposal that was adapted to draws; fewer effective draws of a mixture than ``count``),
-    and ``budget`` allows, it goes on with ensembles. What it became is said in the result.
+    the problem names any, else with a mixture that adapts to it. Where that still fails its check
+    (k-hat above 0.7, or 0.5 for a proposal that was adapted to draws; fewer effective draws of a
+    mixture than ``count``), and ``budget`` allows, it goes on with ensembles. What it became is
+    said in the result.
     ``optimum`` may be passed if it is known already, ``count`` is the number of draws, ``budget``
     the evaluations that sampling may take, ``checkpoint`` the file that ensembles resume from (see
     :func:`run_ensembles`). ``stop`` is asked before every evaluation of search and sampling whether
