@@ -1,6 +1,6 @@
 """Verdicts and intervals on days without a fault: what fails by chance, and what intervals hold.
 
-    python -m benchmarks.clean_days --count 200 [--first 1] [--rig own|second|coarse] [--json FILE]
+    python -m benchmarks.clean_days --count 200 [--first 1] [--rig own|second|coarse|coarser] [--json FILE]
 
 Each day has another rig and another material, drawn around a recipe's own; recipes take turns
 (paper, cloth, press-only and, on every tenth day, photographs). It is captured in virtual time and
@@ -9,7 +9,8 @@ every failed verdict is a false one. Parameters are compared with the truth: the
 intervals that hold it and the root mean square of (mean - truth) / sd, and so are friction's torque
 at the middle opening, mean of both directions and half their difference, at four rates. ``second``
 is the rig of tests/second_rig, whose motion, friction and crack share no code with the product;
-``coarse`` the same behind 20,000 counts, with a late motor. Its days are fitted without a package.
+``coarse`` the same behind 20,000 counts, with a late motor, ``coarser`` behind 8,192. Their days
+are fitted without a package.
 All of its friction builds up after a turn, a share of 1, which no interval of a share holds.
 """
 
@@ -21,7 +22,7 @@ import tempfile
 import warnings
 from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -86,14 +87,20 @@ def own_day(seed: int) -> Row:
     return _row(seed, name, fits, verdicts, partial(true_parameters, specimen))
 
 
-def second_day(seed: int, coarse: bool = False) -> Row:
-    """A day of the second rig, fitted in memory."""
-    from benchmarks.design import SecondRig
+def _coarse(counts_per_turn: int, material: Any) -> Any:
     from tests.second_rig import presets
+
+    rig = presets.coarse(material)
+    return replace(rig, sensors=replace(rig.sensors, counts_per_turn=counts_per_turn))
+
+
+def second_day(seed: int, counts_per_turn: int = 0) -> Row:
+    """A day of the second rig, fitted in memory; of the coarse one where its counts are given."""
+    from benchmarks.design import SecondRig
     from tests.second_rig.truth import true_parameters
 
     material = ("paper", "cotton")[seed % 2]
-    day = SecondRig(material, seed, presets.coarse if coarse else presets.fine)
+    day = SecondRig(material, seed, partial(_coarse, counts_per_turn) if counts_per_turn else None)
     friction = fit_friction(
         (day.capture("friction", day.recipe),),
         day.recipe.fit.friction,
@@ -197,7 +204,8 @@ def tabulated(rows: list[Row]) -> str:
 DAYS: dict[str, Any] = {
     "own": own_day,
     "second": second_day,
-    "coarse": partial(second_day, coarse=True),
+    "coarse": partial(second_day, counts_per_turn=20_000),
+    "coarser": partial(second_day, counts_per_turn=8_192),
 }
 
 
