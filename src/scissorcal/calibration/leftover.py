@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.fit_candidate import FittedCandidate, split_strokes
 from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference import gradient, ljung_box
 from scissorcal.model.course_terms import Course
 from scissorcal.model.terms import Term
@@ -199,7 +200,6 @@ def tabulate(
     course: Course,
     terms: Sequence[Term],
     known: Sequence[Term],
-    labels: Integers,
 ) -> Leftover:
     """Reduce all bins to products by piece, without terms that law and simpler terms have.
 
@@ -221,7 +221,7 @@ def tabulate(
     every = every[:, [*range(law.shape[1]), *(law.shape[1] + new), every.shape[1] - 1]]
     solution = np.linalg.lstsq(every[:, :-1], every[:, -1], rcond=1e-8)[0]
     white = ljung_box(every[:, -1] - every[:, :-1] @ solution, chosen.series)
-    strokes = [np.flatnonzero(chosen.strokes == label) for label in labels]
+    strokes = list(by_label(chosen.strokes).values())
     usual = float(np.median([len(here) for here in strokes]))
     counts = [max(1, round(len(here) / usual)) for here in strokes]
     split = [np.array_split(here, PARTS * n) for here, n in zip(strokes, counts, strict=True)]
