@@ -1,8 +1,7 @@
 """Weak form: motion and drive weighted over short windows, with the same filter for both."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -30,13 +29,13 @@ from scissorcal.calibration.signals.window_length import (
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+WINDOWS_AT_ONCE = 8192
+"""Windows that are weighed together: their samples, a third of a megabyte a column, stay in the
+processor's cache, and columns of all samples are never in memory together."""
 RATE_BAND = 2.0
 """The rate in the friction law is low-passed at this many times the cutoff."""
 HELD = 1 / 6
@@ -79,20 +78,25 @@ class Windows:
         return HALF_AT / (self.tick_s * (len(self.weights) // 3))
 
     def average(self, values: Array) -> Array:
-        """Weigh values of all samples, (m,) or (m, k), over each window: (n,) or (n, k)."""
-        return np.asarray(self._weighing @ values)
+        """Weigh values of all samples (m,) over each window: (n,)."""
+        return np.asarray(self.averages(lambda here: (values[here],))[0])
 
-    @cached_property
-    def _weighing(self) -> "csr_array":
-        """The windows' weights as a sparse matrix (n, m)."""
-        from scipy.sparse import csr_array
+    def averages(self, columns: Callable[[slice], Sequence[Array]]) -> Array:
+        """Weigh several columns over each window: (columns, n).
 
-        count, length = len(self.first), len(self.weights)
-        places = (self.first[:, None] + np.arange(length)).ravel().astype(np.int32)
-        ends = np.arange(count + 1, dtype=np.int32) * length
-        return csr_array(
-            (np.tile(self.weights, count), places, ends), shape=(count, len(self.rate))
-        )
+        ``columns`` (samples) gives them at a stretch of samples, a block of windows at a time, so
+        that columns which are worked out from the samples take no memory for all of them.
+        """
+        found = np.empty((len(columns(slice(0, 0))), len(self.first)))
+        for low in range(0, len(self.first), WINDOWS_AT_ONCE):
+            windows = slice(low, low + WINDOWS_AT_ONCE)
+            first = self.first[windows]
+            samples = slice(int(first[0]), int(first[-1]) + len(self.weights))
+            at = first - samples.start
+            for row, column in zip(found, columns(samples), strict=True):
+                over = sliding_window_view(column, len(self.weights))[at]
+                row[windows] = over @ self.weights
+        return found
 
     @property
     def bears_load(self) -> bool:
