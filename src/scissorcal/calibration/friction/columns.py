@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,11 @@ RATE_SPACING, LENGTH_SPACING = 0.15, 0.2
 errs by 2e-4 of a level at most."""
 
 MOST_BYTES = 1e8
-"""Memory for what is late at each sample, which is made again when it is wanted again."""
+"""Memory for columns of one kind, and for what is late at each sample: what does not fit is made
+again when it is wanted again."""
+
+FEWEST_KEPT = 4
+"""Columns of one kind that are in memory at least: those of one cell."""
 
 COARSER = 2
 """Nodes of the coupled columns lie so many times as far apart. Linear interpolation then errs by
@@ -119,7 +124,8 @@ class FrictionBasis:
             bell = _SCALED.column(self.motion, self.stribeck.scale_of(COARSER * rate))
             late = self._late_at(COARSER * length)
             lacks = late * bell
-            self._coupled[rate, length] = self._weigh(lambda here: [lacks[here]])
+            made = self._weigh(lambda here: [lacks[here]])
+            _keep(self._coupled, (rate, length), made)
         return self._coupled[rate, length]
 
     def coupled_weights(self, rates: Array, lengths: Array, cell: Cell) -> Array:
@@ -337,9 +343,16 @@ class ScaledColumns:
 
     def node(self, index: int) -> Array:
         """Columns at one node."""
-        if index not in self.known:
-            self.known[index] = self.at(self.scale_of(index))
+        made = self.known.pop(index, None)
+        _keep(self.known, index, self.at(self.scale_of(index)) if made is None else made)
         return self.known[index]
+
+
+def _keep(known: dict[Any, Array], key: Any, made: Array) -> None:
+    """Put columns last, and forget the first as far as ``MOST_BYTES`` do not hold all."""
+    known[key] = made
+    while len(known) > max(FEWEST_KEPT, MOST_BYTES / max(made.nbytes, 1)):
+        del known[next(iter(known))]
 
 
 def coupled_nodes(cell: Cell) -> list[tuple[int, int]]:
