@@ -226,10 +226,10 @@ def tabulate(
     split = [np.array_split(here, PARTS * n) for here, n in zip(strokes, counts, strict=True)]
     parts = [part for stroke in split for part in stroke]
     blocks = _blocks(parts)
-    corner = np.zeros((0, 0))
+    corner = rows(parts[0][:0])
     for block in blocks:
         every = rows(np.concatenate(block))
-        corner = np.linalg.qr(np.vstack([corner, every]) if len(corner) else every, mode="r")
+        corner = np.asarray(np.linalg.qr(np.vstack([corner, every]), mode="r"))
     size = np.sqrt(np.sum(corner**2, axis=0) / len(left))
     size[-1] = 1.0
     unit = corner / np.where(size > 0.0, size, 1.0)

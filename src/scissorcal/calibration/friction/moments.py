@@ -9,6 +9,7 @@ at once are scored stroke by stroke by their residuals.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,15 +80,13 @@ class StrokeMoments:
     ) -> Array:
         """Put a cell's ``products`` of two blocks, (*shape, columns, columns), together."""
         blocks = _blocks(cell)
-        ends = np.cumsum([0, *(len(self._columns(block)) for block in blocks)]).tolist()
+        known = {(a, b): products(a, b) for i, a in enumerate(blocks) for b in blocks[i:]}
+        ends = np.cumsum([0, *(known[a, a].shape[-1] for a in blocks)]).tolist()
+        places = {a: slice(*bounds) for a, bounds in zip(blocks, pairwise(ends), strict=True)}
         result = np.empty((*shape, ends[-1], ends[-1]))
-        for i, left in enumerate(blocks):
-            rows = slice(ends[i], ends[i + 1])
-            for j in range(i, len(blocks)):
-                columns = slice(ends[j], ends[j + 1])
-                found = products(left, blocks[j])
-                result[..., rows, columns] = found
-                result[..., columns, rows] = np.swapaxes(found, -1, -2)
+        for (a, b), found in known.items():
+            result[..., places[a], places[b]] = found
+            result[..., places[b], places[a]] = np.swapaxes(found, -1, -2)
         return result
 
     def _columns(self, block: Block) -> Array:
