@@ -28,7 +28,7 @@ RATE_SPACING, LENGTH_SPACING = 0.15, 0.2
 """Distance of nodes in the logarithm of Stribeck's speed and of Dahl's length; interpolation then
 errs by 2e-4 of a level at most."""
 
-MOST_BYTES = 1e8
+MOST_BYTES = 6e7
 """Memory for columns of one kind, and for what is late at each sample: what does not fit is made
 again when it is wanted again."""
 

@@ -202,6 +202,9 @@ def _common_knot(recordings: tuple[Recording, ...], cutoff_Hz: float) -> int:
 
 
 def _joined(pieces: list[Windows], loaded: bool) -> Windows:
+    if len(pieces) == 1:
+        return pieces[0] if loaded else replace(pieces[0], load=None)
+
     def together(name: str) -> Array:
         return np.concatenate([getattr(piece, name) for piece in pieces])
 
