@@ -36,6 +36,8 @@ Mask = NDArray[np.bool_]
 WINDOWS_AT_ONCE = 8192
 """Windows that are weighed together: their samples, a third of a megabyte a column, stay in the
 processor's cache, and columns of all samples are never in memory together."""
+MOST_LEFT_OUT = 3
+"""Even windows are all weighed, for what is kept of them, where these are a third at least."""
 RATE_BAND = 2.0
 """The rate in the friction law is low-passed at this many times the cutoff."""
 HELD = 1 / 6
@@ -92,10 +94,9 @@ class Windows:
             windows = slice(low, low + WINDOWS_AT_ONCE)
             first = self.first[windows]
             samples = slice(int(first[0]), int(first[-1]) + len(self.weights))
-            at = first - samples.start
+            over = _over(first - samples.start, self.weights)
             for row, column in zip(found, columns(samples), strict=True):
-                over = sliding_window_view(column, len(self.weights))[at]
-                row[windows] = over @ self.weights
+                row[windows] = over(column)
         return found
 
     @property
@@ -173,6 +174,32 @@ def weigh(
         pieces.append(shifted)
         samples += high - low
     return replace(_joined(pieces, loaded), lengthening=knot / asked)
+
+
+def _over(first: Integers, weights: Array) -> Callable[[Array], Array]:
+    """Weigh values (k,) over the windows that begin at ``first`` (n,), ascending.
+
+    Windows that begin every so many samples are products of a matrix, whose rows are the samples
+    between two beginnings, with the weights in columns of as many: a third of the time.
+    """
+    step, last = int(np.gcd.reduce(first)), int(first[-1])
+    if step < 2 or last > MOST_LEFT_OUT * step * len(first):
+        return lambda values: np.asarray(sliding_window_view(values, len(weights))[first] @ weights)
+    columns = -(-len(weights) // step)
+    parts = np.zeros((columns, step))
+    parts.reshape(-1)[: len(weights)] = weights
+    count = last // step + 1
+    rows, place = np.zeros((count + columns - 1, step)), first // step
+
+    def over(values: Array) -> Array:
+        rows.reshape(-1)[: len(values)] = values
+        shares = parts @ rows.T
+        total = shares[0, :count].copy()
+        for column in range(1, columns):
+            total += shares[column, column : column + count]
+        return total[place]
+
+    return over
 
 
 def next_cutoff(windows: Windows) -> float | None:
