@@ -14,8 +14,8 @@ from tests.calibration.truth import SPEEDS, Truth, friction_recording
 
 LONG = 3
 MOST_BYTES = 600
-"""Memory that a sample more may take. It takes 480; while columns of all nodes, sorted copies of them
-and a mask for each stroke were kept, it took 830."""
+"""Memory that a sample more may take. It takes 480; it took 830 while columns of all nodes, sorted
+copies of them and a mask for each stroke were kept."""
 
 
 def longer(recording: Recording, times: int) -> Recording:
