@@ -33,8 +33,8 @@ PARTS = 4
 TOGETHER = 8192
 """Bins whose columns are in memory together at least: they stay in the processor's cache."""
 MOST_STROKES = 128
-"""Strokes that count singly. Student's t at a chance of one in a thousand is 3.37 with 127 degrees of
-freedom and 3.29 with any number: more would hardly let a term stand out better."""
+"""Strokes that count singly. Student's t at a chance of one in a thousand is 3.37 with 127 degrees
+of freedom and 3.29 with any number: more would hardly let a term stand out better."""
 SAME_RUN = 0.1
 """Share of the range by which an opening may jump within one motion without a reversal."""
 
