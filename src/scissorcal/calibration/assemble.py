@@ -15,6 +15,7 @@ from scissorcal.calibration.predictive import predictive_of
 from scissorcal.calibration.replay import compare_with_replay
 from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
 from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.segments import by_label
 from scissorcal.calibration.signals.usage import Usage
 from scissorcal.inference import Posterior, ljung_box
 from scissorcal.recording.recording import Joint, Recording
@@ -222,19 +223,18 @@ def _stroke_errors(
     planned = [stroke for recording in recordings for stroke in recording.strokes]
     errors = []
     size = float(np.sqrt(np.mean(measured**2)))
-    for label in np.unique(strokes):
-        here = strokes == label
+    for label, here in by_label(strokes).items():
         rms = float(np.sqrt(np.mean(chosen.held_out_residuals[here] ** 2)))
         known = planned[label] if 0 <= label < len(planned) else None
         errors.append(
             StrokeError(
-                stroke=int(label),
-                recording=recordings[int(bins.recording[here][0])].source,
-                kind=known.kind if known else ("opening" if bins.rate[here][0] > 0 else "closing"),
+                stroke=label,
+                recording=recordings[int(bins.recording[here[0]])].source,
+                kind=known.kind if known else ("opening" if bins.rate[here[0]] > 0 else "closing"),
                 speed=float(np.median(np.abs(bins.rate[here]))),
                 rms=rms,
                 relative_rms=rms / size if size > 0 else float("inf"),
-                independent=float(np.count_nonzero(here)) * chosen.share,
+                independent=len(here) * chosen.share,
             )
         )
     return tuple(errors)

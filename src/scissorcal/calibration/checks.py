@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.fit_candidate import SEARCH_REACH, FittedCandidate
 from scissorcal.calibration.result import StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference import Posterior, SearchStatus
 from scissorcal.inference.importance import ADAPTED_LIMIT
 from scissorcal.inference.importance import K_HAT_LIMIT as K_HAT_LIMIT
@@ -171,14 +172,14 @@ def _null(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdic
 
 def _varied(scope: str, what: str, chosen: FittedCandidate, bins: Bins, contact: Array) -> Verdict:
     """Whether strokes differ in what the law is to be used over: speed, and where it is met."""
-    labels = np.unique(chosen.strokes)
-    if len(labels) < 2:
+    strokes = by_label(chosen.strokes).values()
+    if len(strokes) < 2:
         why = (
             "There is one stroke only, so nothing shows that another would agree: record several, "
             "in both directions and at several speeds."
         )
-        return Verdict(scope, "strokes", "fail", float(len(labels)), 2.0, why)
-    medians = np.array([np.median(bins.rate[chosen.strokes == label]) for label in labels])
+        return Verdict(scope, "strokes", "fail", float(len(strokes)), 2.0, why)
+    medians = np.array([np.median(bins.rate[here]) for here in strokes])
     ratio, fast = _spread(-medians[medians < 0])
     if what == "friction":
         quarters = np.quantile(np.abs(bins.rate), [0.25, 0.75])

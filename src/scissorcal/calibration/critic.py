@@ -99,7 +99,7 @@ def criticise(
         )
     terms = [term for term in _candidates(load, joint) if term.name not in known]
     already = [LIBRARY[name] for name in known]
-    left = tabulate(chosen, course_of(bins, load), terms, already, labels)
+    left = tabulate(chosen, course_of(bins, load), terms, already)
     tried = f"The critic tried {len(left.terms)} terms over {len(labels)} strokes"
     quiet = Structure(0.0, 0.0, left.hidden())
     least = min(left.chances().values(), default=1.0)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.psis_loo import LeftOut, leave_strokes_out
+from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference.autocorrelation import ljung_box
 from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.curvature import gradient, natural_step
@@ -218,7 +219,7 @@ class FittedCandidate:
     @cached_property
     def left_out(self) -> LeftOut:
         """Densities of strokes by the posterior without them, worked out when first asked for."""
-        labelled = tuple(self.strokes == label for label in np.unique(self.strokes))
+        labelled = tuple(by_label(self.strokes).values())
         return leave_strokes_out(
             self.candidate.problem(self.series),
             self.optimum.point,
@@ -267,7 +268,7 @@ def fit_candidate(
     return FittedCandidate(
         candidate=candidate,
         optimum=optimum,
-        scores=np.array([densities[strokes == label].sum() for label in labels]),
+        scores=np.array([densities[here].sum() for here in by_label(strokes).values()]),
         held_out_residuals=residuals,
         information=without.information,
         log_likelihood=problem.log_likelihood(point) / problem.share,

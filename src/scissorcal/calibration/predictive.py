@@ -17,6 +17,8 @@ RESAMPLED = 3 * DRAWS // 4
 """Equally weighted draws, few enough that hardly one is repeated: repeated ones raise k-hats."""
 
 REPLICATES = 50
+AT_ONCE = 4_000_000
+"""Values of the noise that are drawn together: 32 MB."""
 LARGEST = 3e38
 MANTISSA_BITS = 10
 """Bits of a replicated value's mantissa, which compresses it to a third: within 0.05 %."""
@@ -51,7 +53,7 @@ def predictive_of(
     points = layout.columns(own.left_out.points[_resampled(own.left_out)]) if held else None
     means = predictions[:: max(1, len(predictions) // REPLICATES)]
     return Predictive(
-        torque=_rounded(means + _noise(own, len(means), rng)[:, thin]),
+        torque=_rounded(means + _noise(own, len(means), thin, rng)),
         stroke=np.unique(own.strokes),
         log_likelihood=densities[:, :, sampled.index(own)] if held else None,
         log_likelihood_draws=points,
@@ -63,8 +65,10 @@ def predictive_of(
     )
 
 
-def _noise(fitted: FittedCandidate, count: int, rng: np.random.Generator) -> Array:
-    """Draws of the noise (count, n): autoregressive, with the likelihood's standard deviations.
+def _noise(fitted: FittedCandidate, count: int, thin: slice, rng: np.random.Generator) -> Array:
+    """Draws of the noise (count, k) at the points that ``thin`` selects.
+
+    It is autoregressive, with the likelihood's standard deviations.
 
     The autoregression is fitted to the residuals at the optimum over these standard deviations,
     within each series without a gap: the likelihood itself counts a share of the points.
@@ -72,7 +76,12 @@ def _noise(fitted: FittedCandidate, count: int, rng: np.random.Generator) -> Arr
     likelihood, point = fitted.candidate.likelihood, fitted.optimum.point
     sd = np.exp(likelihood.normal(point)[1])
     noise = fit_ar(likelihood.residuals(point) / sd, fitted.series)
-    return sd * noise.draws(fitted.series, count, rng)
+    most = max(1, AT_ONCE // len(sd))
+    drawn = [
+        noise.draws(fitted.series, min(most, count - first), rng)[:, thin]
+        for first in range(0, count, most)
+    ]
+    return sd[thin] * np.concatenate(drawn)
 
 
 def _resampled(left_out: LeftOut) -> NDArray[np.int64]:

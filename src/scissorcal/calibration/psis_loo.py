@@ -51,7 +51,7 @@ def leave_strokes_out(
     point: Array,
     information: Array,
     prior_precision: Array,
-    labelled: tuple[NDArray[np.bool_], ...],
+    labelled: tuple[NDArray[np.int64], ...],
     share: float,
     by_stroke: Callable[[Array], Array] | None = None,
 ) -> LeftOut:
@@ -65,7 +65,7 @@ def leave_strokes_out(
     weights correct for both the approximation and the stroke that is missing, and their k-hat
     judges both. Where the curvature describes the posterior badly, draws are taken again from the
     moments that they find. ``information`` and ``prior_precision`` have shape (p, p); ``labelled``
-    masks the bins (n,) of each stroke. ``by_stroke`` gives the log-likelihood (k, strokes) of each
+    are the bins (k,) of each stroke. ``by_stroke`` gives the log-likelihood (k, strokes) of each
     stroke at draws (k, p), where that is cheaper than by bins.
     """
     from scipy.special import logsumexp
@@ -108,7 +108,7 @@ def _inverse(precision: Array) -> Array:
 def _densities(
     problem: Problem,
     draws: Array,
-    labelled: tuple[NDArray[np.bool_], ...],
+    labelled: tuple[NDArray[np.int64], ...],
     by_stroke: Callable[[Array], Array] | None,
 ) -> tuple[Array, Array]:
     """Log density by stroke (draws, strokes) and of the prior (draws,), -inf out of bounds."""

@@ -16,6 +16,10 @@ them (a constant, a sine), and the autoregression is so near a unit root that it
 in rounding: the covariance's condition is about the square of the inverse."""
 
 
+NEGLIGIBLE = 1e-18
+"""Share of the variance below which autocovariances are taken as 0: a hundredth of rounding."""
+
+
 @dataclass(frozen=True)
 class ArNoise:
     """Stationary autoregression e_t = sum_k coefficients[k] e_(t-1-k) + sd * white.
@@ -68,7 +72,7 @@ class ArNoise:
         return float(np.sqrt(self._stationary()[0, 0])) if self.order else self.sd
 
     def autocovariance(self, lags: int) -> Array:
-        """Autocovariances at lags 0 to ``lags`` - 1, shape (lags,).
+        """Autocovariances at lags 0 to ``lags`` - 1, shape (lags,); 0 from where they are rounding.
 
         >>> ArNoise(1, (0.5,), 1.0).autocovariance(3).round(3)
         array([1.333, 0.667, 0.333])
@@ -79,8 +83,12 @@ class ArNoise:
             begun = self._stationary()[0, : min(self.order, len(values))]
             values[: len(begun)] = begun
             back = np.asarray(self.coefficients)[::-1]
+            least = NEGLIGIBLE * values[0]
             for lag in range(self.order, len(values)):
-                values[lag] = back @ values[lag - self.order : lag]
+                before = values[lag - self.order : lag]
+                if np.max(np.abs(before)) <= least:
+                    break
+                values[lag] = back @ before
         return values[:lags]
 
     def _stationary(self) -> Array:

@@ -21,7 +21,7 @@ def gradient(function: Callable[[Array], Array], point: Array, step: Array) -> A
         wide = (function(point + reach) - function(point - reach)) / (2 * step[index])
         near = (function(point + reach / 2) - function(point - reach / 2)) / step[index]
         columns.append((4 * near - wide) / 3)
-    return np.stack(columns, axis=-1)
+    return np.moveaxis(np.stack(columns), 0, -1)
 
 
 def hessian(

@@ -15,6 +15,8 @@ Labels = NDArray[np.int64]
 
 WELL_ABOVE_ROUNDING = 1e-6
 CHANCE = 0.01
+BLOCK = 8192
+"""Rows that are transformed together at least, which the processor's cache holds."""
 
 
 @dataclass(frozen=True)
@@ -86,16 +88,25 @@ def covariance_of_sum(slopes: Array, series: Labels, noise: ArNoise) -> Array:
 
 
 def _quadratic(slopes: Array, memory: Array) -> Array:
-    """Slopes' times the Toeplitz matrix of ``memory`` times slopes, by Fourier transforms."""
+    """Slopes' times the Toeplitz matrix of ``memory`` times slopes, by Fourier transforms.
+
+    A block of rows at a time, each with as many rows on either side as there is memory.
+    """
     length = len(slopes)
-    size = 1 << int(2 * length - 1).bit_length()
+    reach = int(np.max(np.flatnonzero(memory[:length]), initial=0))
+    size = 1 << int(min(2 * length - 1, max(BLOCK, 8 * reach))).bit_length()
+    block = length if 2 * length - 1 <= size else size - 2 * reach
     kernel = np.zeros(size)
-    kernel[:length] = memory[:length]
-    kernel[size - length + 1 :] = memory[1:length][::-1]
+    kernel[: reach + 1] = memory[: reach + 1]
+    kernel[size - reach :] = memory[1 : reach + 1][::-1]
     spectrum = np.fft.rfft(kernel).real
-    waves = np.fft.rfft(slopes, size, axis=0)
-    smoothed = np.fft.irfft(waves * spectrum[:, None], size, axis=0)[:length]
-    product = slopes.T @ smoothed
+    product = np.zeros((slopes.shape[1],) * 2)
+    for low in range(0, length, block):
+        first, high = max(low - reach, 0), min(low + block, length)
+        near = np.ascontiguousarray(slopes[first : min(high + reach, length)].T)
+        smoothed = np.fft.irfft(np.fft.rfft(near, size) * spectrum, size)
+        inside = slice(low - first, high - first)
+        product += near[:, inside] @ smoothed[:, inside].T
     return np.asarray(0.5 * (product + product.T))
 
 

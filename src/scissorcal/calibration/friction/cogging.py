@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.moments import FIXED, MEASURED, StrokeMoments
+from scissorcal.calibration.signals.segments import by_label
 from scissorcal.calibration.signals.weak_form import Windows
 
 Array = NDArray[np.float64]
@@ -123,7 +124,7 @@ def find_cogging(moments: StrokeMoments) -> Cogging:
 def _quarters(moments: StrokeMoments) -> list[NDArray[np.bool_]]:
     """Bins (n,) of slow and of fast strokes, every other one of each: slow, slow, fast, fast."""
     speed = np.abs(moments.basis.windows.bins.rate)
-    usual = [float(np.median(speed[moments.strokes == label])) for label in moments.labels]
+    usual = [float(np.median(speed[here])) for here in by_label(moments.strokes).values()]
     order = moments.labels[np.argsort(usual, kind="stable")]
     middle = len(order) // 2
     groups = (order[:middle:2], order[1:middle:2], order[middle::2], order[middle + 1 :: 2])
@@ -161,7 +162,7 @@ def _steady(moments: StrokeMoments, left: Array) -> Array:
     bins = moments.basis.windows.bins
     speed = np.abs(bins.rate)
     place = np.searchsorted(moments.labels, moments.strokes)
-    usual = np.array([float(np.median(speed[moments.strokes == k])) for k in moments.labels])
+    usual = np.array([float(np.median(speed[at])) for at in by_label(moments.strokes).values()])
     steady = speed > STEADY * usual[place]
     size = float(np.median(np.abs(left[steady]))) / 0.6745 if np.any(steady) else 0.0
     low, span = float(bins.opening.min()), float(np.ptp(bins.opening))

@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +28,18 @@ RATE_SPACING, LENGTH_SPACING = 0.15, 0.2
 """Distance of nodes in the logarithm of Stribeck's speed and of Dahl's length; interpolation then
 errs by 2e-4 of a level at most."""
 
-MOST_BYTES = 1e8
-"""Memory for what is late at each sample, which is made again when it is wanted again."""
+MOST_BYTES = 6e7
+"""Memory for columns of one kind, and for what is late at each sample: what does not fit is made
+again when it is wanted again."""
+
+FEWEST_KEPT = 4
+"""Columns of one kind that are in memory at least: those of one cell."""
 
 COARSER = 2
 """Nodes of the coupled columns lie so many times as far apart. Linear interpolation then errs by
 2.5 % of what Stribeck friction lacks at worst, by 0.1 % of its level (rms) over empty sweeps."""
+
+EVERY = slice(None)
 
 DRIVE = ("inertia", "offset", "delay", "cogging_cos", "cogging_sin")
 """The first columns: what is added to the drive and is no friction."""
@@ -67,9 +74,10 @@ class FrictionBasis:
         self._plain = tuple(one for one in rows if one.role is Role.PLAIN)
         self._dry = tuple(one for one in rows if one.role is Role.DRY and not one.scale)
         self._sliding = tuple(one for one in rows if one.role is Role.SLIDING)
-        load = np.zeros_like(windows.rate) if windows.load is None else windows.load
-        self.motion = Motion(windows.opening, windows.rate, np.zeros_like(windows.rate), load)
-        self.fixed = np.column_stack([*self._rigid(), *self._free(), *self._levels()])
+        none = np.broadcast_to(0.0, windows.rate.shape)
+        load = none if windows.load is None else windows.load
+        self.motion = Motion(windows.opening, windows.rate, none, load)
+        self.fixed = np.vstack([*self._rigid(), *self._free(), *self._levels().T]).T
         self._places: dict[tuple[str, ...], list[tuple[Array, Integers, Integers, Integers]]] = {}
         self.stribeck = ScaledColumns(self._stribeck_at, RATE_SPACING)
         self.lag = ScaledColumns(self._lag_at, LENGTH_SPACING)
@@ -115,7 +123,9 @@ class FrictionBasis:
         if (rate, length) not in self._coupled:
             bell = _SCALED.column(self.motion, self.stribeck.scale_of(COARSER * rate))
             late = self._late_at(COARSER * length)
-            self._coupled[rate, length] = np.column_stack(self._weigh([late * bell]))
+            lacks = late * bell
+            made = self._weigh(lambda here: [lacks[here]])
+            _keep(self._coupled, (rate, length), made)
         return self._coupled[rate, length]
 
     def coupled_weights(self, rates: Array, lengths: Array, cell: Cell) -> Array:
@@ -204,29 +214,44 @@ class FrictionBasis:
             waves = [windows.average(np.cos(phase)), windows.average(np.sin(phase))]
         return [bins.acceleration, np.ones(len(windows.first)), windows.slope, *waves]
 
-    def _free(self) -> list[Array]:
-        return [self.windows.average(term.column(self.motion)) for term in self._plain]
+    def _free(self) -> Array:
+        return self.windows.averages(lambda here: self._columns_of(self._plain, here))
 
-    def _levels(self) -> list[Array]:
-        sign = self.motion.direction
-        columns = [sign * one for one in self._levels_of(self._dry)]
-        return self._weigh([*columns, *self._levels_of(self._sliding)])
+    def _levels(self) -> Array:
+        def levels(here: slice) -> list[Array]:
+            sign = np.sign(self.windows.rate[here])
+            dry = [sign * one for one in self._levels_of(self._dry, here)]
+            return [*dry, *self._levels_of(self._sliding, here)]
 
-    def _levels_of(self, terms: tuple[Term, ...]) -> list[Array]:
-        """What each parameter of some terms multiplies (m,): one column for each direction."""
-        rate, columns = self.windows.rate, []
-        for term in terms:
-            value = term.column(self.motion)
+        return self._weigh(levels)
+
+    def _columns_of(self, terms: tuple[Term, ...], here: slice) -> list[Array]:
+        motion = self._motion_at(here)
+        return [term.column(motion) for term in terms]
+
+    def _motion_at(self, here: slice) -> Motion:
+        """The motion at a stretch of samples."""
+        whole = self.motion
+        parts = (whole.opening, whole.rate, whole.acceleration, whole.load)
+        return Motion(*(part[here] for part in parts))
+
+    def _levels_of(self, terms: tuple[Term, ...], here: slice = EVERY) -> list[Array]:
+        """What each parameter of some terms multiplies: one column for each direction."""
+        rate, columns = self.windows.rate[here], []
+        for term, value in zip(terms, self._columns_of(terms, here), strict=True):
             columns += [value * (rate > 0), value * (rate < 0)] if term.sided else [value]
         return columns
 
     def _stribeck_at(self, rate: float) -> Array:
-        bell = _SCALED.column(self.motion, rate)
-        return np.column_stack(self._weigh([self.motion.direction * bell]))
+        def bell(here: slice) -> list[Array]:
+            motion = self._motion_at(here)
+            return [motion.direction * _SCALED.column(motion, rate)]
+
+        return self._weigh(bell)
 
     def _lag_at(self, length: float) -> Array:
         late = self._late(length)
-        return np.column_stack(self._weigh([late * one for one in self._levels_of(self._dry)]))
+        return self._weigh(lambda here: [late[here] * c for c in self._levels_of(self._dry, here)])
 
     def _late_at(self, node: int) -> Array:
         if node not in self._lateness:
@@ -248,16 +273,22 @@ class FrictionBasis:
         )
         return np.asarray(np.sign(windows.rate) - state)
 
-    def _weigh(self, columns: list[Array]) -> list[Array]:
-        """Each column (m,) times the powers of the place, weighed (n,); one at a time."""
-        away = self.windows.opening - self._center
-        weighed = []
-        for column in columns:
-            for power in range(len(self._place) + 1):
-                weighed.append(self.windows.average(column))
-                if power < len(self._place):
-                    column = column * away
-        return weighed
+    def _weigh(self, columns: Callable[[slice], list[Array]]) -> Array:
+        """Columns times the powers of the place, weighed (n, columns * powers).
+
+        ``columns`` (samples) gives them at a stretch of samples. In memory each column of the
+        result lies in one piece, as products by stroke take it.
+        """
+
+        def placed(here: slice) -> list[Array]:
+            away, found = self.windows.opening[here] - self._center, []
+            for column in columns(here):
+                found.append(column)
+                for _ in self._place:
+                    found.append(found[-1] * away)
+            return found
+
+        return self.windows.averages(placed).T
 
 
 class ScaledColumns:
@@ -312,9 +343,16 @@ class ScaledColumns:
 
     def node(self, index: int) -> Array:
         """Columns at one node."""
-        if index not in self.known:
-            self.known[index] = self.at(self.scale_of(index))
+        made = self.known.pop(index, None)
+        _keep(self.known, index, self.at(self.scale_of(index)) if made is None else made)
         return self.known[index]
+
+
+def _keep(known: dict[Any, Array], key: Any, made: Array) -> None:
+    """Put columns last, and forget the first as far as ``MOST_BYTES`` do not hold all."""
+    known[key] = made
+    while len(known) > max(FEWEST_KEPT, MOST_BYTES / max(made.nbytes, 1)):
+        del known[next(iter(known))]
 
 
 def coupled_nodes(cell: Cell) -> list[tuple[int, int]]:

@@ -104,13 +104,20 @@ def fit_friction(
     refuse_unsound(recordings)
     joint = recordings[0].joint if recordings else Joint()
     sensors = inspect_sensors(recordings)
-    cleaned, zero = _cleaned(recordings, settings, simulated=prior is not None)
     steady, broken = steadiness(recordings), interruptions(recordings)
-    again = partial(_slid, steady, cleaned, settings.cutoff_Hz, sensors.usable)
-    every = again()
+
+    def weighed(window_Hz: float | None = None) -> tuple[Windows, DriveZero | None]:
+        # Made again for other windows: the cleaned samples take as much memory as the recorded.
+        cleaned, zero = _cleaned(recordings, settings, simulated=prior is not None)
+        usable, cutoff_Hz = sensors.usable, settings.cutoff_Hz
+        return _slid(steady, cleaned, cutoff_Hz, usable, window_Hz=window_Hz), zero
+
+    every, zero = weighed()
     windows = every.where(every.bins.moving)
     usage = usage_of_windows(recordings, every, sensors.usable)
     refuse_friction(recordings, settings, every, windows, sensors, usage)
+    left_out = 1.0 - len(windows.first) / len(every.first)
+    del every  # half of what a long recording's windows take
     slow = SlowFriction.of(recordings, windows.bins, settings)
     settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
@@ -136,7 +143,7 @@ def fit_friction(
             start_verdict(law, chosen.optimum.point),
             near_rest_verdict(law, posterior.draws),
             *((swung,) if swung else ()),
-            _bandwidth(again, law, chosen, posterior, effort),
+            _bandwidth(lambda other_Hz: weighed(other_Hz)[0], law, chosen, posterior, effort),
             sensors.verdict,
             *((broken.verdict("fit.friction"),) if broken.interrupted else ()),
             *((steady.verdict(),) if steady.rows else ()),
@@ -166,7 +173,7 @@ def fit_friction(
         extra_verdicts=verdicts,
         extra_notes=(
             *sensors.notes,
-            *_notes(every, windows, posterior, joint, cogging),
+            *_notes(left_out, windows, posterior, joint, cogging),
             *_symmetry_note(law, chosen),
             *passed,
             *draft_note(effort, every_law, laws),
@@ -268,7 +275,7 @@ def _diagnostics(
 
 
 def _bandwidth(
-    weighed: Callable[..., Windows],
+    weighed: Callable[[float], Windows],
     law: FrictionExperiment,
     chosen: FittedCandidate,
     posterior: Posterior,
@@ -289,7 +296,7 @@ def _bandwidth(
             f"fit.friction.cutoff_Hz to {longer_Hz:.3g} or less, or log at a higher rate."
         )
         return Verdict("fit.friction", "bandwidth", "fail", None, None, why)
-    every = weighed(window_Hz=other_Hz)
+    every = weighed(other_Hz)
     windows = every.where(every.bins.moving)
     if len(windows.first) < FEWEST_BINS:
         why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
@@ -309,13 +316,12 @@ def _bandwidth(
 
 
 def _notes(
-    every: Windows, windows: Windows, posterior: Posterior, joint: Joint, cogging: Cogging
+    left: float, windows: Windows, posterior: Posterior, joint: Joint, cogging: Cogging
 ) -> tuple[str, ...]:
-    """Notes on the time that is left out, window length, delay of the torque and cogging."""
-    left = 1.0 - len(windows.first) / len(every.first)
+    """Notes on the share of time that is left out, window length, delay of torque and cogging."""
     notes = [
         f"{left:.1%} of the time is left out: the joint rests, turns or moves by less than "
-        f"{every.bins.rate_floor:.2g} {joint.position_unit}/s (below that the encoder does not "
+        f"{windows.bins.rate_floor:.2g} {joint.position_unit}/s (below that the encoder does not "
         "show the direction), samples are missing, or a sensor is faulty."
     ]
     if windows.lengthening > 1.0:

@@ -9,12 +9,14 @@ at once are scored stroke by stroke by their residuals.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.friction.columns import SCALES, Cell, FrictionBasis, coupled_nodes
 from scissorcal.calibration.parameters import Layout
+from scissorcal.inference.ar_noise import runs
 from scissorcal.model.transforms import IDENTITY, Transform
 
 Array = NDArray[np.float64]
@@ -42,10 +44,7 @@ class StrokeMoments:
         self.basis, self.measured, self.strokes = basis, measured, strokes
         self.labels, place, counts = np.unique(strokes, return_inverse=True, return_counts=True)
         self.counts = counts.astype(np.float64)
-        self._order = np.argsort(place, kind="stable")
-        ends = np.cumsum(counts).tolist()
-        self._bounds = list(zip([0, *ends[:-1]], ends, strict=True))
-        self._sorted: dict[Block, Array] = {}
+        self._runs = [(int(place[low]), low, high) for low, high in runs(strokes)]
         self._products: dict[tuple[Block, Block], Array] = {}
 
     def of(self, measured: Array) -> "StrokeMoments":
@@ -61,18 +60,19 @@ class StrokeMoments:
             if (b, a) in self._products:
                 return np.asarray(self._products[b, a].transpose(0, 2, 1))
             left, right = self._columns(a), self._columns(b)
-            self._products[a, b] = np.stack(
-                [left[:, low:high] @ right[:, low:high].T for low, high in self._bounds]
-            )
+            found = np.zeros((len(self.labels), len(left), len(right)))
+            for stroke, low, high in self._runs:
+                found[stroke] += left[:, low:high] @ right[:, low:high].T
+            self._products[a, b] = found
         return self._products[a, b]
 
     def squares(self, cell: Cell, factors: Array) -> Array:
         """Squares that factors (k, q) of a cell's columns leave in each stroke, (k, strokes)."""
         rows = [self._columns(block) for block in _blocks(cell)]
-        found = np.empty((len(factors), len(self._bounds)))
-        for place, (low, high) in enumerate(self._bounds):  # a stroke at a time stays in the cache
+        found = np.zeros((len(factors), len(self.labels)))
+        for stroke, low, high in self._runs:  # a run at a time stays in the cache
             left = factors @ np.concatenate([row[:, low:high] for row in rows])
-            found[:, place] = np.einsum("kn,kn->k", left, left)
+            found[:, stroke] += np.einsum("kn,kn->k", left, left)
         return found
 
     def assembled(
@@ -80,35 +80,26 @@ class StrokeMoments:
     ) -> Array:
         """Put a cell's ``products`` of two blocks, (*shape, columns, columns), together."""
         blocks = _blocks(cell)
-        ends = np.cumsum([0, *(len(self._columns(block)) for block in blocks)]).tolist()
+        known = {(a, b): products(a, b) for i, a in enumerate(blocks) for b in blocks[i:]}
+        ends = np.cumsum([0, *(known[a, a].shape[-1] for a in blocks)]).tolist()
+        places = {a: slice(*bounds) for a, bounds in zip(blocks, pairwise(ends), strict=True)}
         result = np.empty((*shape, ends[-1], ends[-1]))
-        for i, left in enumerate(blocks):
-            rows = slice(ends[i], ends[i + 1])
-            for j in range(i, len(blocks)):
-                columns = slice(ends[j], ends[j + 1])
-                found = products(left, blocks[j])
-                result[..., rows, columns] = found
-                result[..., columns, rows] = np.swapaxes(found, -1, -2)
+        for (a, b), found in known.items():
+            result[..., places[a], places[b]] = found
+            result[..., places[b], places[a]] = np.swapaxes(found, -1, -2)
         return result
 
     def _columns(self, block: Block) -> Array:
-        """Columns of a block (columns, n), stroke after stroke."""
-        if block not in self._sorted:
-            kind, index, other = block
-            if kind == "measured":
-                columns = self.measured[:, None]
-            elif kind == "fixed":
-                columns = self.basis.fixed
-            elif kind == "coupled":
-                columns = self.basis.coupled(index, other)
-            else:
-                scaled = self.basis.stribeck if kind == "stribeck" else self.basis.lag
-                columns = scaled.node(index)
-            in_order = bool(np.all(np.diff(self._order) == 1))
-            self._sorted[block] = np.ascontiguousarray(
-                columns.T if in_order else columns[self._order].T
-            )
-        return self._sorted[block]
+        """Columns of a block (columns, n), each in one piece of memory."""
+        kind, index, other = block
+        if kind == "measured":
+            return self.measured[None, :]
+        if kind == "fixed":
+            return self.basis.fixed.T
+        if kind == "coupled":
+            return self.basis.coupled(index, other).T
+        scaled = self.basis.stribeck if kind == "stribeck" else self.basis.lag
+        return scaled.node(index).T
 
 
 @dataclass(frozen=True)

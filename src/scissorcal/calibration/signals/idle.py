@@ -1,6 +1,6 @@
 """Sensors' zeros from idle periods: motors off and blades at rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,18 +52,19 @@ def idle_zero(recordings: tuple[Recording, ...]) -> Zero | None:
     spans = [(recording, span) for recording in recordings for span in idle_spans(recording)]
     if not spans:
         return None
-    every = np.concatenate([recording.drive_effort[span] for recording, span in spans])
+    every = np.concatenate(
+        [replace(one, samples=one.samples[span]).drive_effort for one, span in spans]
+    )
     seconds = sum(_tick(recording) * (span.stop - span.start) for recording, span in spans)
     return Zero(float(every.mean()), _standard_error(every, seconds), seconds)
 
 
 def idle_noise(recordings: tuple[Recording, ...]) -> float:
     """White noise of the drive's sensors (sd, N m or N) over idle periods; 0 without any."""
-    found = [
-        noise_of(recording.drive_effort[span])
-        for recording in recordings
-        for span in idle_spans(recording)
-    ]
+    found = []
+    for recording in recordings:
+        effort = recording.drive_effort
+        found += [noise_of(effort[span]) for span in idle_spans(recording)]
     return float(np.median(found)) if found else 0.0
 
 
@@ -71,13 +72,15 @@ def idle_periods(recording: Recording) -> tuple[IdlePeriod, ...]:
     """Means over each idle period of a recording, in order of time."""
     found = []
     has_force = bool(np.isfinite(recording.handle_radius_m))
-    for span in idle_spans(recording):
-        samples = recording.samples[span]
-        drive = np.asarray(recording.drive_effort[span], dtype=np.float64)
-        seconds = _tick(recording) * len(drive)
+    spans = idle_spans(recording)
+    effort, time = recording.drive_effort, recording.device_time_s
+    tick = _tick(recording)
+    for span in spans:
+        samples, drive = recording.samples[span], effort[span]
+        seconds = tick * len(drive)
         found.append(
             IdlePeriod(
-                time_s=float(recording.device_time_s[span].mean()),
+                time_s=float(time[span].mean()),
                 torque=float(samples["motor_torque"].mean()),
                 force_N=float(samples["handle_force"].mean()) if has_force else 0.0,
                 drive=float(drive.mean()),

@@ -161,6 +161,19 @@ def stretches(held: Mask) -> tuple[Integers, Integers]:
     return edges[::2], edges[1::2]
 
 
+def by_label(labels: Integers) -> dict[int, Integers]:
+    """Places (k,) of each label in ``labels`` (m,), ascending, by one sort for all of them.
+
+    >>> {label: at.tolist() for label, at in by_label(np.array([7, 3, 7])).items()}
+    {3: [1], 7: [0, 2]}
+    """
+    order = np.argsort(labels, kind="stable")
+    ordered = labels[order]
+    first = np.flatnonzero(np.diff(ordered)) + 1
+    found = ordered[np.concatenate([[0], first])] if len(ordered) else ordered
+    return dict(zip(found.tolist(), np.split(order, first), strict=True)) if len(found) else {}
+
+
 def sheets_of(recording: Recording) -> Integers:
     """Sheet in place at each sample: a stroke's own, held until the next stroke names another."""
     stroke = np.asarray(recording.samples["stroke"], dtype=np.int64)

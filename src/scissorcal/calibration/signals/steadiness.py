@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.signals.segments import by_label
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.recipe.pace import ADVANCE_ACCELERATION, TURN_ACCELERATION, ramp_time
-from scissorcal.recording.recording import Joint, Recording, Stroke
+from scissorcal.recording.recording import Joint, Recording
 from scissorcal.recording.resolution import noise_of, resolution_of
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
@@ -111,10 +112,14 @@ def steadiness(recordings: tuple[Recording, ...]) -> Steadiness:
     numbers: dict[float, list[int]] = {}
     offset = 0
     for recording in recordings:
-        label = np.asarray(recording.samples["stroke"])
+        inside = by_label(np.asarray(recording.samples["stroke"], dtype=np.int64))
+        opening = np.asarray(recording.samples["opening"], dtype=np.float64)
+        time = recording.device_time_s
+        kind = recording.joint.kind
         for place, stroke in enumerate(recording.strokes if recording.device else ()):
             if np.isfinite(stroke.speed) and stroke.speed > 0.0:
-                share = _rest_share(recording, np.flatnonzero(label == stroke.index), stroke)
+                here = inside.get(stroke.index, np.zeros(0, dtype=np.int64))
+                share = _rest_share(opening[here], time[here], kind, stroke.speed)
                 if np.isfinite(share):
                     speed = round(stroke.speed, 9)
                     rests.setdefault(speed, []).append(share)
@@ -125,25 +130,26 @@ def steadiness(recordings: tuple[Recording, ...]) -> Steadiness:
     return Steadiness(rows, stuck, recordings[0].joint if recordings else Joint())
 
 
-def _rest_share(recording: Recording, inside: NDArray[np.intp], stroke: Stroke) -> float:
-    """Share of a stroke's inner time in which the joint rested; NaN where it is too short."""
-    if len(inside) < 3:
+def _rest_share(opening: Array, time: Array, kind: str, speed: float) -> float:
+    """Share of a stroke's inner time in which the joint rested; NaN where it is too short.
+
+    ``opening`` and ``time`` (k,) are those of the stroke.
+    """
+    if len(time) < 3:
         return float("nan")
-    opening = np.asarray(recording.samples["opening"][inside], dtype=np.float64)
-    time = recording.device_time_s[inside]
     tick = float(np.median(np.diff(time)))
     step = resolution_of(opening)
     error = max(step if np.isfinite(step) else 0.0, 3.0 * np.sqrt(2.0) * noise_of(opening))
-    lasting = max(LEAST_S, CERTAIN * error / stroke.speed)
+    lasting = max(LEAST_S, CERTAIN * error / speed)
     if tick <= 0.0:
         return float("nan")
     apart = max(1, int(np.ceil(lasting / tick)))
-    acceleration = TURN_ACCELERATION if recording.joint.kind == "rotary" else ADVANCE_ACCELERATION
-    left_out = max(ENDS * len(inside), ramp_time(stroke.speed, acceleration) / tick)
-    low, high = round(left_out), len(inside) - round(left_out)
+    acceleration = TURN_ACCELERATION if kind == "rotary" else ADVANCE_ACCELERATION
+    left_out = max(ENDS * len(time), ramp_time(speed, acceleration) / tick)
+    low, high = round(left_out), len(time) - round(left_out)
     if high - low <= 2 * apart:
         return float("nan")
     sense = 1.0 if opening[-1] >= opening[0] else -1.0
     way = sense * (opening[low + apart : high] - opening[low : high - apart])
     passed = time[low + apart : high] - time[low : high - apart]
-    return float(np.mean(way < RESTS_BELOW * stroke.speed * passed))
+    return float(np.mean(way < RESTS_BELOW * speed * passed))

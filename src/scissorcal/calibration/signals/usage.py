@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.signals.segments import bridge
+from scissorcal.calibration.signals.segments import bridge, by_label
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.recipe.requirements import LITTLE
 from scissorcal.recording.recording import Recording
@@ -125,17 +125,17 @@ def count_usage(
         for number, masks in reversed(list(enumerate(reasons.values()))):
             why[masks[index]] = number
         names = [*reasons, OTHER]
-        for label in np.unique(stroke):
-            here = stroke == label
-            left = np.bincount(why[here & ~used[index]], minlength=len(names))
+        for label, here in by_label(stroke).items():
+            taken = used[index][here]
+            left = np.bincount(why[here[~taken]], minlength=len(names))
             known = recording.strokes[label] if 0 <= label < len(recording.strokes) else None
             rows.append(
                 UsageRow(
                     recording=recording.source,
                     stroke=int(label) + offset if label >= 0 else -1,
                     speed=known.speed if known else float("nan"),
-                    recorded_s=tick * np.count_nonzero(here),
-                    used_s=tick * np.count_nonzero(here & used[index]),
+                    recorded_s=tick * len(here),
+                    used_s=tick * np.count_nonzero(taken),
                     reasons={
                         name: round(tick * int(count), 9)
                         for name, count in zip(names, left, strict=True)

@@ -1,8 +1,7 @@
 """Weak form: motion and drive weighted over short windows, with the same filter for both."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -30,13 +29,15 @@ from scissorcal.calibration.signals.window_length import (
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+WINDOWS_AT_ONCE = 8192
+"""Windows that are weighed together: their samples, a third of a megabyte a column, stay in the
+processor's cache, and columns of all samples are never in memory together."""
+MOST_LEFT_OUT = 3
+"""Even windows are all weighed, for what is kept of them, where these are a third at least."""
 RATE_BAND = 2.0
 """The rate in the friction law is low-passed at this many times the cutoff."""
 HELD = 1 / 6
@@ -79,20 +80,24 @@ class Windows:
         return HALF_AT / (self.tick_s * (len(self.weights) // 3))
 
     def average(self, values: Array) -> Array:
-        """Weigh values of all samples, (m,) or (m, k), over each window: (n,) or (n, k)."""
-        return np.asarray(self._weighing @ values)
+        """Weigh values of all samples (m,) over each window: (n,)."""
+        return np.asarray(self.averages(lambda here: (values[here],))[0])
 
-    @cached_property
-    def _weighing(self) -> "csr_array":
-        """The windows' weights as a sparse matrix (n, m)."""
-        from scipy.sparse import csr_array
+    def averages(self, columns: Callable[[slice], Sequence[Array]]) -> Array:
+        """Weigh several columns over each window: (columns, n).
 
-        count, length = len(self.first), len(self.weights)
-        places = (self.first[:, None] + np.arange(length)).ravel().astype(np.int32)
-        ends = np.arange(count + 1, dtype=np.int32) * length
-        return csr_array(
-            (np.tile(self.weights, count), places, ends), shape=(count, len(self.rate))
-        )
+        ``columns`` (samples) gives them at a stretch of samples, a block of windows at a time, so
+        that columns which are worked out from the samples take no memory for all of them.
+        """
+        found = np.empty((len(columns(slice(0, 0))), len(self.first)))
+        for low in range(0, len(self.first), WINDOWS_AT_ONCE):
+            windows = slice(low, low + WINDOWS_AT_ONCE)
+            first = self.first[windows]
+            samples = slice(int(first[0]), int(first[-1]) + len(self.weights))
+            over = _over(first - samples.start, self.weights)
+            for row, column in zip(found, columns(samples), strict=True):
+                row[windows] = over(column)
+        return found
 
     @property
     def bears_load(self) -> bool:
@@ -171,6 +176,32 @@ def weigh(
     return replace(_joined(pieces, loaded), lengthening=knot / asked)
 
 
+def _over(first: Integers, weights: Array) -> Callable[[Array], Array]:
+    """Weigh values (k,) over the windows that begin at ``first`` (n,), ascending.
+
+    Windows that begin every so many samples are products of a matrix, whose rows are the samples
+    between two beginnings, with the weights in columns of as many: a third of the time.
+    """
+    step, last = int(np.gcd.reduce(first)), int(first[-1])
+    if step < 2 or last > MOST_LEFT_OUT * step * len(first):
+        return lambda values: np.asarray(sliding_window_view(values, len(weights))[first] @ weights)
+    columns = -(-len(weights) // step)
+    parts = np.zeros((columns, step))
+    parts.reshape(-1)[: len(weights)] = weights
+    count = last // step + 1
+    rows, place = np.zeros((count + columns - 1, step)), first // step
+
+    def over(values: Array) -> Array:
+        rows.reshape(-1)[: len(values)] = values
+        shares = parts @ rows.T
+        total = shares[0, :count].copy()
+        for column in range(1, columns):
+            total += shares[column, column : column + count]
+        return total[place]
+
+    return over
+
+
 def next_cutoff(windows: Windows) -> float | None:
     """Cutoff in Hz of the next shorter windows over the same samples; None where none are."""
     knot = len(windows.weights) // 3
@@ -198,6 +229,9 @@ def _common_knot(recordings: tuple[Recording, ...], cutoff_Hz: float) -> int:
 
 
 def _joined(pieces: list[Windows], loaded: bool) -> Windows:
+    if len(pieces) == 1:
+        return pieces[0] if loaded else replace(pieces[0], load=None)
+
     def together(name: str) -> Array:
         return np.concatenate([getattr(piece, name) for piece in pieces])
 
