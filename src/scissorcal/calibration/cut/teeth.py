@@ -73,9 +73,10 @@ class Line:
 
     ``log_period`` is the mean logarithm of the period (rad) over the stretches ``stretches``, where
     the mean logarithm of the torque (N m) is ``log_torque``: phases follow the local torque, so the
-    period is that of a sheet so tough, whatever this one is. ``gain`` is the power that keeps its phase over what noise would leave. ``speeds`` has rows of
-    stroke speed (rad/s), the ratio that it gives and its gain. ``half`` and ``third`` are the
-    powers at a half and a third of the line's frequency over its own.
+    period is that of a sheet so tough, whatever this one is. ``gain`` is the power that keeps its
+    phase over what noise would leave. ``speeds`` has rows of stroke speed (rad/s), the ratio that
+    it gives and its gain. ``half`` and ``third`` are the powers at a half and a third of the line's
+    frequency over its own.
     """
 
     ratio: float
@@ -141,8 +142,9 @@ def find_line(
     its phase from window to window (the pulse-pair estimator of the mean frequency, Zrnic 1979,
     IEEE Trans. Geosci. Electron. GE-17, 113); the error is a jackknife over strokes, and
     ``PERIOD_SD``.
-    ``paths`` (k,) of the segments weigh the means of period and ``expected`` torque; ``near`` says that the expected period is
-    right to some percent, and needs no search.
+    ``paths`` (k,) of the segments weigh the means of period and of the ``expected`` torque (k,),
+    which the phases were worked out with; ``near`` says that the expected period is right to some
+    percent, and needs no search.
     """
     seen = [s for s in signals if _ticks_per_cycle(s) >= LEAST_TICKS * SCAN[0]]
     if not seen:
