@@ -16,6 +16,7 @@ static sc_cut_data load_data(const json *one)
     data.moving_blades = json_number(one, "moving_blades");
     data.reference_depth = json_number(one, "reference_depth");
     data.known_sd = json_number(one, "known_sd");
+    data.line_log_torque = json_number(one, "line_log_torque");
     data.piece_first = integers(one, "piece_first");
     data.piece_rest = integers(one, "piece_rest");
     data.piece_closing = integers(one, "piece_closing");

@@ -69,6 +69,7 @@ class CutFitData:
     start_noise: Array
     end_noise: Array
     line_weight: Array
+    line_log_torque: float
     _c: Any = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

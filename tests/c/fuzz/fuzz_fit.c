@@ -146,7 +146,8 @@ static void likelihood(input *from)
         .run_sinking = numbers(from, running, -0.1, 0.1),
         .run_place = numbers(from, running, 0.0, 0.06), .run_step = numbers(from, running, 1e-4, 1e-2),
         .run_noise = numbers(from, running, 1e-8, 1e-4), .start_noise = numbers(from, running, 0.0, 1e-6),
-        .end_noise = numbers(from, running, 0.0, 1e-6), .line_weight = numbers(from, running, 0.0, 0.1)};
+        .end_noise = numbers(from, running, 0.0, 1e-6), .line_weight = numbers(from, running, 0.0, 0.1),
+        .line_log_torque = -3.0};
     const sc_cut_parameters points[2] = {parameters_of(from, kind), parameters_of(from, (uint8_t)(kind + 1))};
     const size_t segments = (size_t)(elastic + running), doubles = sizeof(double);
     double *terms = room(segments * doubles), *residuals = room(segments * doubles);

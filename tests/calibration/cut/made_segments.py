@@ -111,6 +111,7 @@ def _runs(rng, q):
         "start_noise": rng.uniform(1e-12, 4e-12, n),
         "end_noise": rng.uniform(1e-12, 4e-12, n),
         "line_weight": weight / weight.sum(),
+        "line_log_torque": float(np.log(0.06)),
     }
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 from scissorcal.kernel import cut_log_likelihood, cut_log_likelihoods
 from tests.calibration.cut.golden import PATH, golden
 from tests.calibration.cut.made_segments import made_data, made_parameters, responses
-from tests.calibration.cut.twin import Table, beliefs, log_likelihood
+from tests.calibration.cut.twin import Table, beliefs, cycle, log_likelihood
 
 FAMILIES = ("power", "exponential", "spline")
 FRACTURES = ("none", "smooth", "rippled")
@@ -66,6 +66,29 @@ def test_cycles_may_be_interpolated_over_the_slope(family):
     limit = 1e-4 if family == "spline" else 1e-5
     assert found["residuals"] < limit, found
     assert found["log period"] < limit, found
+
+
+def test_a_tougher_sheet_leaves_the_line_where_it_is():
+    """At a given torque: the teeth are longer by the torque's ratio to the power 1 / n."""
+    given = made_parameters(responses()["power"], "rippled")
+    for tougher in (0.98, 1.02):
+        for data in (made_data(9), replace(made_data(9), line_log_torque=-4.0)):
+            moved = replace(given, energy=tougher * given.energy)
+            base, there = (cut_log_likelihood(data, p)[5] for p in (given, moved))
+            longer = math.log(tougher) / responses()["power"].exponent
+            assert abs(there - base) < 0.05 * abs(longer)
+
+
+def test_the_lines_period_is_that_of_the_expected_torque():
+    """What the line adds to the period's logarithm is nothing where the torques agree."""
+    data, given = made_data(9), made_parameters(responses()["power"], "rippled", plain=True)
+    expected = data.run_torque - cut_log_likelihood(data, given)[2][len(data.torque) :]
+    at = replace(data, line_log_torque=float(data.line_weight @ np.log(expected)))
+    twice = replace(at, line_log_torque=at.line_log_torque + math.log(2.0))
+    exponent = responses()["power"].exponent
+    here, longer = (cut_log_likelihood(one, given)[5] for one in (at, twice))
+    assert here == pytest.approx(_mean_log_period(at, given), rel=1e-3)
+    assert longer - here == pytest.approx(math.log(2.0) / exponent, rel=1e-9)
 
 
 def test_places_of_rests_are_where_the_density_is_highest():
@@ -174,3 +197,17 @@ def test_the_golden_vectors_are_the_twins():
         assert held["title"] == made["title"]
         for name in ("terms", "residuals", "standardised", "places"):
             assert held[name] == pytest.approx(made[name], rel=1e-9, abs=1e-12)
+
+
+def _mean_log_period(data, given):
+    """Of one cycle at every segment's own slope and lever, in a loop."""
+    table, found = Table(given), 0.0
+    for k, weight in enumerate(data.line_weight):
+        start, stop, _ = cycle(given, table, data.moving_blades, data.run_slope[k])
+        away = 0.5 * (start + stop) - data.reference_depth
+        slope = data.run_slope[k] + data.run_slope_dd[k] * away
+        lever = data.run_lever[k] + data.run_lever_dd[k] * away
+        power = table.log_force(float(np.log(start)))[1]
+        turn = 0.5 * (start + stop) * (1.0 + slope**2) / (power * slope)
+        found += weight * math.log(data.moving_blades * (start - stop) / (lever - turn))
+    return found

@@ -35,9 +35,9 @@ def day(seed, strokes=6, **changes):
 
 
 def found(signals, near=False) -> Line | None:
-    zeros = [np.zeros(20) for _ in signals]
+    zeros, ones = ([np.full(20, value) for _ in signals] for value in (0.0, 1.0))
     paths = [np.full(20, 5e-3) for _ in signals]
-    return find_line(signals, zeros, paths, near)
+    return find_line(signals, zeros, ones, paths, near)
 
 
 @pytest.mark.parametrize("ratio", [0.6, 0.83, 1.0, 1.3, 2.1])

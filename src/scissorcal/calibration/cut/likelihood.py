@@ -31,7 +31,7 @@ the logarithm: an exponential is within 1e-8 of its value. A power law needs two
 class Evaluation(NamedTuple):
     """Log-likelihood by segment (n,), residuals (N m), standardised ones, and places of rests.
 
-    ``log_period`` is the weighted mean logarithm of the teeth's period (rad).
+    ``log_period`` is the weighted mean logarithm of the teeth's period (rad) at the line's torque.
     """
 
     total: float
@@ -206,6 +206,7 @@ class CutLikelihood:
             "start_noise": _joined(start),
             "end_noise": _joined(end),
             "line_weight": weight / weight.sum() if weight.sum() > 0 else weight,
+            "line_log_torque": self.line.log_torque if self.line else 0.0,
         }
 
     def _measured(self, parts: Any, first: int) -> Array:

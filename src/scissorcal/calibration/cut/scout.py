@@ -291,7 +291,8 @@ def _line(
     growth = 1.0 / float(np.asarray(response.exponent))
     periods, torques = [row[0] for row in rows], [gain * row[1] for row in rows]
     signals = phase_signals(found.segments, found.materials, geometry, periods, torques, growth)
-    return find_line(signals, periods, [s.path for s in found.segments.stretches], near)
+    paths = [stretch.path for stretch in found.segments.stretches]
+    return find_line(signals, periods, torques, paths, near)
 
 
 def _middles(found: Scouted, index: int) -> Array:

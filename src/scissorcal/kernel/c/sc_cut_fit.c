@@ -325,7 +325,10 @@ static double running(const sc_cut_data *data, const sc_cut_parameters *p, doubl
             if (data->line_weight[k] > 0.0 && p->fracture == SC_CUT_RIPPLED) {
                 double turn = middle * (1.0 + slope * slope) / (c.power * slope);
                 double period = blades * (c.start - c.stop) / (lever - turn);
-                line += data->line_weight[k] * log(period > TINY ? period : TINY);
+                /* A tougher place has longer teeth: with the torque to the power 1 / c.power. */
+                double tougher = log(torque > TINY ? torque : TINY) - data->line_log_torque;
+                line += data->line_weight[k] *
+                        (log(period > TINY ? period : TINY) - tougher / c.power);
             }
             if (k > data->run_first[sheet]) {
                 double gone = fabs(data->run_place[k] - data->run_place[k - 1]);

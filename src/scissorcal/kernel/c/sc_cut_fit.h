@@ -41,7 +41,8 @@ typedef struct {
  * slope of the edge are expanded in depth about reference_depth and in the edge's parameters;
  * joined[k] is 1 where segment k begins where k - 1 ended. start_noise[k] is the variance of the work
  * at the segment's start, end_noise[k] at its end. line_weight sums to 1
- * over the segments that show the line, or is 0 throughout. */
+ * over the segments that show the line, or is 0 throughout; line_log_torque is the logarithm of the
+ * mean torque (N m) there at which the line's period holds. */
 typedef struct {
     int32_t pieces;
     int32_t rests;
@@ -88,6 +89,7 @@ typedef struct {
     const double *start_noise;
     const double *end_noise;
     const double *line_weight;
+    double line_log_torque;
 } sc_cut_data;
 
 /* Parameters in SI. energy is J_c h (N); fracture is one of SC_CUT_*. delay (ticks) is how late a
@@ -135,7 +137,7 @@ void sc_cut_cycle(const sc_cut_parameters *parameters, double moving_blades, dou
 /* Log-likelihood of every segment, elastic ones first and then running ones, up to a constant, with
  * residuals (measured less expected, N m) and, unless scaled is null, residuals that are standard
  * normal if the model is true, in the same order. places (rests) gets where each crack rests, at the highest density. line_log_period gets
- * the weighted mean of the logarithm of the teeth's period in opening. Returns the sum; -HUGE_VAL
+ * the weighted mean of the logarithm of the teeth's period in opening, at the line's torque. Returns the sum; -HUGE_VAL
  * where a number is not finite. work has 2 * elastic segments values. */
 double sc_cut_log_likelihood(const sc_cut_data *data, const sc_cut_parameters *parameters,
                              double *terms, double *residuals, double *scaled, double *places,
