@@ -94,7 +94,11 @@ def place_at_turn(
 def placed_by_loading(
     motion: PathMotion, work: Array, run: Run, rest: Rest, geometry: Geometry, guess: Guess
 ) -> Rest:
-    """A rest whose crack is where the torque passes that of PLACED_AT of its critical depth."""
+    """A rest whose crack is where the torque passes that of PLACED_AT of its critical depth.
+
+    A loading that begins beyond, after blades that turned back a little, passes it unseen: where
+    the torque comes up to it later, the crack has run in between, and so the rest is not placed.
+    """
     shortest = max(LEAST_SEGMENT_RAD, PLACING * shortest_segment(motion, run.low, run.high))
     ends = split(motion.opening, run.low, run.high, shortest)
     if len(ends) < 3:
@@ -106,10 +110,10 @@ def placed_by_loading(
     depth = PLACED_AT * guess.critical_depth(slope, geometry.moving_blades)
     reached = (1.0 + guess.load) * guess.response.force_at(depth)
     reached = reached * geometry.depth_and_lever(geometry.edge, opening, rest.place - advance)[1]
-    above = np.flatnonzero((torque[1:] >= reached[1:]) & (torque[:-1] < reached[:-1]))
-    if not len(above):
+    above = np.flatnonzero(torque >= reached)
+    if not len(above) or above[0] == 0:
         return replace(rest, placed=False)
-    at = int(above[0])
+    at = int(above[0]) - 1
     short = reached[at : at + 2] - torque[at : at + 2]
     share = float(short[0] / (short[0] - short[1]))
     place = [
