@@ -39,8 +39,8 @@ class Rest:
 
     ``opening`` and ``advance`` are where the blades turned; ``fresh`` marks a sheet that is not
     cut yet, whose crack is at 0. ``seen`` is false where the unloading has too few segments (of a
-    coarse encoder, or a short contact), so that the next loading has to show the place, and
-    ``placed`` where that did not.
+    coarse encoder, or a short contact) or invalid samples, so that the next loading has to show the
+    place; ``placed`` where that did not, or the turn itself lies in invalid samples.
     """
 
     sheet: int
@@ -78,7 +78,7 @@ def place_at_turn(
         shortest = max(LEAST_SEGMENT_RAD, PLACING * shortest_segment(motion, low, run.high))
         ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, shortest))
         ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
-        if len(ends) < 4:
+        if len(ends) < 4 or not np.all(motion.usable[low : ends[-1] + 1]):
             return place, False
         seen, _ = mean_torque(motion, work, ends)
         middle = 0.5 * (opening[ends[1:]] + opening[ends[:-1]])
@@ -114,6 +114,8 @@ def placed_by_loading(
     if not len(above) or above[0] == 0:
         return replace(rest, placed=False)
     at = int(above[0]) - 1
+    if not np.all(motion.usable[run.low : ends[at + 2] + 1]):
+        return replace(rest, placed=False)
     short = reached[at : at + 2] - torque[at : at + 2]
     share = float(short[0] / (short[0] - short[1]))
     place = [
