@@ -14,7 +14,8 @@ from scissorcal.recipe.library import builtin_recipe
 @pytest.mark.parametrize("seed", [9705, 9717, 9720])
 def test_no_lag_is_found_in_place_of_the_inertia(seed: int) -> None:
     """Of paper's rig 9705 a mode of 0.53 of the inertia and 3.2 ms of delay explains the pushes to
-    0.9 of what a law may leave out, and the true one to 0.01."""
+    0.9 of what a law may leave out, and the true one to 0.01. An inertia is asked for to 20 %
+    (`swings.ENOUGH_SD`)."""
     rng = np.random.default_rng(seed)
     specimen = varied(load_specimen("office-paper"), rng)
     link = LockstepLink(specimen, rng.spawn(2)[0])
@@ -22,5 +23,5 @@ def test_no_lag_is_found_in_place_of_the_inertia(seed: int) -> None:
     inertia, delay = found.inertia_kg_m2, found.delay_s
     assert inertia is not None
     assert delay is not None
-    assert inertia.mean == pytest.approx(specimen.mechanism.inertia_kg_m2, rel=0.1)
+    assert inertia.mean == pytest.approx(specimen.mechanism.inertia_kg_m2, rel=0.2)
     assert delay.mean == pytest.approx(1.0e-3, abs=0.5e-3)
