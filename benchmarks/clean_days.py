@@ -14,7 +14,6 @@ are fitted without a package.
 All of its friction builds up after a turn, a share of 1, which no interval of a share holds.
 """
 
-import argparse
 import json
 import os
 import sys
@@ -28,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from benchmarks.days import day_options
 
 from scissorcal.calibration import FitResult, fit_cut, fit_friction
 from scissorcal.calibration.friction.typical import friction_and_offset
@@ -219,12 +219,9 @@ def _safely(day: Any, seed: int) -> Row:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--first", type=int, default=1)
+    parser = day_options(__doc__, first=1, count=200)
     parser.add_argument("--rig", choices=sorted(DAYS), default="own")
     parser.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
-    parser.add_argument("--json", type=Path, help="write the rows here as they come")
     arguments = parser.parse_args()
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     seeds = range(arguments.first, arguments.first + arguments.count)

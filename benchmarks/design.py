@@ -22,7 +22,6 @@ Ratios are found over predicted: of the medians over places of the band's half-w
 the torque there.
 """
 
-import argparse
 import json
 import sys
 import tempfile
@@ -32,6 +31,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import numpy as np
+from benchmarks.days import day_options
 from numpy.typing import NDArray
 
 from scissorcal.calibration import FitResult
@@ -350,11 +350,8 @@ def summary(rows: list[Row]) -> dict[str, Any]:
 
 def main() -> None:
     """Run the days and print one line each, then the summary."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--first", type=int, default=9400)
-    parser.add_argument("--count", type=int, default=20)
+    parser = day_options(__doc__, first=9400, count=20)
     parser.add_argument("--second-rig", type=int, default=10, help="days on the second rig")
-    parser.add_argument("--json", type=Path, default=None)
     arguments = parser.parse_args()
     last = arguments.first + arguments.count
     rows = [

@@ -17,7 +17,6 @@ differs from the nominal one by a few tenths of a percent, which no number of th
 is also compared with the torque at the toughness of what was cut.
 """
 
-import argparse
 import importlib.util
 import json
 import math
@@ -36,6 +35,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from benchmarks.days import day_options
 
 from scissorcal.package.model_package import open_package
 from scissorcal.recipe.library import recipe_path
@@ -311,12 +311,9 @@ def against_truth(folder: Path, truth: Any) -> tuple[float, float]:
 
 def main() -> int:
     """Run the days one after another and print one line each, then what they show together."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = day_options(__doc__, first=1, count=12)
     parser.add_argument("--rig", type=Path, default=RIG)
-    parser.add_argument("--first", type=int, default=1)
-    parser.add_argument("--count", type=int, default=12)
     parser.add_argument("--keep", type=Path, default=None, help="folder that keeps the days")
-    parser.add_argument("--json", type=Path, default=None)
     asked = parser.parse_args()
     if not asked.rig.exists():
         print(f"There is no rig program at {asked.rig}, so no day was run: give one with --rig.")

@@ -14,7 +14,6 @@ error that the present settings have there. Loop rates and candidates of the edg
 are not tried.
 """
 
-import argparse
 import json
 import sys
 import tempfile
@@ -24,6 +23,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from benchmarks.days import day_options
 from numpy.typing import NDArray
 
 from scissorcal.bench.trade.case import Case
@@ -154,13 +154,10 @@ def tabulated(rows: list[Row]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=10)
-    parser.add_argument("--first", type=int, default=1)
+    parser = day_options(__doc__, first=1, count=10)
     parser.add_argument("--budget", default="3 min")
     parser.add_argument("--fresh", type=int, default=2, help="fresh captures of each day")
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--json", type=Path, help="write the rows here as they come")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore")
     rows: list[Row] = []

@@ -16,7 +16,6 @@ fitted by themselves, and the fits are compared with the specimen's truth:
   (the mean over a crack's cycle, without friction, in the middle of the scene).
 """
 
-import argparse
 import json
 import sys
 import tempfile
@@ -26,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from benchmarks.days import day_options
 from numpy.typing import NDArray
 
 from scissorcal.calibration import FitResult
@@ -255,11 +255,8 @@ def summary(rows: list[Row]) -> dict[str, Any]:
 
 def main() -> None:
     """Run the days and print one line each, then the summary."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--first", type=int, default=9450)
-    parser.add_argument("--count", type=int, default=20)
+    parser = day_options(__doc__, first=9450, count=20)
     parser.add_argument("--effort", choices=("draft", "standard"), default="standard")
-    parser.add_argument("--json", type=Path, default=None)
     arguments = parser.parse_args()
     rows = []
     for seed in range(arguments.first, arguments.first + arguments.count):

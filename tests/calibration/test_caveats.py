@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from scissorcal.calibration import FittedParameter
-from scissorcal.calibration.caveats import FEW_COUNTS, caveats_by_parameter, caveats_of
+from scissorcal.calibration.caveats import COLUMN, FEW_COUNTS, caveats_by_parameter, caveats_of
 from scissorcal.cli.fit_law import parameter_facts, text
 from scissorcal.report.subjects.posterior import parameters_panel
 from scissorcal.workday.runs.fit import FitOutcome
@@ -93,12 +93,15 @@ def test_what_one_recording_does_not_show_stands_beside_the_interval():
     assert all(row["next_recording_sd"] is None for row in parameter_facts(outcome))
     panel = parameters_panel(fit, "cut")
     assert "One recording does not show" in panel.sentence
-    assert all(str(row.value("next recording")) == "not known" for row in panel.rows)
+    assert all(str(row.value(COLUMN)) == "not known" for row in panel.rows)
 
 
 def test_the_size_that_recordings_showed_stands_beside_the_interval():
     sizes = {parameter.name: 0.0123 for parameter in fitted().parameters}
-    for key, shown in (("next_recording_sd", "+- 0.012"), ("next_recording_sd_on_record", "(+- ")):
+    for key, shown in (
+        ("next_recording_sd", " 0.012 "),
+        ("next_recording_sd_on_record", "(0.012)"),
+    ):
         plain = fitted()
         fit = replace(plain, diagnostics={**plain.diagnostics, key: sizes})
         outcome = FitOutcome("cut", fit, Path("cut.nc"), (), False, UNVERIFIED)

@@ -316,6 +316,19 @@ def test_a_position_that_begins_again_is_continued(
     assert len(closing) == 5
 
 
+@pytest.mark.parametrize(
+    ("jump", "unit"), [(200.0, "counts"), (230.0, "counts"), (255.0, "counts"), (300.0, "deg")]
+)
+def test_a_single_jump_is_no_wrap(tmp_path: Path, jump: float, unit: str) -> None:
+    """An encoder that is set anew, or loses its place, far from where it would begin again."""
+    way = np.floor(20.0 + 10.0 * np.cos(np.arange(600) / 40.0)) + jump * (np.arange(600) >= 300)
+    path = written(tmp_path / "log.csv", [[k * 0.01, v, 0.0] for k, v in enumerate(way.tolist())])
+    scale = {"opening": 0.001} if unit == "counts" else {}
+    units = {**UNITS, "opening": "rad" if unit == "counts" else unit}
+    recording = import_table(path, columns=COLUMNS, units=units, scale=scale)
+    assert not any("begins again" in note for note in recording.notes)
+
+
 def test_a_position_that_jumps_otherwise_is_left_as_it_is(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     angle = np.round(np.where(rng.random(400) < 0.02, 300.0, 30.0 + np.arange(400) / 10.0), 3)

@@ -23,7 +23,9 @@ NEXT_RECORDING = "next_recording_sd"
 """Diagnostic of fits of several recordings: sd between recordings by parameter, in its unit."""
 ON_RECORD = "next_recording_sd_on_record"
 """The same of an earlier fit of several recordings, beside a fit of one."""
-COLUMN = "next recording"
+STEP_VERSION = "step_version"
+"""Diagnostic: the version of the step that made a fit, so that a later one does not build on it."""
+COLUMN = "sd, next recording"
 NOT_KNOWN = "not known"
 ONE_RECORDING = (
     "One recording does not show how far the next would differ, and the intervals do not include "
@@ -91,7 +93,7 @@ def next_recording_words(fit: FitResult, parameter: FittedParameter) -> str:
     sd = next_recording_sd(fit, parameter)
     if sd is None:
         return NOT_KNOWN
-    return f"+- {sd:.2g}" if fit.diagnostics.get(NEXT_RECORDING) else f"(+- {sd:.2g})"
+    return f"{sd:.2g}" if fit.diagnostics.get(NEXT_RECORDING) else f"({sd:.2g})"
 
 
 def next_recording_sentence(fit: FitResult) -> str:

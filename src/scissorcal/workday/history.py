@@ -91,16 +91,17 @@ def versions(engine: Engine, what: str = "") -> tuple[Version, ...]:
 def scatter_on_record(engine: Engine, step: Step) -> dict[str, float]:
     """The sd between recordings by parameter, as the newest version of a law's fit has it.
 
-    Empty where no version had several recordings that could be compared.
+    Only fits by the present version of the step count: another judged recordings in another way.
+    Empty where none of them had several recordings that could be compared.
     """
-    from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD
+    from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
     from scissorcal.calibration.store import load_fit
 
     for version in versions(engine, step.what):
         with contextlib.suppress(InputError):  # a version that is damaged shows nothing
             known = load_fit(version.path).diagnostics
             found = known.get(NEXT_RECORDING) or known.get(ON_RECORD)
-            if found:
+            if found and known.get(STEP_VERSION) == step.version:
                 return {str(name): float(value) for name, value in found.items()}
     return {}
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from scissorcal.calibration.cut.path import material_of, path_motion
 from scissorcal.calibration.cut.path.runs import find_runs, split
+from scissorcal.calibration.cut.rests import Rest, placed_by_loading
 from scissorcal.calibration.cut.segments import cut_into_segments
 from tests.calibration.cut.made_cuts import (
     FRICTION,
@@ -163,6 +164,63 @@ def test_an_invalid_piece_is_left_out(two_strokes):
     usable[first : first + 3] = False
     invalid = segments_of(cut(way(HIGH, LOW, HIGH), way(HIGH, LOW, HIGH), usable=usable))
     assert [piece.kind for piece in invalid.pieces] == ["fresh", "loading", "unloading"]
+
+
+def lacking(made: Cut, keep: np.ndarray) -> Cut:
+    """The cut without the samples that ``keep`` leaves out."""
+    recording = replace(made.made.recording, samples=made.made.recording.samples[keep])
+    motions = path_motion((recording,), INERTIA)
+    materials = tuple(material_of(motion, FRICTION, 0.0) for motion in motions)
+    return replace(made, motions=motions, materials=materials)
+
+
+def test_single_lost_samples_cost_nothing(two_strokes):
+    """1 % of the samples, at random: no stretch between two is as long as a rate needs."""
+    keep = np.random.default_rng(1).random(len(two_strokes.tip)) > 0.01
+    whole, torn = segments_of(two_strokes), segments_of(lacking(two_strokes, keep))
+    assert [p.kind for p in torn.pieces] == [p.kind for p in whole.pieces]
+    assert len(torn.stretches) == len(whole.stretches)
+    for one, other in zip(torn.rests, whole.rests, strict=True):
+        assert one.place == pytest.approx(other.place, abs=1e-5)
+    for one, other in zip(torn.pieces, whole.pieces, strict=True):
+        np.testing.assert_allclose(one.torque, other.torque, atol=0.01 * other.torque.max())
+
+
+def test_no_rest_is_placed_by_what_a_gap_hides(two_strokes):
+    """A gap of 40 ms over the turn, then one within the unloading."""
+    whole = segments_of(two_strokes)
+    turn = int(np.argmin(two_strokes.made.opening[: len(two_strokes.tip) // 2]))
+    keep = np.ones(len(two_strokes.tip), dtype=bool)
+    keep[turn - 20 : turn + 160] = False
+    keep[turn + 20 : turn + 120] = True
+    hidden = segments_of(lacking(two_strokes, keep))
+    unloading = whole.pieces[1]
+    keep = np.ones(len(two_strokes.tip), dtype=bool)
+    keep[unloading.ends[1] : unloading.ends[3]] = False
+    torn = segments_of(lacking(two_strokes, keep))
+    assert not torn.rests[1].seen
+    assert torn.rests[1].placed
+    assert torn.rests[1].place == pytest.approx(whole.rests[1].place, abs=5e-5)
+    assert [p.kind for p in torn.pieces] == ["fresh", "loading", "unloading"]
+    assert [p.rest for p in hidden.pieces if p.kind == "unloading"] == [len(hidden.rests) - 1]
+
+
+@pytest.mark.parametrize(("begins_at", "placed"), [(0.0, True), (0.9, False)])
+def test_a_loading_that_begins_beyond_its_measure_places_no_crack(two_strokes, begins_at, placed):
+    """Shares of the running crack's torque: it falls as the crack jumps, and rises again.
+
+    Blades that spring back by 3 mrad as a crack jumps are loaded still: what comes up to the
+    measure later is the next jump's torque, and once placed a crack 2 mm off.
+    """
+    (motion,), run = two_strokes.motions, find_runs(two_strokes.motions)[0]
+    middle = int(np.argmax(motion.opening < 0.5))
+    run = replace(run, low=middle, high=middle + 200)
+    shares = np.interp(np.arange(201), [0, 60, 100, 140, 200], [begins_at, 0.9, 0.9, 0.3, 0.9])
+    torque = np.zeros(len(motion.opening))
+    torque[middle : middle + 201] = shares * two_strokes.torque[middle : middle + 201]
+    work = np.append(0.0, np.cumsum(0.5 * (torque[1:] + torque[:-1]) * np.diff(motion.opening)))
+    rest = Rest(0, False, float(two_strokes.tip[middle]), 0.5, -0.018, seen=False)
+    assert placed_by_loading(motion, work, run, rest, GEOMETRY, GUESS).placed == placed
 
 
 def test_where_nothing_is_cut_the_near_edge_is_the_only_place():

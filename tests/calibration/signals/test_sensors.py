@@ -261,6 +261,21 @@ def test_marks_of_overflow_are_told_from_measurements(mark: float) -> None:
         assert len(told) == (1 if marked else 0)
 
 
+@pytest.mark.parametrize(("lasting", "marked"), [(1, True), (40, False)])
+def test_zero_is_a_level_unless_it_never_lasts(lasting: int, marked: bool) -> None:
+    """A motor under load that is let go for 40 ms, and a line that loses single samples."""
+    rng = np.random.default_rng(5)
+    samples = np.zeros(6000, SAMPLE_DTYPE)
+    samples["device_time_us"] = np.arange(6000) * 1000
+    samples["opening"] = np.sin(np.arange(6000) / 300)
+    torque = 0.5 + rng.normal(0.0, 0.01, 6000)
+    for begin in (900, 2300, 4100):
+        torque[begin : begin + lasting] = 0.0
+    samples["motor_torque"] = torque
+    (channel,) = channels_of(Recording("cut", samples), ("motor_torque",))
+    assert channel.marks == ((0.0,) if marked else ())
+
+
 def _marked(values, mark, count):
     other = values.copy()
     other[np.arange(count) * 700 + 50] = mark

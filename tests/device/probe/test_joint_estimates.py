@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from scissorcal.device.probe.joint_fit import LEFT_OUT, JointFit
+from scissorcal.device.probe.joint_posterior import LEFT_OUT, JointFit
 from scissorcal.device.probe.joint_values import NAMES
 
 VALUES = {"log_inertia": math.log(3e-4), "log_coulomb": math.log(0.02), "log_slow": math.log(0.01),

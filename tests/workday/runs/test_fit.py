@@ -1,6 +1,7 @@
 """A fit is done once for the same inputs, and again when any of them changes."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,12 @@ from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD
 from scissorcal.cli.fit_law import text
 from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.history import scatter_on_record
 from scissorcal.workday.plan import Plan, make_plan
 from scissorcal.workday.recordings import exclude_recording
 from scissorcal.workday.runs.fit import fit_workspace, load_result
 from scissorcal.workday.runs.report import write_workspace_report
+from scissorcal.workday.steps import BY_NAME
 from scissorcal.workday.workspace import Workspace
 from tests.workday.made import quick_workspace, record_friction
 
@@ -91,7 +94,15 @@ def test_a_fit_of_one_recording_takes_the_scatter_of_an_earlier_fit_of_two(
         assert len(one.result.sources) == 1
         assert NEXT_RECORDING not in one.result.diagnostics
         assert one.result.diagnostics[ON_RECORD] == seen
-    assert f"(+- {seen['inertia']:.2g})" in text(one)
+    assert f"({seen['inertia']:.2g})" in text(one)
+
+
+def test_no_scatter_is_taken_from_a_fit_of_another_version_of_the_step(copied: Workspace) -> None:
+    record_friction(copied, seed=2)
+    (two,) = fit_workspace(copied, ("friction",))
+    step, engine = BY_NAME["fit friction"], Engine.of(copied)
+    assert scatter_on_record(engine, step) == two.result.diagnostics[NEXT_RECORDING]
+    assert scatter_on_record(engine, replace(step, version=step.version + 1)) == {}
 
 
 def test_a_changed_setting_of_the_fit_makes_it_stale(copied: Workspace) -> None:

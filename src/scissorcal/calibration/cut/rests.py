@@ -39,8 +39,8 @@ class Rest:
 
     ``opening`` and ``advance`` are where the blades turned; ``fresh`` marks a sheet that is not
     cut yet, whose crack is at 0. ``seen`` is false where the unloading has too few segments (of a
-    coarse encoder, or a short contact), so that the next loading has to show the place, and
-    ``placed`` where that did not.
+    coarse encoder, or a short contact) or invalid samples, so that the next loading has to show the
+    place; ``placed`` where that did not, or the turn itself lies in invalid samples.
     """
 
     sheet: int
@@ -78,7 +78,7 @@ def place_at_turn(
         shortest = max(LEAST_SEGMENT_RAD, PLACING * shortest_segment(motion, low, run.high))
         ends = split(opening, begin, run.high, max(length / ELASTIC_SEGMENTS, shortest))
         ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
-        if len(ends) < 4:
+        if len(ends) < 4 or not np.all(motion.usable[low : ends[-1] + 1]):
             return place, False
         seen, _ = mean_torque(motion, work, ends)
         middle = 0.5 * (opening[ends[1:]] + opening[ends[:-1]])
@@ -94,7 +94,11 @@ def place_at_turn(
 def placed_by_loading(
     motion: PathMotion, work: Array, run: Run, rest: Rest, geometry: Geometry, guess: Guess
 ) -> Rest:
-    """A rest whose crack is where the torque passes that of PLACED_AT of its critical depth."""
+    """A rest whose crack is where the torque passes that of PLACED_AT of its critical depth.
+
+    A loading that begins beyond, after blades that turned back a little, passes it unseen: where
+    the torque comes up to it later, the crack has run in between, and so the rest is not placed.
+    """
     shortest = max(LEAST_SEGMENT_RAD, PLACING * shortest_segment(motion, run.low, run.high))
     ends = split(motion.opening, run.low, run.high, shortest)
     if len(ends) < 3:
@@ -106,10 +110,12 @@ def placed_by_loading(
     depth = PLACED_AT * guess.critical_depth(slope, geometry.moving_blades)
     reached = (1.0 + guess.load) * guess.response.force_at(depth)
     reached = reached * geometry.depth_and_lever(geometry.edge, opening, rest.place - advance)[1]
-    above = np.flatnonzero((torque[1:] >= reached[1:]) & (torque[:-1] < reached[:-1]))
-    if not len(above):
+    above = np.flatnonzero(torque >= reached)
+    if not len(above) or above[0] == 0:
         return replace(rest, placed=False)
-    at = int(above[0])
+    at = int(above[0]) - 1
+    if not np.all(motion.usable[run.low : ends[at + 2] + 1]):
+        return replace(rest, placed=False)
     short = reached[at : at + 2] - torque[at : at + 2]
     share = float(short[0] / (short[0] - short[1]))
     place = [

@@ -179,7 +179,7 @@ class _Builder:
         """Loading of the crack that waits, then what is cut further."""
         motion = self.motions[run.motion]
         span = slice(run.low, run.high + 1)
-        if not self.rests[-1].seen:
+        if not self.rests[-1].seen and self.rests[-1].placed:
             work = self.materials[run.motion].work
             self.rests[-1] = placed_by_loading(
                 motion, work, run, self.rests[-1], self.geometry, self.guess
@@ -225,7 +225,10 @@ class _Builder:
                 return
             turn = float(motion.opening[run.low]), float(motion.advance[run.low])
             place, seen = found
-            self.rests.append(Rest(self.sheet, False, place, *turn, seen))
+            turned = bool(motion.usable[run.low])
+            self.rests.append(Rest(self.sheet, False, place, *turn, seen and turned, turned))
+            if not turned:
+                return
         span = slice(run.low, run.high + 1)
         opening, contact = motion.opening[span], self.rests[-1].place - motion.advance[span]
         depth, _ = self.geometry.depth_and_lever(self.geometry.edge, opening, contact)

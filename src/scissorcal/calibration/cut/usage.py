@@ -25,9 +25,8 @@ def usage_of_segments(recordings: tuple[Recording, ...], segments: Segments) -> 
         for name in ("used", "inside", INVALID, STARTING)
     }
     for motion in segments.motions:
-        span = slice(motion.start, motion.start + len(motion.opening))
-        masks["inside"][motion.recording][span] = True
-        masks[INVALID][motion.recording][span] = ~motion.usable
+        masks["inside"][motion.recording][motion.source] = True
+        masks[INVALID][motion.recording][motion.source[~motion.usable]] = True
     loaded: dict[int, list[int]] = {}
     for piece in segments.pieces:
         _mark(masks["used"], segments, piece.motion, int(piece.ends[0]), int(piece.ends[-1]))
@@ -60,4 +59,4 @@ def usage_sentence(recordings: tuple[Recording, ...], usage: Usage) -> str:
 
 def _mark(masks: tuple[Mask, ...], segments: Segments, index: int, low: int, high: int) -> None:
     motion = segments.motions[index]
-    masks[motion.recording][motion.start + low : motion.start + high + 1] = True
+    masks[motion.recording][motion.source[low : high + 1]] = True

@@ -149,4 +149,6 @@ def _motion(planned: PlannedMotion, kind: str) -> Motion:
         rest_rate=REST_RATE,
         held=True,
     )
-    return Motion(recording, (piece,), planned.opening_step, planned.advance_step, float("nan"))
+    recorded = np.ones(count, dtype=bool)
+    steps = planned.opening_step, planned.advance_step, float("nan")
+    return Motion(recording, recorded, (piece,), *steps)

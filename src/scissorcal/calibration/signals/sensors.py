@@ -179,7 +179,8 @@ def _marks_in(values: Array) -> tuple[float, ...]:
     the next value than all values within the ends are apart. What is sampled while it moves has
     values on its way, so that no measurement lies so far off; a single spike never repeats. A value
     that is held for more of the time than ``INVALID_LIMIT`` may be a level, unless it lies ``FAR``
-    times farther off.
+    times farther off. Zero is what a sensor shows without a load, and a mark only where it never
+    stands for two samples in a row: no load goes and returns between two samples, time and again.
     """
     levels, counts = np.unique(values, return_counts=True)
     if len(levels) < FEWEST_LEVELS:
@@ -190,6 +191,7 @@ def _marks_in(values: Array) -> tuple[float, ...]:
         float(levels[end])
         for end, away in zip((0, -1), apart, strict=True)
         if counts[end] > 1
+        and not (levels[end] == 0.0 and np.any((values[1:] == 0.0) & (values[:-1] == 0.0)))
         and away > inside * (1.0 if counts[end] <= INVALID_LIMIT * len(values) else FAR)
     )
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.probe.joint_fit import JointFit, fit_joint, swings_of, travel_of
+from scissorcal.device.probe.joint_fit import fit_joint, swings_of, travel_of
+from scissorcal.device.probe.joint_posterior import JointFit
 from scissorcal.device.probe.joint_values import NAMES, Prior, Push
 from scissorcal.device.probe.pushes import MOVED_STEPS, Axis, Pushed, push
 from scissorcal.device.probe.talk import Talk
@@ -94,14 +95,15 @@ def _fitted(
 ) -> JointFit:
     """Fit with motors and stream off: a device ends a stream after 5 s without a frame.
 
-    Where the mode that was followed so far does not explain the pushes, it is sought anew.
+    Where the mode that was followed so far does not explain the pushes, it is sought anew; with
+    ``modes`` others are sought in any case.
     """
     some = pushes_of(talk, pushes, least, prior.stop, axis.seen)
     with talk.paused():
         fit = fit_joint(some, prior, noise_rad, start=start, modes=modes)
-        if fit.misfit <= EXPLAINED and not fit.strange:
+        if modes or (fit.misfit <= EXPLAINED and not fit.strange):
             return fit
-        anew = fit_joint(some, prior, noise_rad, modes=True)
+        anew = fit_joint(some, prior, noise_rad, modes=False)
         return min(fit, anew, key=lambda one: (bool(one.strange), one.misfit))
 
 

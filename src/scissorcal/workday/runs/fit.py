@@ -178,7 +178,7 @@ def fit_step(
         critic=critic,
     )
     made = cast(FitModule, import_module(step.run)).fit(engine, request)
-    result = _with_scatter_on_record(engine, step, made.result)
+    result = _on_record(engine, step, made.result)
     save_anywhere(engine, step, result, made.draw, save_to)
     state = engine.state(step.name)
     if state.state != "incomplete":
@@ -227,16 +227,18 @@ def pictures_beside(path: Path) -> tuple[Path, ...]:
     return tuple(sorted(path.with_suffix("").glob("*.png")))
 
 
-def _with_scatter_on_record(engine: Engine, step: Step, result: Any) -> Any:
-    """A law's fit of one recording, with what an earlier fit of several found them to differ by."""
-    from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD
+def _on_record(engine: Engine, step: Step, result: Any) -> Any:
+    """A law's fit with its step's version; of one recording, also with what an earlier fit of
+    several found them to differ by."""
+    from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
     from scissorcal.calibration.result import FitResult
     from scissorcal.workday.history import scatter_on_record
 
-    if not isinstance(result, FitResult) or result.diagnostics.get(NEXT_RECORDING):
+    if not isinstance(result, FitResult):
         return result
-    found = scatter_on_record(engine, step)
-    known = {**result.diagnostics, ON_RECORD: found} if found else result.diagnostics
+    known = {**result.diagnostics, STEP_VERSION: step.version}
+    if not known.get(NEXT_RECORDING) and (found := scatter_on_record(engine, step)):
+        known[ON_RECORD] = found
     return replace(result, diagnostics=known)
 
 

@@ -267,10 +267,30 @@ def test_invalid_samples_stay_marked_and_a_gap_splits_a_motion():
     usable[1000:1010] = False
     (motion,) = path_motion((made.recording,), INERTIA, (usable,))
     assert np.flatnonzero(~motion.usable).tolist() == list(range(1000, 1010))
-    samples = np.delete(made.recording.samples, np.s_[2000:2300])
-    holed = type(made.recording)(
-        kind="cut", samples=samples, strokes=(), source="", content_hash=""
-    )
-    motions = path_motion((holed,), INERTIA)
-    assert [m.start for m in motions] == [0, 2000]
+    motions = path_motion((without(made, 2000, 2300),), INERTIA)
+    assert [m.source[0] for m in motions] == [0, 2000]
     assert sum(len(m.opening) for m in motions) == 3700
+
+
+def without(made, low, high):
+    samples = np.delete(made.recording.samples, np.s_[low:high])
+    return replace(made.recording, samples=samples)
+
+
+@pytest.mark.parametrize(("missing", "kept"), [(1, True), (2, True), (3, False), (50, False)])
+def test_a_short_gap_is_bridged_and_a_longer_one_than_3_ms_is_not_used(missing, kept):
+    """The swing turns at 25 rad/s^2: a gap of 2 ms leaves its opening to a microradian."""
+    made = record(swing(4.0), spring)
+    (motion,) = path_motion((without(made, 1500, 1500 + missing),), INERTIA)
+    whole = motion_of(made)
+    inside = slice(1500, 1500 + missing)
+    assert len(motion.opening) == 4000
+    assert np.all(motion.usable[inside] == kept)
+    assert motion.usable.sum() >= 4000 - missing
+    assert np.all(motion.source[inside] == 1499)
+    assert motion.source[1500 + missing] == 1500
+    assert motion.resolution == pytest.approx(whole.resolution, rel=0.01)
+    beside = np.r_[1400:1500, 1500 + missing : 1600 + missing]
+    np.testing.assert_allclose(motion.opening[beside], whole.opening[beside], atol=2e-6)
+    if kept:
+        np.testing.assert_allclose(motion.opening[inside], whole.opening[inside], atol=2e-6)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.signals.segments import pieces_of, sheets_of
+from scissorcal.calibration.signals.segments import Bridged, bridge, sheets_of
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of
 
@@ -44,20 +44,22 @@ HELD = 0.5
 
 @dataclass(frozen=True)
 class PathMotion:
-    """One stretch of a recording without a gap; arrays (n,) by sample.
+    """One stretch of a recording whose gaps are short; arrays (n,) by sample.
 
+    ``source`` are the samples' places in the recording (:func:`~.signals.segments.bridge`).
     ``opening`` (rad) and ``rate`` (rad/s) are smoothed, ``advance`` (m) is as measured. ``drive``
     (N m) is the mean drive from each sample to the next, had it been measured without delay;
     ``drive_step`` its change over that tick, by which a delay of one tick would lower it.
     ``torque`` (N m) is what the drive and the acceleration leave unexplained at each sample, from
     unsmoothed positions: rough, but with nothing filtered out. ``usable`` is false where a sensor's
-    sample is invalid for longer than BRIDGED_S, ``standing`` true where the blades do not turn.
+    samples are invalid or missing for longer than BRIDGED_S, ``standing`` true where the blades do
+    not turn.
     ``opening_sd`` and ``rate_sd`` (n,) are the errors of opening and rate, ``resolution`` the
     encoder's step, ``advance_sd`` (m) the error of a place along the cut.
     """
 
     recording: int
-    start: int
+    source: Integers
     time_s: Array
     opening: Array
     rate: Array
@@ -80,7 +82,7 @@ class PathMotion:
 def path_motion(
     recordings: tuple[Recording, ...], inertia: float, usable: tuple[Mask, ...] | None = None
 ) -> tuple[PathMotion, ...]:
-    """Smooth the motion of recordings, one stretch without a gap after the other.
+    """Smooth the motion of recordings, one stretch after the other; short gaps are bridged.
 
     ``inertia`` (kg m^2) relates position and drive; the unexplained torque is modelled as a random
     walk. The most probable positions follow the measured drive exactly, and the encoder within its
@@ -92,31 +94,32 @@ def path_motion(
     offset = 0
     for index, recording in enumerate(recordings):
         good = np.ones(len(recording.samples), dtype=bool) if usable is None else usable[index]
-        sheets = sheets_of(recording)
-        for low, high in pieces_of(recording):
-            found.append(_piece(recording, index, (low, high), inertia, good, sheets, offset))
+        bridged = bridge(recording, good)
+        sheets = sheets_of(bridged.recording)
+        found += [_piece(bridged, index, b, inertia, sheets, offset) for b in bridged.pieces]
         offset += len(recording.strokes)
     return tuple(found)
 
 
 def _piece(
-    recording: Recording,
+    bridged: Bridged,
     index: int,
     bounds: tuple[int, int],
     inertia: float,
-    usable: Mask,
     sheets: Integers,
     stroke_offset: int,
 ) -> PathMotion:
     part = slice(*bounds)
+    recording, recorded = bridged.recording, bridged.recorded[part]
     samples, time = recording.samples[part], recording.device_time_s[part]
     tick_s = float((time[-1] - time[0]) / (len(time) - 1))
     position = np.asarray(samples["opening"], dtype=np.float64)
+    advance = np.asarray(samples["advance"], dtype=np.float64)
     measured = np.asarray(recording.drive_effort[part], dtype=np.float64)
-    measured, good = _bridged(measured, usable[part], round(BRIDGED_S / tick_s))
+    measured, good = _without_brief(measured, bridged.usable[part], round(BRIDGED_S / tick_s))
     step = np.append(np.diff(measured), 0.0)
     drive = measured + HELD * step
-    seen = resolution_of(position)
+    seen = resolution_of(position[recorded])
     resolution = seen if np.isfinite(seen) else FINEST_STEP
     model = _Dynamics(position, drive, tick_s, inertia, resolution)
     walk = _local_walk(model, _torque_walk(model))
@@ -127,11 +130,11 @@ def _piece(
     stroke = np.asarray(samples["stroke"], dtype=np.int64)
     return PathMotion(
         recording=index,
-        start=bounds[0],
+        source=bridged.source[part],
         time_s=time,
         opening=smooth,
         rate=_rate(smooth, tick_s),
-        advance=np.asarray(samples["advance"], dtype=np.float64),
+        advance=advance,
         drive=drive,
         drive_step=step,
         torque=rough,
@@ -144,11 +147,11 @@ def _piece(
         opening_sd=_error(model, walk, np.ones(1)),
         rate_sd=_error(model, walk, RATE_WEIGHTS[::-1] / tick_s),
         resolution=resolution,
-        advance_sd=_place_sd(np.asarray(samples["advance"], dtype=np.float64)),
+        advance_sd=_place_sd(advance[recorded]),
     )
 
 
-def _bridged(measured: Array, usable: Mask, most_ticks: int) -> tuple[Array, Mask]:
+def _without_brief(measured: Array, usable: Mask, most_ticks: int) -> tuple[Array, Mask]:
     """Values (n,) with brief invalid stretches replaced, and which of them can be used then."""
     good = np.flatnonzero(usable)
     if len(good) < 2:

@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.path import PathMotion, path_motion
+from scissorcal.calibration.signals.segments import bridge
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 MOVED_HZ = 15.0
 """Motion up to here is kept however coarse an encoder is: excitations of the inertia end here."""
@@ -47,9 +49,13 @@ class SmoothPiece:
 
 @dataclass(frozen=True)
 class Motion:
-    """A recording to be simulated: its pieces, and its channels' resolutions (NaN for none)."""
+    """A recording to be simulated: its pieces, and its channels' resolutions (NaN for none).
+
+    Short gaps of ``recording`` are bridged; ``recorded`` (m,) are the samples that it had before.
+    """
 
     recording: Recording
+    recorded: Mask
     pieces: tuple[SmoothPiece, ...]
     opening_step: float
     advance_step: float
@@ -59,7 +65,7 @@ class Motion:
         """The recording with the same motion, quantised again, and with other drives.
 
         ``drives`` are by piece and sample (N m): motor less handle. The handle's force, labels and
-        time stamps are kept; samples outside the pieces stay as they were.
+        time stamps are kept, and so are gaps; samples outside the pieces stay as they were.
         """
         samples = self.recording.samples.copy()
         radius = self.recording.handle_radius_m
@@ -75,7 +81,7 @@ class Motion:
             added = hand if np.ndim(hand) == 0 else np.asarray(hand)[span]
             motor[span] = _stepped(drive + added, 0.0, self.torque_step)
         samples["motor_torque"] = motor
-        return replace(self.recording, samples=samples)
+        return replace(self.recording, samples=samples[self.recorded])
 
 
 def motion_of(
@@ -89,32 +95,36 @@ def motion_of(
     that torque is as large as a noise of ``unseen_Nm`` (N m) a sample: it grows with the
     frequency's square.
     """
+    bridged = [bridge(one, np.ones(len(one.samples), dtype=bool)) for one in recordings]
+    filled = tuple(one.recording for one in bridged)
     found: dict[int, list[SmoothPiece]] = {index: [] for index in range(len(recordings))}
-    for motion in path_motion(recordings, inertia):
+    for motion in path_motion(filled, inertia):
         shown = unseen_Nm * np.sqrt(12.0) / (inertia * motion.resolution)
         kept_Hz = max(float(np.sqrt(shown)) / (2.0 * np.pi), MOVED_HZ)
         smoothing = HALF_SD / kept_Hz / motion.tick_s
-        found[motion.recording].append(_piece(motion, recordings[motion.recording], smoothing))
+        found[motion.recording].append(_piece(motion, filled[motion.recording], smoothing))
     return tuple(
         Motion(
-            recording,
+            one.recording,
+            one.recorded,
             tuple(found[index]),
-            _step(recording, "opening"),
-            _step(recording, "advance"),
-            _step(recording, "motor_torque"),
+            _step(recordings[index], "opening"),
+            _step(recordings[index], "advance"),
+            _step(recordings[index], "motor_torque"),
         )
-        for index, recording in enumerate(recordings)
+        for index, one in enumerate(bridged)
     )
 
 
 def _piece(motion: PathMotion, recording: Recording, smoothing: float) -> SmoothPiece:
-    span = slice(motion.start, motion.start + len(motion.opening))
+    start = int(motion.source[0])
+    span = slice(start, start + len(motion.opening))
     load = np.zeros(len(motion.opening))
     if not np.isnan(recording.handle_radius_m):
         force = np.asarray(recording.samples["handle_force"][span], dtype=np.float64)
         load = recording.handle_radius_m * force
     return SmoothPiece(
-        start=motion.start,
+        start=start,
         opening=_smoothed(motion.opening, smoothing),
         advance=_smoothed(motion.advance, SLEDGE_SD),
         load=load,
