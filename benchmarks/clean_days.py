@@ -1,6 +1,6 @@
 """Verdicts and intervals on days without a fault: what fails by chance, and what intervals hold.
 
-    python -m benchmarks.clean_days --count 200 [--first 1] [--rig own|second|coarse|coarser] [--json FILE]
+    python -m benchmarks.clean_days --count 200 [--first 1] [--rig RIG] [--json FILE]
 
 Each day has another rig and another material, drawn around a recipe's own; recipes take turns
 (paper, cloth, press-only and, on every tenth day, photographs). It is captured in virtual time and

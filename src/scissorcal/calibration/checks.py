@@ -7,18 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.fit_candidate import SEARCH_REACH, FittedCandidate
-from scissorcal.calibration.result import StrokeError, worst_stroke
+from scissorcal.calibration.result import PRIOR_ONLY, StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference import Posterior, SearchStatus
-from scissorcal.inference.importance import ADAPTED_LIMIT
-from scissorcal.inference.importance import K_HAT_LIMIT as K_HAT_LIMIT
+from scissorcal.inference.importance import ADAPTED_LIMIT, K_HAT_LIMIT
 from scissorcal.inference.status import SamplingStatus
 from scissorcal.model.friction_terms import NEAR_REST
 from scissorcal.verdicts import Status, Verdict, judge, not_evaluated
 
-PRIOR_ONLY = 0.9
-"""A posterior at least this share of its prior's width says that the data are silent."""
 FEWEST_INDEPENDENT = 10.0
 """Independent observations wanted per parameter."""
 HELD_OUT_LIMIT = 0.2

@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Effort = Literal["draft", "standard", "thorough"]
 
+PRIOR_ONLY = 0.9
+"""A posterior at least this share of its prior's width says that the data are silent."""
+
 MANY = 10.0
 """Degrees of freedom from which the approximation of Wilson and Hilferty is the closer one."""
 

@@ -13,8 +13,7 @@ from scissorcal.calibration.caveats import (
     next_recording_sd,
     next_recording_sentence,
 )
-from scissorcal.calibration.checks import K_HAT_LIMIT, PRIOR_ONLY
-from scissorcal.calibration.result import FitResult, FittedParameter
+from scissorcal.calibration.result import PRIOR_ONLY, FitResult, FittedParameter
 from scissorcal.report.numbers import Number, finite, scalar, shown_unit, significant
 from scissorcal.report.panel import (
     Axis,
@@ -42,7 +41,7 @@ NINETY_PERCENT = 4.605
 """Squared radius that holds 90 % of a normal distribution in the plane."""
 
 MEANINGS = {
-    "k_hat": f"Tail of the importance weights: above {K_HAT_LIMIT} no draws can be used.",
+    "k_hat": "Tail of the importance weights, which the check k-hat judges.",
     "effective_samples": "Number of independent draws that the posterior's are worth.",
     "evaluations": "Number of evaluations of the model.",
     "observations": "Number of bins in the likelihood.",
