@@ -56,6 +56,21 @@ def critique(recording: Recording, seed: int, template):
     return criticise("friction", chosen, law.bins, None, recording.joint, rng)
 
 
+def test_fewer_bins_than_terms_are_criticised_too(template):
+    """Eight strokes of five bins, where law and library have some sixty columns."""
+    recording = friction_recording(Truth(), np.random.default_rng(101), QUICK)
+    law = friction_experiment((recording,), SIMPLE, template)
+    strokes = np.unique(law.strokes)[:8]
+    few = [np.flatnonzero(law.strokes == stroke)[::7][:5] for stroke in strokes]
+    kept = np.isin(np.arange(len(law.strokes)), np.concatenate(few))
+    law = dataclasses.replace(
+        law, windows=law.windows.where(kept), strokes=law.strokes[kept], shared=None, share=None
+    )
+    chosen = fit_candidate(law.candidate(law.observed), law.series, law.strokes)
+    rng = np.random.default_rng(0)
+    assert isinstance(criticise("friction", chosen, law.bins, None, recording.joint, rng), Critique)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MISSING)
 def test_a_missing_term_is_recovered_in_nine_of_ten_recordings(name, template):

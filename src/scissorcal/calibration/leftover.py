@@ -225,18 +225,24 @@ def tabulate(
         return np.column_stack([law[here], *columns, left[here]])
 
     strokes = list(by_label(chosen.strokes).values())
-    together = -(-len(strokes) // MOST_STROKES)
+    groups = min(len(strokes), MOST_STROKES)
     usual = float(np.median([len(here) for here in strokes]))
     counts = [max(1, round(len(here) / usual)) for here in strokes]
     split = [np.array_split(here, PARTS * n) for here, n in zip(strokes, counts, strict=True)]
     parts = [part for stroke in split for part in stroke]
-    rows_of = [(k // together, at) for k, stroke in enumerate(split) for at in range(len(stroke))]
+    rows_of = [
+        (k * groups // len(strokes), at)
+        for k, stroke in enumerate(split)
+        for at in range(len(stroke))
+    ]
     places = {row: place for place, row in enumerate(sorted(set(rows_of)))}
     blocks = _blocks(parts)
     corner = rows(parts[0][:0])
     for block in blocks:
         every = rows(np.concatenate(block))
         corner = np.asarray(np.linalg.qr(np.vstack([corner, every]), mode="r"))
+    lacking = max(corner.shape[1] - len(corner), 0)
+    corner = np.pad(corner, ((0, lacking), (0, 0)))  # fewer bins than columns: the rest is 0
     size = np.sqrt(np.sum(corner**2, axis=0) / len(left))
     size[-1] = 1.0
     unit = corner / np.where(size > 0.0, size, 1.0)

@@ -87,7 +87,8 @@ def compare_with_replay(
     if len(strokes) < FEWEST_STROKES:
         return None
     closing = [places[label] for label in strokes]
-    tried = range(0, len(closing), -(-len(closing) // MOST_TRIED))
+    count = min(len(closing), MOST_TRIED)
+    tried = [k * len(closing) // count for k in range(count)]
     replays = [replay_from_stroke(bins.opening[closing[k]], measured[closing[k]]) for k in tried]
     errors = _left_in_others(replays, tried, closing, bins.opening, measured)
     best = int(np.argmin(errors))
@@ -140,7 +141,8 @@ def _left_in_others(
 ) -> list[float]:
     """Sum of squares that each replay leaves in all strokes but its ``own``, held beyond its ends.
 
-    What is not known of the others, NaN, counts for nothing.
+    What is not known of the others, NaN, counts for nothing; a replay of which nothing is known
+    leaves infinitely much.
     """
     every = np.concatenate(strokes)
     opening, measured = opening[every], measured[every]
@@ -149,7 +151,8 @@ def _left_in_others(
     for replay, k in zip(replays, own, strict=True):
         squares = (measured - replay(opening)) ** 2
         squares[ends[k] : ends[k + 1]] = 0.0
-        found.append(float(np.nansum(squares)))
+        known = bool(np.any(np.isfinite(replay.torque)))
+        found.append(float(np.nansum(squares)) if known else np.inf)
     return found
 
 

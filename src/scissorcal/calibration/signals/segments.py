@@ -68,9 +68,8 @@ def bridge(recording: Recording, usable: Mask) -> Bridged:
     The zero-phase filter looks about so far, which is what an end of a piece costs. With a gap
     filled, the filter sees its neighbours on either side, and only windows that touch the gap are
     lost. The opening follows the cubic that has the places and the rates of both ends, so that the
-    filtered rate beside the gap stays right; the other channels follow the line. No made-up sample
-    is ever compared with a model: ``usable`` (m,) comes back with them as False. Longer gaps stay,
-    and part the recording. Raises InputError where the clock stands still.
+    filtered rate beside the gap stays right; the other channels follow the line. ``usable`` (m,)
+    comes back with made-up samples as False. Longer gaps stay, and part the recording. Raises InputError where the clock stands still.
     """
     time = recording.device_time_s
     count = np.arange(len(time))

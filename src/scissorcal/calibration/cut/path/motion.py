@@ -117,6 +117,7 @@ def _piece(
     advance = np.asarray(samples["advance"], dtype=np.float64)
     measured = np.asarray(recording.drive_effort[part], dtype=np.float64)
     measured, good = _without_brief(measured, bridged.usable[part], round(BRIDGED_S / tick_s))
+    good &= ~_beside(~recorded & ~good, len(RATE_WEIGHTS) // 2)
     step = np.append(np.diff(measured), 0.0)
     drive = measured + HELD * step
     seen = resolution_of(position[recorded])
@@ -162,6 +163,12 @@ def _without_brief(measured: Array, usable: Mask, most_ticks: int) -> tuple[Arra
     whole[inside] |= apart[at[inside]] <= most_ticks
     line = np.interp(np.arange(len(usable)), good, measured[good])
     return np.where(whole & ~usable, line, measured), whole
+
+
+def _beside(here: Mask, reach: int) -> Mask:
+    """Samples (n,) at most ``reach`` from a marked one: their rate is taken from its position."""
+    near = np.convolve(here, np.ones(2 * reach + 1))[reach : len(here) + reach]
+    return np.asarray(near > 0.5)
 
 
 def _rate(opening: Array, tick_s: float) -> Array:

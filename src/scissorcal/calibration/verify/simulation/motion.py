@@ -98,11 +98,12 @@ def motion_of(
     bridged = [bridge(one, np.ones(len(one.samples), dtype=bool)) for one in recordings]
     filled = tuple(one.recording for one in bridged)
     found: dict[int, list[SmoothPiece]] = {index: [] for index in range(len(recordings))}
-    for motion in path_motion(filled, inertia):
+    for motion in path_motion(recordings, inertia):  # of filled ones, steps would seem finer
         shown = unseen_Nm * np.sqrt(12.0) / (inertia * motion.resolution)
         kept_Hz = max(float(np.sqrt(shown)) / (2.0 * np.pi), MOVED_HZ)
         smoothing = HALF_SD / kept_Hz / motion.tick_s
-        found[motion.recording].append(_piece(motion, filled[motion.recording], smoothing))
+        start = int(np.searchsorted(bridged[motion.recording].source, motion.source[0]))
+        found[motion.recording].append(_piece(motion, start, filled[motion.recording], smoothing))
     return tuple(
         Motion(
             one.recording,
@@ -116,8 +117,9 @@ def motion_of(
     )
 
 
-def _piece(motion: PathMotion, recording: Recording, smoothing: float) -> SmoothPiece:
-    start = int(motion.source[0])
+def _piece(
+    motion: PathMotion, start: int, recording: Recording, smoothing: float
+) -> SmoothPiece:
     span = slice(start, start + len(motion.opening))
     load = np.zeros(len(motion.opening))
     if not np.isnan(recording.handle_radius_m):
