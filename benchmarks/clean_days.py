@@ -11,7 +11,8 @@ at the middle opening, mean of both directions and half their difference, at fou
 is the rig of tests/second_rig, whose motion, friction and crack share no code with the product;
 ``coarse`` the same behind 20,000 counts, with a late motor, ``coarser`` behind 8,192. Their days
 are fitted without a package.
-All of its friction builds up after a turn, a share of 1, which no interval of a share holds.
+All friction of the coarse rigs builds up after a turn, a share of 1, which no interval of a share
+holds.
 """
 
 import json

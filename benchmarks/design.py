@@ -1,6 +1,6 @@
 """Designed against listed captures on virtual days: minutes until the tolerance, predicted bands.
 
-    python benchmarks/design.py --first 9400 --count 20 [--second-rig 10] [--json rows.json]
+    python -m benchmarks.design --first 9400 --count 20 [--second-rig 10] [--json rows.json]
 
 Each day has another rig and another material, drawn around the recipe's own (the first rig's
 specimen by 15 %, the second rig's material and friction by 30 %). On each day two captures are

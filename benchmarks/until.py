@@ -1,6 +1,6 @@
 """Captures until the tolerance against the recipe's list on virtual days: minutes, band, coverage.
 
-    python benchmarks/until.py --first 9450 --count 20 [--effort standard] [--json rows.json]
+    python -m benchmarks.until --first 9450 --count 20 [--effort standard] [--json rows.json]
 
 Each day has another specimen, drawn around the recipe's own as in `benchmarks/design.py`, on a rig
 that was probed. Friction

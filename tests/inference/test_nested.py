@@ -1,11 +1,15 @@
 """A curved posterior is sampled by a proposal that follows it."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from scissorcal.inference import Problem, infer
+from scissorcal.inference.importance import sample_by_proposal
+from scissorcal.inference.infer import _following
+from scissorcal.inference.laplace import laplace, shape_at
 from scissorcal.inference.nested import DEPTH, nested_mixture
 
 WIDE, NARROW, BEND = 1.0, 0.05, 2.0
@@ -61,6 +65,7 @@ def test_a_normal_posterior_has_components_along_its_own_axes() -> None:
         np.zeros(2),
         covariance,
         (1,),
+        10_000,
     )
     assert found is not None
     assert found.centres[:, 0] == pytest.approx(0.99 * found.centres[:, 1], abs=1e-6)
@@ -75,28 +80,70 @@ def test_there_is_no_proposal_where_the_density_is_not_finite() -> None:
     def beside_an_edge(points: np.ndarray) -> np.ndarray:
         return np.where(points[:, 0] > 0.0, -np.inf, -0.5 * np.sum(points**2, axis=1))
 
-    assert nested_mixture(beside_an_edge, np.zeros(2), np.eye(2), (1,)) is None
+    assert nested_mixture(beside_an_edge, np.zeros(2), np.eye(2), (1,), 10_000) is None
 
 
-def believed(away: float) -> Problem:
-    """Data that see x0 - exp(x1) fall off, and priors N(0, 1) of x0 and N(away, 0.3) of x1."""
-    plain = ridge()
-
-    def terms(u: np.ndarray) -> np.ndarray:
-        return np.array([-0.5 * (np.exp(u[0] - np.exp(u[1])) / 0.1) ** 2])
-
-    def log_prior(u: np.ndarray) -> float:
-        return -0.5 * float(u[0] ** 2 + ((u[1] - away) / 0.3) ** 2)
-
-    starts = np.array([[0.0, away]])
-    sized = replace(plain, prior_sd=np.array([1.0, 0.3]), starts=starts)
-    return replace(sized, log_likelihood_terms=terms, log_prior=log_prior)
+def test_there_is_none_where_the_budget_is_too_small() -> None:
+    standard = partial(np.einsum, "ki,ki->k")
+    assert nested_mixture(lambda x: -0.5 * standard(x, x), np.zeros(3), np.eye(3), (1,), 40) is None
 
 
-@pytest.mark.parametrize("effort", ["draft", "standard"])
-def test_where_nothing_of_the_ridge_is_left_the_prior_keeps_its_shape(effort: str) -> None:
-    """At exp(x1) = 7.4 data tell nothing: both are their priors."""
-    found = infer(replace(believed(2.0), curved=(0, 1)), effort, np.random.default_rng(0))  # type: ignore[arg-type]
-    assert found.draws.mean(axis=0) == pytest.approx([0.0, 2.0], abs=0.1)
-    assert found.draws.std(axis=0) == pytest.approx([1.0, 0.3], rel=0.07)
-    assert found.evaluations < 5000
+def test_a_bend_along_one_axis_leaves_the_others_their_reach() -> None:
+    """x3 follows 2 x0^2: of 400 nodes those along x0 lie nearer, the other axes reach as far."""
+
+    def height(points: np.ndarray) -> np.ndarray:
+        off = points[:, 3] - 2.0 * points[:, 0] ** 2
+        return -0.5 * (np.sum(points[:, :3] ** 2, axis=1) + (off / 0.2) ** 2)
+
+    covariance = np.diag([1.0, 1.0, 1.0, 0.04])
+    found = nested_mixture(height, np.zeros(4), covariance, (0, 1, 2), 10**6)
+    assert found is not None
+    reach = np.abs(found.centres).max(axis=0)
+    assert np.all(reach[:3] > 2.4)
+    assert len(np.unique(found.centres[:, 0].round(6))) > len(np.unique(found.centres[:, 1]))
+    np.testing.assert_allclose(found.centres[:, 3], 2.0 * found.centres[:, 0] ** 2, atol=0.05)
+
+
+def test_more_than_three_parameters_are_refused() -> None:
+    with pytest.raises(ValueError, match="3 parameters at most"):
+        replace(ridge(), curved=(0, 1, 2, 3))
+
+
+def test_a_stretched_posterior_is_followed_in_either_coordinates() -> None:
+    """The ridge's own moments, in the coordinates before it was stretched and sheared."""
+    problem = replace(ridge(), curved=(1,))
+    pivot, stretch = np.zeros(2), np.array([[0.5, 0.2], [0.0, 0.5]])
+    local = replace(
+        laplace(problem, shape_at(problem, pivot), None),
+        stretch=stretch,
+        log_posteriors=lambda u: problem.log_posteriors(pivot + (u - pivot) @ stretch.T),
+        covariance=np.linalg.inv(stretch) @ np.diag([NARROW**2, 1.0]) @ np.linalg.inv(stretch).T,
+    )
+    sampled = [
+        sample_by_proposal(local.log_posteriors, one, 2000, np.random.default_rng(0), 200_000)
+        for one in _following(local, (1,), lambda: 10**6)
+    ]
+    assert len(sampled) == 2
+    for found in sampled:
+        assert found.trusted
+        written = local.written(found.resample(2000, np.random.default_rng(1)))
+        assert written[:, 1].std() == pytest.approx(1.0, rel=0.07)
+        off = written[:, 0] - BEND * written[:, 1] ** 2
+        assert off.std() == pytest.approx(NARROW, rel=0.07)
+
+
+def test_where_nothing_of_the_ridge_is_left_the_prior_keeps_its_shape() -> None:
+    """At exp(x1) = 7.4 data tell nothing of x0 - exp(x1): both are their priors."""
+
+    def height(points: np.ndarray) -> np.ndarray:
+        seen = (np.exp(points[:, 0] - np.exp(points[:, 1])) / 0.1) ** 2
+        return -0.5 * (seen + points[:, 0] ** 2 + ((points[:, 1] - 2.0) / 0.3) ** 2)
+
+    centre, covariance = np.array([0.0, 2.0]), np.diag([1.0, 0.09])
+    mixture = nested_mixture(height, centre, covariance, (0, 1), 10**6)
+    assert mixture is not None
+    found = sample_by_proposal(height, mixture, 2000, np.random.default_rng(0), 200_000)
+    draws = found.resample(2000, np.random.default_rng(1))
+    assert found.k_hat < 0.5
+    assert draws.mean(axis=0) == pytest.approx([0.0, 2.0], abs=0.1)
+    assert draws.std(axis=0) == pytest.approx([1.0, 0.3], rel=0.07)

@@ -115,11 +115,11 @@ class CandidateProblem(Problem):
 class Candidate:
     """One candidate model, ready to be fitted. ``key`` holds its discrete choices.
 
-    ``blocks`` and ``populations`` (n,) are as in :class:`scissorcal.inference.problem.Problem`.
+    ``blocks``, ``populations`` (n,) and ``curved`` are as in
+    :class:`scissorcal.inference.problem.Problem`.
     ``reduced`` is the same model over sums by stroke, where it has them. ``search`` finds the
     optimum where the model has a quicker way than :func:`~.optimise.find_optimum`. ``share`` is
-    the share of bins that count as independent, where it is known, ``curved`` the places of
-    parameters in which the model is not linear.
+    the share of bins that count as independent, where it is known.
     """
 
     name: str

@@ -20,8 +20,14 @@ ADAPTED_LIMIT = 0.5
 and k-hat cannot tell of what was never visited. With 0.7 a bent valley passed with a standard
 deviation 8 to 20 % too small."""
 
+NO_MEAN = 1.0
+"""k-hat above which weights have no mean, so that more draws do not help. Below, k-hat of a few
+hundred effective draws is too rough to end with: it is judged when all are drawn."""
+
 GOOD_K = 0.5
-"""k-hat above which a better proposal is sought: from there on weights have no variance."""
+"""k-hat above which a better proposal is sought: from there on weights have no variance. Where a
+posterior is known to bend, none above is trusted of the normal approximation: one of 0.67 with 183
+effective draws of EMPS had a standard deviation 35 % too small."""
 
 FEWEST_EFFECTIVE = 50.0
 """Effective draws below which k-hat counts as infinite. It is then fitted to as few weights, whose
@@ -172,7 +178,7 @@ def sample_by_proposal(
     fitted = fit_mixture(first.draws, first.weights, COMPONENTS, rng)
     batches = max(min(MORE_BATCHES, budget // (2 * count) - 2), 0)
     joined = fitted.joined(proposal, 0.5)
-    found = _enough(log_posteriors, joined, count, rng, batches, K_HAT_LIMIT)
+    found = _enough(log_posteriors, joined, count, rng, batches, NO_MEAN)
     return replace(found, wanted=float(count))
 
 

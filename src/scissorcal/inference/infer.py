@@ -32,6 +32,11 @@ Progress = Callable[[float, str], None]
 BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
 """Evaluations that sampling may take where the caller says nothing."""
 
+FOLLOWING = 450_000
+"""Evaluations beside these for following a posterior that bends: two lattices of 400 nodes, each
+node in two or three rounds of (p + 1) (p + 2) / 2 + p with p of 12 to 16, and up to 100,000 draws
+of either."""
+
 MIXTURE_TAKES = 15
 """Evaluations, in the draws asked for, that a mixture is given at least: five rounds, the draws
 that judge it, and four more batches. Only what is left beside them is kept for ensembles."""
@@ -70,10 +75,11 @@ def infer(
     importance sampling around every optimum; thorough runs independent ensembles. Where standard
     does not do well (k-hat above 0.5) it goes on by itself, unless ``escalate`` is false: with a
     proposal that follows the posterior along its ``curved`` parameters (:func:`nested_mixture`), if
-    the problem names any, else with a mixture that adapts to it. Where that still fails its check
-    (k-hat above 0.7, or 0.5 for a proposal that was adapted to draws; fewer effective draws of a
-    mixture than ``count``), and ``budget`` allows, it goes on with ensembles. What it became is
-    said in the result.
+    the problem names any, then with a mixture that adapts to it. Where that still fails its check
+    (k-hat above 0.7, or 0.5 for a proposal that was adapted to draws and for the normal
+    approximation of a problem with ``curved`` parameters; fewer effective draws of a mixture than
+    ``count``), and ``budget`` allows, it goes on with ensembles. What it became is said in the
+    result.
     ``optimum`` may be passed if it is known already, ``count`` is the number of draws, ``budget``
     the evaluations that sampling may take, ``checkpoint`` the file that ensembles resume from (see
     :func:`run_ensembles`). ``stop`` is asked before every evaluation of search and sampling whether
@@ -102,7 +108,8 @@ def infer(
     proposal = _proposal(counted, best, local)
     if stop is not None:
         local = laplace(counter.over(problem, stop), shape, spread)
-    run = _Run(problem, local, proposal, counter, rng, count, tell)
+    beside = 0 if budget else FOLLOWING
+    run = _Run(problem, local, proposal, counter, rng, count, tell, beside)
     try:
         found = run.at(effort, budget or BUDGET[effort], escalate, checkpoint)
     except NotFiniteError as error:
@@ -165,24 +172,30 @@ def _proposal(problem: Problem, best: Optimum, local: Laplace) -> Mixture:
     return Mixture.of(weights, np.stack(centres), np.stack(covariances))
 
 
-def _following(local: Laplace, along: tuple[int, ...]) -> Iterator[Mixture]:
+def _following(
+    local: Laplace, along: tuple[int, ...], left: Callable[[], int]
+) -> Iterator[Mixture]:
     """Proposals that follow a bent posterior, made in two sets of coordinates.
 
     In its own the prior is normal; in those of the likelihood before it was stretched the model is
-    linear in what does not bend. Either may be what counts.
+    linear in what does not bend. Either may be what counts. ``left`` are the evaluations that a
+    lattice may take.
     """
-    many = local.log_posteriors
-    own = nested_mixture(many, local.centre, local.covariance, along)
+    many, stretch = local.log_posteriors, local.stretch
+    own = nested_mixture(many, local.centre, local.covariance, along, left())
     if own is not None:
         yield own
+    if np.array_equal(stretch, np.eye(len(stretch))):
+        return
     written = nested_mixture(
         lambda points: many(local.stretched(points)),
         local.written(local.centre),
-        local.stretch @ local.covariance @ local.stretch.T,
+        stretch @ local.covariance @ stretch.T,
         along,
+        left(),
     )
     if written is not None:
-        yield written.mapped(local.stretched, np.asarray(np.linalg.inv(local.stretch)))
+        yield written.mapped(local.stretched, np.asarray(np.linalg.inv(stretch)))
 
 
 @dataclass(frozen=True)
@@ -210,6 +223,8 @@ class _Run:
     rng: np.random.Generator
     count: int
     tell: Progress
+    beside: int
+    """Evaluations beside the budget that following a bend may take."""
 
     def at(
         self,
@@ -249,23 +264,33 @@ class _Run:
         target, proposal = self.local.log_posterior, self.proposal
         first = self.counter.calls
         many = self.local.log_posteriors
+
+        beside = self.beside
+
+        def left() -> int:
+            return max(budget + beside - (self.counter.calls - first), 0)
+
         bends = bool(self.problem.curved) and escalate
         rounds = 1 if bends else None
         sampled = sample_by_importance(target, proposal, self.count, self.rng, rounds, many)
         said = f"k-hat {sampled.k_hat:.2f}"
-        followed = self.followed(said, budget) if bends and sampled.k_hat > GOOD_K else None
-        if followed is not None:
-            said += f", {followed.k_hat:.2f} with a proposal that follows the bend"
-            return self._weighed(followed, said)
-        if bends:
+        if bends and sampled.k_hat > GOOD_K:
+            self.tell(0.45, f"{said}: following the posterior where it bends")
+            before = self.counter.calls
+            for mixture in _following(self.local, self.problem.curved, left):
+                joined = mixture.joined(proposal, DEFENSIVE)
+                found = sample_by_proposal(many, joined, self.count, self.rng, left())
+                said += f", {found.k_hat:.2f} with a proposal that follows the bend"
+                if found.trusted:
+                    return self._weighed(found, said)
+            beside = min(beside, self.counter.calls - before)
             sampled = replace(sampled, limit=GOOD_K)
         if sampled.k_hat > GOOD_K and escalate:
             self.tell(0.5, f"{said}: one Student-t does not fit well, adapting a mixture")
-            left = budget - sampled.evaluations
-            after = left - fewest_evaluations(len(self.problem.names))
-            if after >= MIXTURE_TAKES * self.count:
-                left = after  # ensembles can follow
-            mixed = sample_by_mixture(target, sampled, proposal, self.count, self.rng, left, many)
+            after = left() - fewest_evaluations(len(self.problem.names))
+            # where those are enough, ensembles can follow
+            most = after if after >= MIXTURE_TAKES * self.count else left()
+            mixed = sample_by_mixture(target, sampled, proposal, self.count, self.rng, most, many)
             if mixed is not None:
                 said += f", {mixed.k_hat:.2f} with an adapted mixture"
                 said += f" and {mixed.effective:.0f} effective draws ({mixed.wanted:.0f} wanted)"
@@ -274,24 +299,12 @@ class _Run:
                 sampled = replace(mixed, limit=sampled.limit, wanted=0.0) if passed else mixed
         if sampled.trusted or not escalate:
             return self._weighed(sampled, said)
-        left = budget - (self.counter.calls - first)
         wanted = fewest_evaluations(len(self.problem.names))
-        if left < wanted:
-            said += f"; ensembles need at least {wanted} evaluations and {left} are left"
+        if left() < wanted:
+            said += f"; ensembles need at least {wanted} evaluations and {left()} are left"
             return self._weighed(sampled, said)
         self.tell(0.6, f"{said}: running ensembles")
-        return self._walked(left, checkpoint, sampled, f"Escalated from standard ({said}). ")
-
-    def followed(self, said: str, budget: int) -> Sampled | None:
-        """Draws of a proposal that follows the bend, where they can be trusted."""
-        self.tell(0.45, f"{said}: following the posterior where it bends")
-        for mixture in _following(self.local, self.problem.curved):
-            proposal = mixture.joined(self.proposal, DEFENSIVE)
-            many = self.local.log_posteriors
-            found = sample_by_proposal(many, proposal, self.count, self.rng, budget)
-            if found.trusted:
-                return found
-        return None
+        return self._walked(left(), checkpoint, sampled, f"Escalated from standard ({said}). ")
 
     def thorough(self, budget: int, checkpoint: Path | None) -> _Found:
         self.tell(0.4, "checking the approximation")

@@ -22,10 +22,13 @@ where the others' optimum leaves a straight line by more than its own conditiona
 from one to the next."""
 
 DEPTH = 8.0
-"""Fall of the marginal log density, in nats, at which the lattice ends: e^-8 is a tenth of what one
-of 2,000 draws weighs, times the density at 4 standard deviations of a normal."""
+"""Fall of the marginal log density, in nats, at which the lattice ends: that of a normal at 4 of
+its standard deviations, beyond which lies a tenth of what one of 2,000 draws weighs."""
 
 MOST_NODES = 400
+"""Nodes of a lattice: one of three parameters, a standard deviation apart, has 268 within
+``DEPTH``, and those beside them. Where it is too few, the highest are there."""
+
 STEP = 0.3
 """Step of differences, in conditional standard deviations, as where a fit measures curvature."""
 
@@ -58,7 +61,7 @@ class _Given:
 
 
 def nested_mixture(
-    log_posteriors: Many, centre: Array, covariance: Array, along: Sequence[int]
+    log_posteriors: Many, centre: Array, covariance: Array, along: Sequence[int], budget: int
 ) -> Mixture | None:
     """A mixture that follows a posterior along a few parameters in which it bends.
 
@@ -67,20 +70,27 @@ def nested_mixture(
     nested approximation of Rue, Martino and Chopin (2009, doi:10.1111/j.1467-9868.2008.00700.x), of
     which an importance proposal is made. ``log_posteriors`` gives those of points (k, p), shape
     (k,); ``centre`` (p,) and ``covariance`` (p, p) are the normal approximation at the optimum. The
-    lattice grows from there as long as the marginal density is within ``DEPTH`` nats of the
-    highest. None where the curvature at the centre is not finite.
+    lattice grows from there, at its highest end first, as long as the marginal density is within
+    ``DEPTH`` nats of the highest. None where the curvature at the centre is not finite, and where
+    it takes more than ``budget`` evaluations.
     """
     given, others = np.array(along), np.setdiff1d(np.arange(len(centre)), along)
     narrow = 1.0 / np.sqrt(np.diag(np.linalg.inv(covariance)))
     root = np.linalg.cholesky(covariance[np.ix_(given, given)])
+    spent = 0
+
+    def many(points: Array) -> Array:
+        nonlocal spent
+        spent += len(points)
+        return log_posteriors(points)
 
     def solved(from_node: _Given, to: Array) -> _Given | None:
         start = from_node.point.copy()
         start[given] = to
         start[others] += from_node.follow @ (to - from_node.point[given])
-        return _conditional(log_posteriors, start, given, others, narrow)
+        return _conditional(many, start, given, others, narrow)
 
-    first = _conditional(log_posteriors, centre, given, others, narrow)
+    first = _conditional(many, centre, given, others, narrow)
     if first is None:
         return None
     beside = [
@@ -91,6 +101,8 @@ def nested_mixture(
     nodes: dict[Node, _Given] = {origin: first}
     waiting, highest = [origin], first.mass
     while waiting and len(nodes) < MOST_NODES:
+        if spent > budget:
+            return None
         waiting.sort(key=lambda node: nodes[node].mass)
         here = waiting.pop()
         for node in _neighbours(here):
@@ -125,8 +137,14 @@ def _spacing(first: _Given, beside: Sequence[Sequence[_Given | None]], others: I
             wanted[axis] = 1.0 / max(1.0, float(bend @ inverse @ bend) ** 0.25)
     size = len(wanted)
     ball = (2.0 * np.pi * DEPTH) ** (0.5 * size) / gamma(0.5 * size + 1.0)
-    room = (MOST_NODES * float(np.prod(wanted)) / ball) ** (1.0 / size)
-    return np.asarray(np.minimum(1.0, wanted / min(1.0, room)))
+    found = wanted
+    for _ in range(size):  # as far apart as leaves so many nodes; none farther than one
+        wide = found < 1.0
+        lacking = ball / MOST_NODES / float(np.prod(found))
+        if lacking > 1.0 and np.any(wide):
+            share = lacking ** (1.0 / np.count_nonzero(wide))
+            found = np.minimum(1.0, np.where(wide, found * share, found))
+    return found
 
 
 def _neighbours(node: Node) -> list[Node]:

@@ -9,6 +9,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+MOST_CURVED = 3
+"""Parameters along which a lattice of 400 nodes still reaches as far as draws do."""
+
+
 @dataclass(frozen=True)
 class Problem:
     """A posterior over unconstrained parameters, shape (p,).
@@ -41,8 +45,8 @@ class Problem:
     ``smooth`` says that the log-posterior has continuous second derivatives, so that a search may
     go by differences where there are no squares.
 
-    ``curved`` are the places of parameters in which the model is not linear, three at most: a
-    posterior that bends is sampled by a proposal that follows it along these.
+    ``curved`` are the places of parameters along which a posterior bends, three at most: it is then
+    sampled by a proposal that follows it along these.
 
     ``tally`` is called before likelihoods that a subclass works out without their terms, with their
     number if they are several, so that counters see them too.
@@ -68,6 +72,8 @@ class Problem:
     tally: Callable[..., None] | None = None
 
     def __post_init__(self) -> None:
+        if len(self.curved) > MOST_CURVED:
+            raise ValueError(f"a posterior is followed along {MOST_CURVED} parameters at most")
         if self.log_posterior_many is not None and self.share != 1.0:
             raise ValueError("a posterior of many points at once counts all of its terms")
 

@@ -69,7 +69,8 @@ def bridge(recording: Recording, usable: Mask) -> Bridged:
     filled, the filter sees its neighbours on either side, and only windows that touch the gap are
     lost. The opening follows the cubic that has the places and the rates of both ends, so that the
     filtered rate beside the gap stays right; the other channels follow the line. ``usable`` (m,)
-    comes back with made-up samples as False. Longer gaps stay, and part the recording. Raises InputError where the clock stands still.
+    comes back with made-up samples as False. Longer gaps stay, and part the recording. Raises
+    InputError where the clock stands still.
     """
     time = recording.device_time_s
     count = np.arange(len(time))

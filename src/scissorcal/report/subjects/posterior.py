@@ -57,6 +57,7 @@ MEANINGS = {
     "rate_floor": "Slower samples are left out, because the sign of their rate is noise.",
     "bin_s": "Length of a bin, s.",
     "noise": "Standard deviation of the residuals.",
+    "step_version": "Version of the step that made the fit; another version may fit otherwise.",
 }
 
 

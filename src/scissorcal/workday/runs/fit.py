@@ -228,8 +228,10 @@ def pictures_beside(path: Path) -> tuple[Path, ...]:
 
 
 def _on_record(engine: Engine, step: Step, result: Any) -> Any:
-    """A law's fit with its step's version; of one recording, also with what an earlier fit of
-    several found them to differ by."""
+    """A law's fit with its step's version, and with how much recordings differ by earlier fits.
+
+    The latter is for a fit of one recording.
+    """
     from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
     from scissorcal.calibration.result import FitResult
     from scissorcal.workday.history import scatter_on_record

@@ -117,9 +117,7 @@ def motion_of(
     )
 
 
-def _piece(
-    motion: PathMotion, start: int, recording: Recording, smoothing: float
-) -> SmoothPiece:
+def _piece(motion: PathMotion, start: int, recording: Recording, smoothing: float) -> SmoothPiece:
     span = slice(start, start + len(motion.opening))
     load = np.zeros(len(motion.opening))
     if not np.isnan(recording.handle_radius_m):
