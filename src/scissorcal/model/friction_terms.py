@@ -67,7 +67,7 @@ _SURFACE = "lubricated metal has Stribeck speeds of 0.1 to 10 mm/s (Armstrong-He
 _METAL = "sliding pairs of metal have 0.05 to 0.3"
 _SCALES = "the scales of two sensors differ by less than a third"
 _ASPERITIES = "asperities yield over 1 to 50 um"
-_WHOLE = "all of it in the law of Dahl (1968); 0.43 to 0.99 with 90 %"
+_WHOLE = "all of it in the law of Dahl (1968), a tenth on EMPS; 0.18 to 0.997"
 _HELD = "a held torque is late by half a tick, and its sensor by the filter: 1 or 2 ms"
 
 _LAW = (
@@ -210,7 +210,7 @@ _LAW = (
         FREE,
         part="presliding",
         transform=LOGIT,
-        prior=Prior((0.9, 12.0, _WHOLE), (0.9, 12.0, _WHOLE)),
+        prior=Prior((0.9, 40.0, _WHOLE), (0.9, 40.0, _WHOLE)),
     ),
     Term(
         "presliding_length",

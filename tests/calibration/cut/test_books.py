@@ -75,7 +75,7 @@ def compared(rig, seed: int) -> Compared:
     for part in (*segments.pieces, *segments.stretches):
         motion = motions[part.motion]
         torque, late = mean_torque(motion, materials[part.motion].work, part.ends)
-        rows = books.rows[part.ends + motion.start]
+        rows = books.rows[part.ends + int(motion.source[0])]
         path = np.diff(rows["opening"])
         true = np.diff(rows["cut_work"]) / path * (1.0 - load * part.direction)
         felt = true > LEAST_SHARE * true.max()

@@ -47,7 +47,7 @@ SPEEDS_DIFFER = 1.5
 SAME_PERIOD = 0.03
 HARMONICS = (2, 3)
 HARMONIC_POWER = 0.25
-PERIOD_SD = 0.0014
+PERIOD_SD = 0.003
 """Relative error of the period's formula and of unevenness within a tooth: what the jackknife lacks
 of the distance to the true period, rms over 55 days of two simulated rigs of other construction."""
 
