@@ -48,8 +48,8 @@ SAME_PERIOD = 0.03
 HARMONICS = (2, 3)
 HARMONIC_POWER = 0.25
 PERIOD_SD = 0.003
-"""Relative error of the period's formula and of unevenness within a tooth: what the jackknife lacks
-of the distance to the true period, rms over 55 days of two simulated rigs of other construction."""
+"""Relative error of the period's formula and of unevenness within a tooth. Days of two simulated
+rigs have 0.11 to 0.2 %, and the study of simulated cuts more (decision 188): the largest counts."""
 
 
 @dataclass(frozen=True)
