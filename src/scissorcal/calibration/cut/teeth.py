@@ -49,7 +49,7 @@ HARMONICS = (2, 3)
 HARMONIC_POWER = 0.25
 PERIOD_SD = 0.003
 """Relative error of the period's formula and of unevenness within a tooth. Days of two simulated
-rigs have 0.11 to 0.2 %, and the study of simulated cuts more (decision 188): the largest counts."""
+rigs have 0.11 to 0.2 %; 0.14 % was too little for the study of simulated cuts (decision 188)."""
 
 
 @dataclass(frozen=True)
