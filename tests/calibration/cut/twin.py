@@ -266,7 +266,8 @@ def _running(data: CutFitData, given: CutFitParameters, table: Table, exact: boo
     if given.fracture == "rippled":
         period = m * (start - stop) / (lever - middle * (1.0 + slope**2) / (power * slope))
         shown = data.line_weight > 0.0
-        at_torque = period * (np.exp(data.line_log_torque) / torque) ** (1.0 / power)
+        seen = torque + given.offset_closing
+        at_torque = period * (np.exp(data.line_log_torque) / seen) ** (1.0 / power)
         log_period = float(data.line_weight[shown] @ np.log(at_torque[shown]))
     scaled, terms = np.zeros(len(torque)), np.zeros(len(torque))
     for low, high in zip(data.run_first[:-1], data.run_first[1:], strict=True):

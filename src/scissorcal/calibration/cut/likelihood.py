@@ -181,11 +181,8 @@ class CutLikelihood:
             for sheet in np.unique(sheets)
         ]
         joined = [np.arange(count) > 0 for count in counts]
-        weights = [
-            np.abs(run.path) if self.line and index in self.line.stretches else np.zeros(count)
-            for index, (run, count) in enumerate(zip(runs, counts, strict=True))
-        ]
-        weight = _joined(weights)
+        shown = dict(zip(self.line.stretches, self.line.weights, strict=True)) if self.line else {}
+        weight = _joined([shown.get(i, np.zeros(count)) for i, count in enumerate(counts)])
         arm = -view.lever * _joined(rate) / geometry.moving_blades
         return {
             "run_first": _starts(by_sheet),

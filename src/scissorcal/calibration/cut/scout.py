@@ -288,11 +288,11 @@ def _line(
         for index in range(len(found.segments.stretches))
     ]
     gain = 1.0 + float(found.values.get("load_share", 0.0))
+    offset = float(found.values.get("offset_closing", 0.0))
     growth = 1.0 / float(np.asarray(response.exponent))
-    periods, torques = [row[0] for row in rows], [gain * row[1] for row in rows]
+    periods, torques = [row[0] for row in rows], [gain * row[1] + offset for row in rows]
     signals = phase_signals(found.segments, found.materials, geometry, periods, torques, growth)
-    paths = [stretch.path for stretch in found.segments.stretches]
-    return find_line(signals, periods, torques, paths, near)
+    return find_line(signals, periods, torques, near)
 
 
 def _middles(found: Scouted, index: int) -> Array:

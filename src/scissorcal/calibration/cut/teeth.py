@@ -17,6 +17,7 @@ from scissorcal.calibration.cut.path import Material
 from scissorcal.calibration.cut.segments import Segments, Stretch, sledge_share
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Complex = NDArray[np.complex128]
 
 SUBDIVISIONS = 32
@@ -54,12 +55,16 @@ rigs have 0.11 to 0.2 %; 0.14 % was too little for the study of simulated cuts (
 
 @dataclass(frozen=True)
 class PhaseSignal:
-    """One stretch in the crack's phase: ``phase`` (n,) in cycles, ``torque`` (n,) in N m."""
+    """One stretch in the crack's phase: ``phase`` (n,) in cycles, ``torque`` (n,) in N m.
+
+    ``ends`` (k + 1,) are the samples between its segments.
+    """
 
     stretch: int
     stroke_speed: float
     phase: Array
     torque: Array
+    ends: Integers
 
     @cached_property
     def weight(self) -> Array:
@@ -73,10 +78,11 @@ class Line:
 
     ``log_period`` is the mean logarithm of the period (rad) over the stretches ``stretches``, where
     the mean logarithm of the torque (N m) is ``log_torque``: phases follow the local torque, so the
-    period is that of a sheet so tough, whatever this one is. ``gain`` is the power that keeps its
-    phase over what noise would leave. ``speeds`` has rows of stroke speed (rad/s), the ratio that
-    it gives and its gain. ``half`` and ``third`` are the powers at a half and a third of the line's
-    frequency over its own.
+    period is that of a sheet so tough, whatever this one is. ``weights`` has (k,) for the segments
+    of each of them: means are of the places that show the line, as its frequency is. ``gain`` is
+    the power that keeps its phase over what noise would leave. ``speeds`` has rows of stroke speed
+    (rad/s), the ratio that it gives and its gain. ``half`` and ``third`` are the powers at a half
+    and a third of the line's frequency over its own.
     """
 
     ratio: float
@@ -84,6 +90,7 @@ class Line:
     log_period: float
     log_torque: float
     stretches: tuple[int, ...]
+    weights: tuple[Array, ...]
     gain: float
     speeds: tuple[tuple[float, float, float], ...]
     half: float
@@ -110,7 +117,7 @@ def phase_signals(
 ) -> tuple[PhaseSignal, ...]:
     """Phase and torque along each stretch, from its segments' ``log_periods`` (rad).
 
-    ``expected`` are the segments' mean torques; where the material is tougher than on average the
+    ``expected`` are the segments' mean torques as they would be measured; where the material is tougher than on average the
     period is longer by the torque's ratio to the power ``growth`` (1 / n for a power law).
     """
     signals = []
@@ -125,7 +132,8 @@ def phase_signals(
         moved = moved * sledge_share(motion, geometry, low, high)
         path = np.diff(motion.opening[low : high + 1]) - moved
         phase = np.concatenate([[0.0], np.cumsum(-path / at)])
-        signals.append(PhaseSignal(index, stretch.speed, phase, motion.torque[low : high + 1]))
+        torque = motion.torque[low : high + 1]
+        signals.append(PhaseSignal(index, stretch.speed, phase, torque, stretch.ends - low))
     return tuple(signals)
 
 
@@ -133,7 +141,6 @@ def find_line(
     signals: Sequence[PhaseSignal],
     log_periods: Sequence[Array],
     expected: Sequence[Array],
-    paths: Sequence[Array],
     near: bool = False,
 ) -> Line | None:
     """Detect the teeth; None where no stroke shows them.
@@ -142,9 +149,9 @@ def find_line(
     its phase from window to window (the pulse-pair estimator of the mean frequency, Zrnic 1979,
     IEEE Trans. Geosci. Electron. GE-17, 113); the error is a jackknife over strokes, and
     ``PERIOD_SD``.
-    ``paths`` (k,) of the segments weigh the means of period and of the ``expected`` torque (k,),
-    which the phases were worked out with; ``near`` says that the expected period is right to some
-    percent, and needs no search.
+    ``log_periods`` (k,) and ``expected`` torque (k,) of the segments are those that the phases were
+    worked out with; ``near`` says that the expected period is right to some percent, and needs no
+    search.
     """
     seen = [s for s in signals if _ticks_per_cycle(s) >= LEAST_TICKS * SCAN[0]]
     if not seen:
@@ -168,11 +175,14 @@ def find_line(
     shift = np.angle(sums.sum()) / (2 * np.pi * WINDOW_CYCLES)
     jackknife = _jackknife(sums)
     where = tuple(kept)
+    by_stretch = {s.stretch: s for s in seen}
+    weights = tuple(_weights(by_stretch[i], kept[i], frequency) for i in where)
     frequency *= 1.0 + float(shift)
-    weights = np.concatenate([np.abs(paths[i]) for i in where])
 
     def mean(logs: Sequence[Array]) -> float:
-        return float(np.average(np.concatenate([logs[i] for i in where]), weights=weights))
+        return float(
+            np.average(np.concatenate([logs[i] for i in where]), weights=np.concatenate(weights))
+        )
 
     chosen = [s for s in seen if s.stretch in kept]
     own = coherent_power(chosen, frequency)
@@ -182,6 +192,7 @@ def find_line(
         log_period=mean(log_periods) - float(np.log(frequency)),
         log_torque=mean([np.log(torques) for torques in expected]),
         stretches=where,
+        weights=weights,
         gain=_gain(list(kept.values())),
         speeds=_by_speed(seen, frequency),
         half=coherent_power(chosen, frequency / 2) / own,
@@ -242,6 +253,18 @@ def _pairs(signal: PhaseSignal, frequency: float, apart: int = ONE_WINDOW) -> Co
     if amplitude is None or len(amplitude) <= apart:
         return None
     return np.asarray(amplitude[apart:] * np.conj(amplitude[:-apart]))
+
+
+def _weights(signal: PhaseSignal, pairs: Complex, frequency: float) -> Array:
+    """What each segment (k,) adds to the mean frequency that ``pairs`` give.
+
+    A pair shows the phase that is gained between the middles of its windows, half a cycle after the
+    one before. It counts as much as in the sum: by its size over the stretch's mean.
+    """
+    begins = 0.5 * WINDOW_CYCLES + 0.5 * np.arange(len(pairs))
+    ends = signal.phase[signal.ends] * frequency
+    gained = np.clip((ends - begins[:, None]) / WINDOW_CYCLES, 0.0, 1.0)
+    return np.asarray(np.diff(np.abs(pairs) @ gained) / np.abs(pairs).mean())
 
 
 def _gain(pairs: Sequence[Complex]) -> float:

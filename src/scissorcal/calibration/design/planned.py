@@ -32,8 +32,6 @@ from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Strok
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-REST_RATE = 1e-3
-"""Speed (rad/s) below which planned blades count as nearly at rest."""
 QUIET = TorqueNoise(0.0, 0.0, 0.01)
 
 
@@ -146,7 +144,7 @@ def _motion(planned: PlannedMotion, kind: str) -> Motion:
         stroke=np.zeros(count, dtype=np.int64),
         sheet=planned.sheet,
         tick_s=planned.tick_s,
-        rest_rate=REST_RATE,
+        resting=np.zeros(count, dtype=bool),
         held=True,
     )
     recorded = np.ones(count, dtype=bool)

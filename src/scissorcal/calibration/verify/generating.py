@@ -11,8 +11,10 @@ from scissorcal.calibration.verify.result import PriorKind
 
 Array = NDArray[np.float64]
 
-NOISE_SIZES = ("noise", "noise_scale")
-"""Parameters that scale the noise of the likelihood's terms."""
+NOT_SIMULATED = ("noise", "noise_scale", "rest_phase", "rest_spread")
+"""Parameters of a likelihood that simulated data have of their own: the size of the noise of its
+terms, and where in a tooth's cycle cracks come to rest. A simulated crack walks with other teeth
+along the recorded motion, so it turns at any phase."""
 
 
 @dataclass(frozen=True)
@@ -73,12 +75,11 @@ def generating_prior(
 def refit_prior(experiment: Experiment, generating: Generating) -> StatedPrior:
     """The prior of fits to simulated data: the distribution of their truths.
 
-    Noise scales keep the recipe's prior: the noise of the likelihood's terms that given noise of
-    samples causes is not known beforehand, and thousands of bins determine it.
+    What is ``NOT_SIMULATED`` keeps the recipe's prior: simulated data do not come from its truth.
     """
     own = experiment.candidate(experiment.observed)
     names = experiment.layout.names
-    kept = [i for i, name in enumerate(names) if name not in NOISE_SIZES]
+    kept = [i for i, name in enumerate(names) if name not in NOT_SIMULATED]
     mean = generating.mean if generating.kind == "local" else own.prior_mean
     covariance: Array = np.asarray(np.linalg.inv(generating.precision))
     return StatedPrior(

@@ -326,7 +326,8 @@ static double running(const sc_cut_data *data, const sc_cut_parameters *p, doubl
                 double turn = middle * (1.0 + slope * slope) / (c.power * slope);
                 double period = blades * (c.start - c.stop) / (lever - turn);
                 /* A tougher place has longer teeth: with the torque to the power 1 / c.power. */
-                double tougher = log(torque > TINY ? torque : TINY) - data->line_log_torque;
+                double seen = torque + p->offset_closing;
+                double tougher = log(seen > TINY ? seen : TINY) - data->line_log_torque;
                 line += data->line_weight[k] *
                         (log(period > TINY ? period : TINY) - tougher / c.power);
             }

@@ -42,7 +42,8 @@ typedef struct {
  * joined[k] is 1 where segment k begins where k - 1 ended. start_noise[k] is the variance of the work
  * at the segment's start, end_noise[k] at its end. line_weight sums to 1
  * over the segments that show the line, or is 0 throughout; line_log_torque is the logarithm of the
- * mean torque (N m) there at which the line's period holds. */
+ * mean measured torque (N m) there at which the line's period holds; of that, offset_closing is not
+ * the material's. */
 typedef struct {
     int32_t pieces;
     int32_t rests;

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.path import built_friction, built_up
+from scissorcal.calibration.cut.path import built_friction, built_up, straight_at_rest
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.weak_form import HELD
 from scissorcal.calibration.signals.window_length import SMOOTH
@@ -51,26 +51,25 @@ def measured_drive(
         inertia * acceleration = drive - friction - offset - cogging + material
 
     holds exactly for means around each sample, as the second difference of the positions weighs
-    them; a sample shows it a delay later. Dry friction of a joint nearly at rest is anything up to
-    its level; it is taken in proportion to the speed there.
+    them; a sample shows it a delay later. Dry friction of a joint at rest is anything up to its
+    level; it is that of the net motion there, as of a joint that creeps.
     """
-    path, tick_s = piece.opening, piece.tick_s
+    path, tick_s = straight_at_rest(piece.opening, piece.resting), piece.tick_s
     step = np.diff(path)
     middle = 0.5 * (path[1:] + path[:-1])
-    sense = np.minimum(np.abs(step) / (tick_s * piece.rest_rate), 1.0)
     law = truth.friction
     direction = built_up(path, np.sign(step), law, truth.fine_rad)
     load = 0.5 * (piece.load[1:] + piece.load[:-1])
-    dry = sense * built_friction(law, middle, step / tick_s, load, direction)
+    dry = built_friction(law, middle, step / tick_s, load, direction)
     cosine, sine, number = truth.cogging
     drive = dry + truth.offset
     drive += cosine * np.cos(number * middle) + sine * np.sin(number * middle)
-    drive -= material - truth.load_share * np.abs(material) * sense * direction
-    closing = 0.5 * (1.0 - sense * np.sign(step))
+    drive -= material - truth.load_share * np.abs(material) * direction
+    closing = 0.5 * (1.0 - np.sign(step))
     drive -= closing * truth.closing_offset + (1.0 - closing) * truth.opening_offset
     drive += _by_stroke(piece, truth.stroke_sd, rng)[:-1]
     around = _around(drive)
-    around[1:-1] += truth.inertia * np.diff(path, 2) / tick_s**2
+    around[1:-1] += truth.inertia * np.diff(piece.opening, 2) / tick_s**2
     nodes = _nodes(around, HELD if piece.held else SMOOTH)
     late = truth.delay_s / tick_s
     shown = (1.0 - late) * nodes + late * np.append(nodes[0], nodes[:-1])

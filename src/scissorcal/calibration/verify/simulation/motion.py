@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.path import PathMotion, path_motion
+from scissorcal.calibration.cut.path import PathMotion, path_motion, resting
 from scissorcal.calibration.signals.segments import bridge
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of
@@ -20,10 +20,6 @@ MOVED_HZ = 15.0
 HALF_SD = 0.1325
 """Standard deviation of a Gaussian times the frequency at which it passes 1 / sqrt(2)."""
 SLEDGE_SD = 10.0
-REST_S = 0.005
-"""A joint that moves less than one encoder step in this time is nearly at rest."""
-REST_RATES = (1e-6, 1e-2)
-"""Bounds of the resulting speed (rad/s or m/s)."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +28,7 @@ class SmoothPiece:
 
     ``opening`` (rad) and ``advance`` (m) are without steps, ``load`` (N m) is what a hand takes,
     ``stroke`` numbers movements, the rest after one counted to it; ``sheet`` is -1 for none.
-    Below ``rest_rate`` (rad/s) the joint counts as nearly at rest; ``held`` says that commands held
+    ``resting`` is true where nothing showed that the joint turns; ``held`` says that commands held
     the drive from one sample to the next.
     """
 
@@ -43,7 +39,7 @@ class SmoothPiece:
     stroke: Integers
     sheet: Integers
     tick_s: float
-    rest_rate: float
+    resting: Mask
     held: bool
 
 
@@ -61,23 +57,27 @@ class Motion:
     advance_step: float
     torque_step: float
 
-    def with_drive(self, drives: Sequence[Array]) -> Recording:
+    def with_drive(self, drives: Sequence[Array], rng: np.random.Generator) -> Recording:
         """The recording with the same motion, quantised again, and with other drives.
 
         ``drives`` are by piece and sample (N m): motor less handle. The handle's force, labels and
-        time stamps are kept, and so are gaps; samples outside the pieces stay as they were.
+        time stamps are kept, and so are gaps; samples outside the pieces stay as they were. The
+        encoders' steps lie elsewhere each time: rounded at the same places, every simulation of
+        one motion would have the same errors of position.
         """
         samples = self.recording.samples.copy()
         radius = self.recording.handle_radius_m
         hand = 0.0 if np.isnan(radius) else radius * np.asarray(samples["handle_force"])
         motor = np.asarray(samples["motor_torque"], dtype=np.float64).copy()
+        at = dict(zip(("opening", "advance"), rng.random(2).tolist(), strict=True))
         for piece, drive in zip(self.pieces, drives, strict=True):
             span = slice(piece.start, piece.start + len(piece.opening))
             for name, path, step in (
                 ("opening", piece.opening, self.opening_step),
                 ("advance", piece.advance, self.advance_step),
             ):
-                samples[name][span] = _stepped(path, float(samples[name][piece.start]), step)
+                first = float(samples[name][piece.start]) + at[name] * step
+                samples[name][span] = _stepped(path, first, step)
             added = hand if np.ndim(hand) == 0 else np.asarray(hand)[span]
             motor[span] = _stepped(drive + added, 0.0, self.torque_step)
         samples["motor_torque"] = motor
@@ -132,7 +132,7 @@ def _piece(motion: PathMotion, start: int, recording: Recording, smoothing: floa
         sheet=motion.sheet,
         tick_s=motion.tick_s,
         held=bool(np.ptp(recording.samples["torque_command"][span]) > 0),
-        rest_rate=float(np.clip(motion.resolution / REST_S, *REST_RATES)),
+        resting=resting(motion),
     )
 
 

@@ -98,7 +98,8 @@ def simulate_friction(
     """Recordings of empty motion, raw samples with the truth's noise."""
     return tuple(
         motion.with_drive(
-            [measured_drive(p, truth, np.zeros(len(p.opening) - 1), rng) for p in motion.pieces]
+            [measured_drive(p, truth, np.zeros(len(p.opening) - 1), rng) for p in motion.pieces],
+            rng,
         )
         for motion in motions
     )
@@ -111,7 +112,7 @@ def simulate_cut(
 
     A sheet that lies in two pieces of a recording, with a gap between them, is walked as one.
     """
-    return tuple(motion.with_drive(_cut_drives(motion, truth, rng)) for motion in motions)
+    return tuple(motion.with_drive(_cut_drives(motion, truth, rng), rng) for motion in motions)
 
 
 def _cut_drives(motion: Motion, truth: CutTruth, rng: np.random.Generator) -> list[Array]:
