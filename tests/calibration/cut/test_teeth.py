@@ -25,7 +25,13 @@ def stretch(rng, index, speed, ticks, *, ratio=1.0, jitter=0.05, height=1.0, noi
     ends = np.concatenate([[0.0], np.cumsum(lengths)]) + rng.uniform()
     teeth = np.interp(phase, ends, np.arange(len(ends)))
     torque = height * sawtooth(teeth) + noise * np.diff(rng.standard_normal(count + 1))
-    return PhaseSignal(index, speed, phase, torque)
+    return signal(index, speed, phase, torque)
+
+
+def signal(index, speed, phase, torque):
+    """With 20 segments of as many samples."""
+    ends = np.linspace(0, len(phase) - 1, 21).astype(int)
+    return PhaseSignal(index, speed, phase, torque, ends)
 
 
 def day(seed, strokes=6, **changes):
@@ -36,8 +42,7 @@ def day(seed, strokes=6, **changes):
 
 def found(signals, near=False) -> Line | None:
     zeros, ones = ([np.full(20, value) for _ in signals] for value in (0.0, 1.0))
-    paths = [np.full(20, 5e-3) for _ in signals]
-    return find_line(signals, zeros, ones, paths, near)
+    return find_line(signals, zeros, ones, near)
 
 
 @pytest.mark.parametrize("ratio", [0.6, 0.83, 1.0, 1.3, 2.1])
@@ -97,7 +102,7 @@ def test_there_is_no_line_in_noise(days):
     for _ in range(half):
         signals = day(0, strokes=3, height=0.0)
         white = [
-            PhaseSignal(s.stretch, s.stroke_speed, s.phase, rng.standard_normal(len(s.phase)))
+            signal(s.stretch, s.stroke_speed, s.phase, rng.standard_normal(len(s.phase)))
             for s in signals
         ]
         seen.append(found(white))
@@ -115,7 +120,7 @@ def test_encoder_counts_that_alias_move_with_the_speed():
         time = np.arange(count)
         torque = np.sin(2 * np.pi * time / 9.0 + rng.uniform(0, 6.28))
         torque += 0.2 * rng.standard_normal(count)
-        signals.append(PhaseSignal(k, speed, time / ticks, torque))
+        signals.append(signal(k, speed, time / ticks, torque))
     line = found(signals)
     assert line is None or not line.at_two_speeds
 

@@ -144,7 +144,7 @@ def _motion(planned: PlannedMotion, kind: str) -> Motion:
         stroke=np.zeros(count, dtype=np.int64),
         sheet=planned.sheet,
         tick_s=planned.tick_s,
-        resting=np.zeros(count, dtype=bool),
+        error=0.0,
         held=True,
     )
     recorded = np.ones(count, dtype=bool)

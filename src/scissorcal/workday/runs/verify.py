@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float, str], None]
 
-ALGORITHM = 5
+ALGORITHM = 6
 """Raised whenever a fit of the same inputs would give other numbers."""
 
 CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")

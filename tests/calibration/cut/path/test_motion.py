@@ -16,6 +16,7 @@ from scissorcal.calibration.cut.path import (
     torque_covariance,
     torque_noise_of,
     turning_points,
+    without_tremor,
 )
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.model import FrictionLaw
@@ -118,8 +119,24 @@ def test_friction_does_no_work_where_the_blades_stand():
     motion = replace(motion, opening=motion.opening + trembling)
     work = material_of(motion, FRICTION, 0.0).work[held]
     assert np.ptp(work) < 1e-4 * COULOMB
-    never = replace(motion, standing=np.zeros(len(way), dtype=bool))
+    never = replace(
+        motion, standing=np.zeros(len(way), dtype=bool), opening_sd=np.zeros(len(way))
+    )
     assert np.ptp(material_of(never, FRICTION, 0.0).work[held]) > 1e-3 * COULOMB
+
+
+def test_turns_within_the_error_of_a_position_take_no_work():
+    """Independent errors go back by three sds of a difference once in 37 samples; 0.7 of 5 mrad."""
+    way = np.linspace(0.5, 0.4, 2000)
+    trembling = way[999] + 5e-6 * np.random.default_rng(5).standard_normal(1000)
+    path = np.concatenate([way[:1000], trembling, way[1000:]])
+    certain = without_tremor(path, 3 * np.sqrt(2) * 5e-6)
+    assert np.abs(np.diff(path)).sum() - 0.1 > 4e-3
+    assert np.abs(np.diff(certain)).sum() - 0.1 < 8e-4
+    assert np.abs(certain - path).max() < 5e-5
+    swing = 0.45 + 1e-3 * np.sin(np.arange(2000) / 30.0)
+    assert without_tremor(swing, 2e-5) == pytest.approx(swing, abs=1e-12)
+
 
 
 def test_blades_that_creep_do_work_against_friction():

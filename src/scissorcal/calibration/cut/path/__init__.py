@@ -11,11 +11,10 @@ from scissorcal.calibration.cut.path.work import (
     material_of,
     mean_advance,
     mean_torque,
-    resting,
-    straight_at_rest,
     sums_between,
     torque_covariance,
     torque_noise_of,
+    without_tremor,
 )
 
 __all__ = [
@@ -30,10 +29,9 @@ __all__ = [
     "mean_advance",
     "mean_torque",
     "path_motion",
-    "resting",
-    "straight_at_rest",
     "sums_between",
     "torque_covariance",
     "torque_noise_of",
     "turning_points",
+    "without_tremor",
 ]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.calibration.signals.segments import Bridged, bridge, sheets_of
 from scissorcal.recording.recording import Recording
@@ -192,9 +192,13 @@ def _place_sd(advance: Array) -> float:
     return max(LEAST_PLACE_SD_M, step / np.sqrt(12.0)) if np.isfinite(step) else LEAST_PLACE_SD_M
 
 
-def turning_points(opening: Array, least: float) -> list[int]:
-    """Samples at which the opening turns, leaving out turns that are undone within ``least``."""
+def turning_points(opening: Array, least: ArrayLike) -> list[int]:
+    """Samples at which the opening turns, leaving out turns that are undone within ``least``.
+
+    ``least`` is one number or has (n,).
+    """
     turns: list[int] = []
+    apart = np.broadcast_to(least, len(opening)).tolist()
     low = high = 0
     direction = 0
     for index, value in enumerate(opening.tolist()):
@@ -202,10 +206,10 @@ def turning_points(opening: Array, least: float) -> list[int]:
             high = index
         if direction <= 0 and value < opening[low]:
             low = index
-        if direction >= 0 and value < opening[high] - least:
+        if direction >= 0 and value < opening[high] - apart[index]:
             turns.append(high)
             direction, low = -1, index
-        elif direction <= 0 and value > opening[low] + least:
+        elif direction <= 0 and value > opening[low] + apart[index]:
             turns.append(low)
             direction, high = 1, index
     return turns

@@ -2,22 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scissorcal.calibration.cut.path.motion import PathMotion
+from scissorcal.calibration.cut.path.motion import PathMotion, turning_points
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.model import FrictionLaw, friction_torque, presliding_state
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 DEFAULT_SLOW_TIME_S = 0.012
 SURE = 3.0
-"""Standard errors from which a rate has a sign: it is wrong once in 740."""
+"""Standard errors from which a difference has a sign: it is wrong once in 740."""
 
 
 def torque_noise_of(diagnostics: Mapping[str, Any]) -> TorqueNoise:
@@ -112,9 +112,10 @@ def material_of(
     ``fine_rad`` is the length over which dry friction builds up where the law lets it jump, if any.
     ``draws`` are what friction may be instead, for the doubt.
     """
-    path, turned = motion.opening, turned_path(motion)
+    path = motion.opening
+    turned = without_tremor(path, SURE * np.sqrt(2.0) * motion.opening_sd)
     step = np.diff(turned)
-    middle, rate = 0.5 * (turned[1:] + turned[:-1]), step / motion.tick_s
+    middle, rate = 0.5 * (turned[1:] + turned[:-1]), _turning_rate(motion, step)
     direction = built_up(turned, np.sign(rate), friction, fine_rad)
     law = built_friction(friction, middle, rate, 0.0, direction)
     gone = (law + offset) * step - motion.drive[:-1] * np.diff(path)
@@ -154,33 +155,35 @@ def built_friction(
     return friction_torque(whole, opening, rate, load, direction)
 
 
-def turned_path(motion: PathMotion) -> Array:
-    """The opening (n,) by which friction works: straight wherever the blades may be at rest.
+def without_tremor(path: Array, least: ArrayLike) -> Array:
+    """The opening (n,) by which friction works: turns that are undone within ``least`` are none.
 
-    Friction takes work of every motion, there and back. Where the rate is within ``SURE`` of its
-    errors of none, most of a smoothed path's motion is the encoder's error, and so is its sense;
-    its net motion counts there, at one rate.
+    Friction takes work of every motion, there and back, so what an encoder's steps leave in a
+    smoothed path would add up while the blades rest. Where the path comes back within ``least``
+    (one number, or (n,)), it goes on instead, midway between how far it was and how far back it
+    comes.
+
+    >>> without_tremor(np.array([0.0, 2, 1, 3, 9, 5]), 1.5)
+    array([0. , 1.5, 1.5, 3. , 9. , 5. ])
     """
-    return straight_at_rest(motion.opening, resting(motion))
+    turns = turning_points(path, least)
+    certain = np.array(path)
+    for first, last in pairwise([0, *turns, len(path) - 1]):
+        onward = 1.0 if path[last] >= path[first] else -1.0
+        way = onward * path[first : last + 1]
+        back = np.minimum.accumulate(way[::-1])[::-1]
+        certain[first : last + 1] = 0.5 * onward * (np.maximum.accumulate(way) + back)
+    return certain
 
 
-def resting(motion: PathMotion) -> Mask:
-    """Samples (n,) at which nothing shows that the blades turn, or which way."""
-    return np.asarray(motion.standing | (np.abs(motion.rate) < SURE * motion.rate_sd))
-
-
-def straight_at_rest(path: Array, resting: Mask) -> Array:
-    """A path (n,) that is straight over each stretch of ``resting`` samples (n,).
-
-    >>> straight_at_rest(np.array([0.0, 1, 3, 2, 4]), np.array([False, True, True, True, False]))
-    array([0. , 1. , 1.5, 2. , 4. ])
-    """
-    inside = resting.copy()
-    inside[1:] &= resting[:-1]
-    inside[:-1] &= resting[1:]
-    inside[[0, -1]] = False
-    kept = np.flatnonzero(~inside)
-    return np.asarray(np.interp(np.arange(len(path)), kept, path[kept]))
+def _turning_rate(motion: PathMotion, step: Array) -> Array:
+    """Rate (n - 1,) between samples; its mean while the blades rest."""
+    rate = step / motion.tick_s
+    still = np.concatenate([[False], motion.standing[1:] & motion.standing[:-1], [False]])
+    starts, ends = np.flatnonzero(np.diff(still.astype(int))).reshape(-1, 2).T
+    for low, high in zip(starts.tolist(), ends.tolist(), strict=True):
+        rate[low:high] = rate[low:high].mean()
+    return np.asarray(rate)
 
 
 def mean_torque(motion: PathMotion, work: Array, ends: Integers) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.path import built_friction, built_up, straight_at_rest
+from scissorcal.calibration.cut.path import built_friction, built_up
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.weak_form import HELD
 from scissorcal.calibration.signals.window_length import SMOOTH
@@ -51,21 +51,22 @@ def measured_drive(
         inertia * acceleration = drive - friction - offset - cogging + material
 
     holds exactly for means around each sample, as the second difference of the positions weighs
-    them; a sample shows it a delay later. Dry friction of a joint at rest is anything up to its
-    level; it is that of the net motion there, as of a joint that creeps.
+    them; a sample shows it a delay later. Dry friction builds up over the path's error at least,
+    whose tremor would make it jump while the joint rests.
     """
-    path, tick_s = straight_at_rest(piece.opening, piece.resting), piece.tick_s
+    path, tick_s = piece.opening, piece.tick_s
     step = np.diff(path)
     middle = 0.5 * (path[1:] + path[:-1])
     law = truth.friction
-    direction = built_up(path, np.sign(step), law, truth.fine_rad)
+    sense = np.sign(step)
+    direction = built_up(path, sense, law, max(truth.fine_rad, piece.error))
     load = 0.5 * (piece.load[1:] + piece.load[:-1])
     dry = built_friction(law, middle, step / tick_s, load, direction)
     cosine, sine, number = truth.cogging
     drive = dry + truth.offset
     drive += cosine * np.cos(number * middle) + sine * np.sin(number * middle)
     drive -= material - truth.load_share * np.abs(material) * direction
-    closing = 0.5 * (1.0 - np.sign(step))
+    closing = 0.5 * (1.0 - sense)
     drive -= closing * truth.closing_offset + (1.0 - closing) * truth.opening_offset
     drive += _by_stroke(piece, truth.stroke_sd, rng)[:-1]
     around = _around(drive)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.path import PathMotion, path_motion, resting
+from scissorcal.calibration.cut.path import PathMotion, path_motion
 from scissorcal.calibration.signals.segments import bridge
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of
@@ -28,8 +28,8 @@ class SmoothPiece:
 
     ``opening`` (rad) and ``advance`` (m) are without steps, ``load`` (N m) is what a hand takes,
     ``stroke`` numbers movements, the rest after one counted to it; ``sheet`` is -1 for none.
-    ``resting`` is true where nothing showed that the joint turns; ``held`` says that commands held
-    the drive from one sample to the next.
+    ``error`` (rad) is that of the opening, ``held`` says that commands held the drive from one
+    sample to the next.
     """
 
     start: int
@@ -39,7 +39,7 @@ class SmoothPiece:
     stroke: Integers
     sheet: Integers
     tick_s: float
-    resting: Mask
+    error: float
     held: bool
 
 
@@ -132,7 +132,7 @@ def _piece(motion: PathMotion, start: int, recording: Recording, smoothing: floa
         sheet=motion.sheet,
         tick_s=motion.tick_s,
         held=bool(np.ptp(recording.samples["torque_command"][span]) > 0),
-        resting=resting(motion),
+        error=float(np.median(motion.opening_sd)),
     )
 
 
