@@ -32,8 +32,8 @@ def test_the_line_is_as_far_from_the_true_period_as_it_says():
     """By the true parameters, on eight days of a rig that shares no code with the fit.
 
     The rms of eight standard normals exceeds 1.6 on 1 in 100 sets and is below 0.3 on 1 in 2,000.
-    With 0.11 % in the place of ``PERIOD_SD`` it was 1.1, and 2.3 where the period was compared at
-    the mean toughness of the material and not at that of the sheets that were cut.
+    It is 0.8, and was 2.3 where the period was compared at the mean toughness of the material and
+    not at that of the sheets that were cut.
     """
     away = []
     for seed in range(33_001, 33_009):
