@@ -117,8 +117,9 @@ def phase_signals(
 ) -> tuple[PhaseSignal, ...]:
     """Phase and torque along each stretch, from its segments' ``log_periods`` (rad).
 
-    ``expected`` are the segments' mean torques as they would be measured; where the material is tougher than on average the
-    period is longer by the torque's ratio to the power ``growth`` (1 / n for a power law).
+    ``expected`` are the segments' mean torques as they would be measured; where the material is
+    tougher than on average the period is longer by the torque's ratio to the power ``growth``
+    (1 / n for a power law).
     """
     signals = []
     for index, stretch in enumerate(segments.stretches):

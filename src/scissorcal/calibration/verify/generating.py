@@ -12,9 +12,9 @@ from scissorcal.calibration.verify.result import PriorKind
 Array = NDArray[np.float64]
 
 NOT_SIMULATED = ("noise", "noise_scale", "rest_phase", "rest_spread")
-"""Parameters of a likelihood that simulated data have of their own: the size of the noise of its
-terms, and where in a tooth's cycle cracks come to rest. A simulated crack walks with other teeth
-along the recorded motion, so it turns at any phase."""
+"""Parameters of a likelihood that a simulation does not take from the truth: the size of the noise
+of its terms, and where in a tooth's cycle cracks come to rest. A simulated crack walks with other
+teeth along the recorded motion, so it turns at any phase."""
 
 
 @dataclass(frozen=True)

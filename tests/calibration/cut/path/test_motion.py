@@ -119,9 +119,7 @@ def test_friction_does_no_work_where_the_blades_stand():
     motion = replace(motion, opening=motion.opening + trembling)
     work = material_of(motion, FRICTION, 0.0).work[held]
     assert np.ptp(work) < 1e-4 * COULOMB
-    never = replace(
-        motion, standing=np.zeros(len(way), dtype=bool), opening_sd=np.zeros(len(way))
-    )
+    never = replace(motion, standing=np.zeros(len(way), dtype=bool), opening_sd=np.zeros(len(way)))
     assert np.ptp(material_of(never, FRICTION, 0.0).work[held]) > 1e-3 * COULOMB
 
 
@@ -136,7 +134,6 @@ def test_turns_within_the_error_of_a_position_take_no_work():
     assert np.abs(certain - path).max() < 5e-5
     swing = 0.45 + 1e-3 * np.sin(np.arange(2000) / 30.0)
     assert without_tremor(swing, 2e-5) == pytest.approx(swing, abs=1e-12)
-
 
 
 def test_blades_that_creep_do_work_against_friction():
