@@ -113,7 +113,9 @@ def material_of(
     ``draws`` are what friction may be instead, for the doubt.
     """
     path = motion.opening
-    turned = without_tremor(path, SURE * np.sqrt(2.0) * motion.opening_sd)
+    # Friction that builds up takes little work of tremor, and its state follows every turn.
+    builds_up = float(np.asarray(friction["presliding_share"])) > 0.0
+    turned = path if builds_up else without_tremor(path, SURE * np.sqrt(2.0) * motion.opening_sd)
     step = np.diff(turned)
     middle, rate = 0.5 * (turned[1:] + turned[:-1]), _turning_rate(motion, step)
     direction = built_up(turned, np.sign(rate), friction, fine_rad)
