@@ -42,7 +42,7 @@ def camera_of(facts: Facts) -> tuple[Camera, tuple[str, ...]]:
     notes = check_matrix(K, width, height, place)
     coefficients = _distortion(facts, model)
     if model == "open":
-        notes.append(_said_of_open_model(coefficients))
+        notes.append(_said_of_open_model(coefficients, facts))
     fx, fy, cx, cy = (float(K[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
     bend = tuple(float(value) for value in coefficients)
     bend += (0.0,) * ((5 if len(bend) <= 5 else 8) - len(bend))
@@ -264,7 +264,7 @@ def _distortion(facts: Facts, model: str) -> Array:
 
 
 def _by_name(facts: Facts) -> tuple[str, Array]:
-    """k1, k2, p1, p2, k3 to k6 by name; those that are not stated are zero."""
+    """k1, k2, p1, p2, k3 to k6 by name, as far as they go; those between are zero."""
     stated = {
         name: _agreed([(one.place, number_at(one)) for one in facts.get(name)])
         for name in _COEFFICIENTS
@@ -274,14 +274,16 @@ def _by_name(facts: Facts) -> tuple[str, Array]:
         raise RefusedError(
             f"has k1 to k4 without p1 and p2, as a fisheye model has; {ONLY_PINHOLE}"
         )
-    return place, np.array([stated[name] or 0.0 for name in _COEFFICIENTS])
+    count = 8 if any(stated[name] is not None for name in _COEFFICIENTS[5:]) else 5
+    count = 4 if count == 5 and stated["k3"] is None else count
+    return place, np.array([stated[name] or 0.0 for name in _COEFFICIENTS[:count]])
 
 
 def _padded(values: Array, size: int) -> Array:
     return np.concatenate([values, np.zeros(size - len(values))])
 
 
-def _said_of_open_model(coefficients: Array) -> str:
+def _said_of_open_model(coefficients: Array, facts: Facts) -> str:
     count = len(coefficients)
     names = ", ".join(_COEFFICIENTS[:count])
     if not count:
@@ -291,6 +293,6 @@ def _said_of_open_model(coefficients: Array) -> str:
         )
     said = f"The file names no distortion model; its coefficients were taken as {names} "
     said += "(rational_polynomial)." if count > 5 else "(plumb_bob)."
-    if count == 4:
+    if count == 4 and not facts.get("p1", "p2"):
         said += " A fisheye calibration has four, too: check that it is none."
     return said
