@@ -84,6 +84,20 @@ REALSENSE = {
     "model": "distortion.brown_conrady",
     "coeffs": BEND,
 }
+BASALT = {
+    "value0": {
+        "T_imu_cam": [{"px": 0.0, "py": 0.0, "pz": 0.0}],
+        "intrinsics": [
+            {
+                "camera_type": "pinhole-radtan8",
+                "intrinsics": VINS["projection_parameters"]
+                | VINS["distortion_parameters"]
+                | {"k3": 0.01, "k4": 0.0, "k5": 0.0, "k6": 0.0, "rpmax": 2.7},
+            }
+        ],
+        "resolution": [[1280, 720]],
+    }
+}
 OKVIS = {
     "cameras": [
         {
@@ -164,6 +178,7 @@ def test_the_cases_are_read_or_refused_for_the_true_reason(name: str, words: str
         (VINS, "VINS"),
         (REALSENSE, "RealSense"),
         (OKVIS, "OKVIS"),
+        (BASALT, "no named program"),
     ],
 )
 def test_tools_are_read_and_named_whatever_the_heading(
@@ -289,7 +304,7 @@ def test_the_supported_model_is_read_under_any_key(tmp_path: Path, model: str) -
         ({"dist_coeffs": [*BEND[:4], "nan"]}, "'nan' is no number"),
         ({"dist_coeffs": [*BEND[:4], ".nan"]}, "not finite"),
         ({"dist_coeffs": [*BEND[:4], 1e9]}, "which no camera has"),
-        ({"dist_coeffs": "[-0.28, 0.09]"}, "has the model"),
+        ({"dist_coeffs": "[-0.28, 0.09]"}, "'[-0.28, 0.09]' is no list of numbers"),
         ({"distortion_model": "none"}, "without distortion"),
         ({"distortion_model": "plumb_bob", "dist_coeffs": [*BEND, 0.1, 0, 0]}, "5 coefficients"),
         ({"distortion_model": "plumb_bob", "camera_model": "rational"}, "has the model rational"),
@@ -302,6 +317,8 @@ def test_the_supported_model_is_read_under_any_key(tmp_path: Path, model: str) -
         ({"roi": {"x_offset": 16, "width": 640}}, "roi: x_offset is 16"),
         ({"image_scale": 0.5}, "image_scale: a scale of 0.5"),
         ({"calibrated": False}, "calibrated false"),
+        ({"calibrated_width": 2560}, "keys calibrated_width"),
+        ({"calibration_valid": False}, "keys calibration_valid"),
         ({"refraction": 1.33}, "has the keys refraction, which are not known"),
         ({"camera_matrix": {"rows": 3, "cols": 3, "data": FLAT, "unit": "mm"}}, "keys unit are"),
         ({"M2": MATRIX}, "has a second camera (M2)"),
@@ -310,6 +327,10 @@ def test_the_supported_model_is_read_under_any_key(tmp_path: Path, model: str) -
         ({"camera_matrix": [[*row, 0.0] for row in MATRIX]}, "3 x 4 numbers where a 3 x 3"),
         ({"camera_matrix": [MATRIX[0], MATRIX[1], [0.0, 1.0]]}, "rows differ in length"),
         ({"RadialDistortion": [0.1, 0.2]}, "of MATLAB"),
+        ({"FocalLength": [900, 905], "PrincipalPoint": [642, 358]}, "of MATLAB"),
+        ({"K": "900 0 642; 0 905 358; 0 0 1"}, "K: '900 0 642; 0 905 358; 0 0 1' is no list"),
+        ({"distortion_parameters": [0.1, 0.0, 0.0, 0.0]}, "which differ"),
+        ({"lens": [16.0]}, "keys lens, which are not known"),
     ],
 )
 def test_what_would_change_the_camera_is_refused_by_name(
@@ -406,6 +427,8 @@ def test_no_usual_camera_is_refused_or_noted(
 
 def test_what_the_file_leaves_open_is_noted(tmp_path: Path) -> None:
     (note,) = read(tmp_path, PLAIN | {"dist_coeffs": []}).notes
+    assert "taken as a pinhole without any" in note
+    (note,) = read(tmp_path, ROS | {"distortion_model": "", "d": []}).notes
     assert "taken as a pinhole without any" in note
     (note,) = read(tmp_path, PLAIN | {"dist_coeffs": BEND[:4]}).notes
     assert "fisheye calibration has four, too" in note

@@ -94,15 +94,17 @@ def _role(key: str, value: Any) -> str:
         role = words.HEADS[plain(head)]
         return _role(rest, value) if role == "camera" else role
     role = _role_of_name(key, plain(key), value)
-    if role == "distortion" and isinstance(value, str) and value and number_of(value) is None:
+    if role == "distortion" and _is_text(value) and value.lstrip()[:1].isalpha():
         return "model"
-    if role in ("unknown", "ignored", "model", "group") and not _is_group(value):
-        return "block" if _camera_in(value) else role
-    return "block" if role in ("unknown", "model") and _camera_in(value) else role
+    if role == "group" and not _is_group(value) and not _camera_in(value):
+        return "unknown" if isinstance(value, list) else "ignored"
+    looked_into = role in ("unknown", "model") or (role != "second" and not _is_group(value))
+    return "block" if looked_into and _camera_in(value) else role
 
 
 def _role_of_name(key: str, name: str, value: Any) -> str:
-    special = words.STRUCTURED if isinstance(value, (list, dict)) else words.SCALAR
+    structured = isinstance(value, (list, dict)) or _is_text(value)
+    special = words.STRUCTURED if structured else words.SCALAR
     if name in special:
         return special[name]
     if name in words.ROLES:
@@ -120,6 +122,10 @@ def is_off(value: Any) -> bool:
     """Whether a switch is off: false, no, none, nothing or zero."""
     off = ("false", "no", "off", "none", "null", "~", "")
     return is_zero(value) or (isinstance(value, str) and value.strip().lower() in off)
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str) and bool(value) and number_of(value) is None
 
 
 def _is_group(value: Any) -> bool:

@@ -49,13 +49,15 @@ def distortion_of(word: str) -> Distortion | Literal["open"] | None:
     ('plumb_bob', 'open', None)
     """
     spaced = _spaced(word)
+    if not word.strip():
+        return "open"
     if not _WORDS.fullmatch(spaced):
         return None
-    if re.search(r"rational|full", spaced):
+    if re.search(r"rational|full|8", spaced):
         return "rational_polynomial"
     if re.search(r"plumb|rad ?tan|radial|brown|conrady", spaced):
         return "plumb_bob"
-    if re.search(r"none|no ?distortion|rectified|undistorted|null", spaced):
+    if re.search(r"none|no ?distortion|rectified|undistorted", spaced):
         return "none"
     return "open"
 

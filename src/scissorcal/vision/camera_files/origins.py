@@ -49,10 +49,13 @@ def refuse_other_text(text: str) -> None:
 def refuse_matlab(tree: Mapping[str, Any]) -> None:
     """Raise RefusedError on MATLAB's camera parameters, whose first pixel is at 1, 1."""
     inner = [key for value in tree.values() if isinstance(value, Mapping) for key in value]
-    if {"radialdistortion", "tangentialdistortion"} & {plain(key) for key in [*tree, *inner]}:
+    names = {*tree, *inner}
+    distortion = {"radialdistortion", "tangentialdistortion"} & {plain(key) for key in names}
+    if distortion or {"FocalLength", "PrincipalPoint"} <= names or "IntrinsicMatrix" in names:
         raise RefusedError(
-            "holds camera parameters of MATLAB, whose first pixel is at 1, 1. Convert them with "
-            f"cameraIntrinsicsToOpenCV, and write {_AS_OPENCV} with jsonencode."
+            "holds camera parameters with the names of MATLAB, whose first pixel is at 1, 1. "
+            "Convert them with cameraIntrinsicsToOpenCV, and write "
+            f"{_AS_OPENCV} with jsonencode."
         )
 
 

@@ -16,11 +16,11 @@ def _table(**words: str) -> dict[str, str]:
 ROLES = _table(
     matrix="cameramatrix cameramat intrinsicmatrix intrinsicsmatrix intrinsic mtx kmatrix "
     "cameraintrinsicmatrix cameraintrinsics calibrationmatrix",
-    intrinsics="intrinsics",
+    intrinsics="intrinsics projectionparameters",
     distortion="distortioncoefficients distortioncoeffs distortioncoeff distortioncoefficient "
     "distcoeffs distcoeff distcoefs distcoef distcoefficients distortion distortions dist coeffs d "
-    "lensdistortion cameradistortion distortionvector",
-    group="projectionparameters distortionparameters camera lens",
+    "lensdistortion cameradistortion distortionvector distortionparameters",
+    group="camera lens",
     width="imagewidth width imgwidth picturewidth framewidth",
     height="imageheight height imgheight pictureheight frameheight",
     size="imagesize imgsize resolution imagedimension imagedimensions cameraresolution framesize "
@@ -58,8 +58,8 @@ STRUCTURED = _table(
 )
 """Keys that mean something else where their value is a list or a mapping."""
 
-SCALAR = _table(unknown="k d m", ignored="camera lens")
-"""Keys that mean something else where their value is one word."""
+SCALAR = _table(unknown="k d m")
+"""Keys that mean something else where their value is one number."""
 
 GROUPS = {"group", "matrix", "intrinsics", "distortion", "size", "focal", "centre"}
 """Meanings whose value may be a mapping of named numbers."""
@@ -68,7 +68,7 @@ OWN = ("matrix", "intrinsics", "fx", "f", "focal")
 """Meanings that state a focal length."""
 
 OF_A_CAMERA = {name for name, role in ROLES.items() if role in ("matrix", "intrinsics", "fx")}
-OF_A_CAMERA |= {"k", "m1", "cameramatrix1", "projectionparameters", "focallength"}
+OF_A_CAMERA |= {"k", "m1", "cameramatrix1", "focallength"}
 
 HEADS = _table(
     camera="camera camera1",
@@ -86,7 +86,7 @@ IGNORED = set(
     _table(
         record="date time timestamp stamp created createdat generated calibratedat author operator "
         "user name id uuid serial serialnumber serialno vendor manufacturer product comment "
-        "comments note notes info description version software source status header seq "
+        "comments note notes info description version software source header seq "
         "frameid topic rostopic path file filename image images imagefiles imagelist "
         "imagefolder imagedir schema generator opencv typeid index device port gain",
         calibration="rmse totalerror meanerror error errors nframes nrofframes framescount "
@@ -99,7 +99,7 @@ IGNORED = set(
         "covariance calibrationtime calibrationdate",
         rig="r p t e q rectificationmatrix projectionmatrix newcameramatrix optimalcameramatrix "
         "optimalnewcameramatrix newcamera roi1 roi2 camoverlaps timeshiftcamimu sensortype "
-        "ratehz fps framerate rgb bf newwidth newheight thdepth depthmapfactor fovx fovy",
+        "ratehz fps framerate rgb bf rpmax newwidth newheight thdepth depthmapfactor fovx fovy",
         vins="imu numofcam imutopic image0topic image1topic imagetopic outputpath cam0calib "
         "multiplethread maxcnt mindist freq fthreshold showtrack flowback equalize "
         "maxsolvertime maxnumiterations keyframeparallax accn gyrn accw gyrw gnorm "
@@ -115,7 +115,7 @@ IGNORED_KINDS = re.compile(
     r"\w*(reprojection|reproj)\w*|\w*(stddev|stdev)\w*|\w*rmse?(px|error)|numimages\w*|"
     r"(square|marker)(size|length)\w*|(chess|checker|charuco)\w*|aruco\w*|innercorners\w*|"
     r"t(cam|cn|bs|sc|bc|sb|ic|imu)\w*|bodytcam\d*|[hvd]fov\w*|exposure\w*|validroi\w*|"
-    r"(camera|lens|sensor|calibration|file|user|board|device|serial)\w*"
-    r"(name|date|time|id|number|topic|version|path|comment|notes?)|"
-    r"(created|generated|calibrated|saved)\w*"
+    r"(camera|lens|sensor|calibration|file|user|board|device|serial)"
+    r"(serial|file|info)?(name|date|time|id|number|topic|version|path|comment|notes?)|"
+    r"(created|generated|calibrated|saved)(at|on|by|with|utc|date|time)*"
 )
