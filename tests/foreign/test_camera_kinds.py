@@ -239,6 +239,7 @@ MODEL_KEYS = [
     "camera-model",
     "lens_model",
     "projection_model",
+    "cam_model",
     "Camera.type",
     "model",
     "distortion_model_name",
@@ -290,7 +291,7 @@ def test_the_supported_model_is_read_under_any_key(tmp_path: Path, model: str) -
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ({"fisheye_model": 1}, "fisheye_model is '1': the camera has a fisheye model"),
+        ({"fisheye_model": 1}, "has fisheye_model of 1: the camera has a fisheye model"),
         ({"is_fisheye": True}, "the camera has a fisheye model"),
         ({"bFishEye": "yes"}, "the camera has a fisheye model"),
         ({"mirror_parameters": {"xi": 1.2}}, "a parameter of another model"),
@@ -313,6 +314,7 @@ def test_the_supported_model_is_read_under_any_key(tmp_path: Path, model: str) -
         ({"K": MATRIX[::-1]}, "states camera_matrix and K, which differ"),
         ({"fx": 901.0}, "states camera_matrix 900 and fx 901"),
         ({"resolution": [640, 480]}, "states image_width 1280 and resolution 640"),
+        ({"binning": {"x": 2, "y": 2}}, "pictures are smaller"),
         ({"binning_x": 2}, "binning_x: it is 2: pictures are smaller"),
         ({"roi": {"x_offset": 16, "width": 640}}, "roi: x_offset is 16"),
         ({"image_scale": 0.5}, "image_scale: a scale of 0.5"),

@@ -53,9 +53,8 @@ def _model(facts: Facts) -> Distortion | Literal["open"]:
     """The distortion that the file states, or "open"; raises RefusedError on another model."""
     for entry in facts.get("switch"):
         what = refused_model(entry.place) or "another model"
-        raise RefusedError(
-            f"{entry.place} is {short(entry.value)!r}: the camera has {what}. {ONLY_PINHOLE}"
-        )
+        of = f" of {short(entry.value)}" if isinstance(entry.value, str) else ""
+        raise RefusedError(f"has {entry.place}{of}: the camera has {what}. {ONLY_PINHOLE}")
     stated = facts.get("model")
     for entry in stated:
         kind = refused_model(str(entry.value))
@@ -155,7 +154,9 @@ def _agreed(stated: Sequence[tuple[str, float]]) -> float | None:
 def _refuse_part_of_picture(facts: Facts, width: float, height: float) -> None:
     """Raise RefusedError where the pictures are binned, or a part of what the matrix is for."""
     for entry in facts.get("binning"):
-        binned = entry.value if isinstance(entry.value, list) else [entry.value]
+        value = entry.value
+        binned = list(value.values()) if isinstance(value, dict) else value
+        binned = binned if isinstance(binned, list) else [binned]
         if any(number_at(Entry(entry.place, one)) not in (0.0, 1.0) for one in binned):
             raise RefusedError(
                 f"it is {short(entry.value)}: pictures are smaller than the size of the matrix. "

@@ -78,7 +78,7 @@ HEADS = _table(
 """What stands before the point in ORB-SLAM's keys; with LEFT and RIGHT, Camera is rectified."""
 
 MODEL_KEY = re.compile(
-    r"(camera|distortion|lens|projection|intrinsics?|calibration)\w*(model|type)(name)?|"
+    r"(cam|camera|distortion|lens|projection|intrinsics?|calibration)\w*(model|type)(name)?|"
     r"model(name|type)|(distortion|projection)(name|kind)"
 )
 
