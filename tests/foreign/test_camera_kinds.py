@@ -447,7 +447,7 @@ def test_what_the_file_leaves_open_is_noted(tmp_path: Path) -> None:
         (
             '<?xml version="1.0"?>\n<calibration>\n  <projection>frame</projection>\n'
             "<width>640</width></calibration>",
-            "save it as OpenCV",
+            "save it in the format of OpenCV",
         ),
         (" Intrinsic of Color:\n  PPX:  \t642\n  Distortion: Inverse Brown Conrady\n", "RealSense"),
         ("m: !!python/object/apply:numpy.core.multiarray._reconstruct\n- 1\n", "tolist()"),

@@ -30,8 +30,8 @@ def refuse_other_text(text: str) -> None:
     if "<calibration" in text and re.search(r"<(f|projection)>", text):
         raise RefusedError(
             "is a calibration of Agisoft Metashape, which counts cx and cy from the picture's "
-            "middle and exchanges p1 and p2. In Tools > Camera Calibration, save it as OpenCV "
-            "Camera Calibration (*.xml), with b1, b2, k4, p3 and p4 fixed at zero."
+            "middle and exchanges p1 and p2. In Tools > Camera Calibration, save it in the "
+            "format of OpenCV (*.xml), with b1, b2, k4, p3 and p4 fixed at zero."
         )
     if re.search(r"\bPPX\s*:", text) and "Distortion:" in text:
         raise RefusedError(
