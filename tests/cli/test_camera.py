@@ -143,6 +143,20 @@ def test_a_camera_file_becomes_the_workspaces_camera(cli: Cli, workspace: Path) 
     assert "Imported from kalibr.yaml" in cli("fit", "camera").out
 
 
+def test_a_camera_file_of_ones_own_is_imported_with_the_model_that_was_taken(
+    cli: Cli, workspace: Path
+) -> None:
+    own = {"K": [[461.6, 0, 362.7], [0, 460.3, 248.1], [0, 0, 1]], "image_size": [752, 480]}
+    (workspace / "own.json").write_text(json.dumps(own | {"dist": [[-0.27, 0.06, 0.0, 0.0, 0.0]]}))
+    said = cli("import", "own.json")
+    assert said.code == 0
+    assert "note: The file names no distortion model; its coefficients were taken as" in said.out
+    (workspace / "cameras.txt").write_text("1 OPENCV 640 480 500 500 320 240 0 0 0 0\n")
+    said = cli("import", "cameras.txt")
+    assert said.code == 2
+    assert "COLMAP" in said.err
+
+
 @pytest.mark.parametrize(
     ("names", "words", "code"),
     [

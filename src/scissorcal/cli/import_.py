@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from scissorcal.calibration.signals.survey import Survey
     from scissorcal.recording import Recording
 
-_CAMERA_FILES = (".yaml", ".yml", ".xml")
+_CAMERA_FILES = (".yaml", ".yml", ".xml", ".json", ".ini")
+_CAMERA_NAMES = ("cameras.txt", "ost.txt")
+"""As COLMAP and camera_calibration of ROS call them."""
 
 
 def _per_channel(short: str, long: str, help_text: str) -> Any:
@@ -73,10 +75,10 @@ def import_(
     output: Output = None,
     folder: Folder = None,
 ) -> Answer:
-    """Import logs: CSV, Parquet or MATLAB .mat; or a camera from .yaml, .yml, .xml.
+    """Import logs: CSV, Parquet or MATLAB .mat; or a camera from .yaml, .yml, .xml, .json.
 
-    A camera file is one of OpenCV, ROS (camera_info) or Kalibr (camchain), and takes no option but
-    --workspace.
+    A camera file is one of OpenCV, ROS (camera_info), Kalibr (camchain), VINS, ORB-SLAM or another
+    program with the same keys, and takes no option but --workspace.
 
     For a log, channels are time, opening, advance, motor_torque, handle_force, torque_command and
     force_command; a column is a heading, a number from 0, or a variable of a .mat file (X[2] for
@@ -102,7 +104,9 @@ def import_(
     """
     import math
 
-    if len(files) == 1 and files[0].suffix.lower() in _CAMERA_FILES:
+    if len(files) == 1 and (
+        files[0].suffix.lower() in _CAMERA_FILES or files[0].name in _CAMERA_NAMES
+    ):
         return _import_camera(files[0], folder)
     if output and len(files) > 1:
         raise InputError(f"--output names one file, and {len(files)} logs are given.")
@@ -245,12 +249,20 @@ def _import_camera(file: Path, folder: Path | None) -> Answer:
     with writes_in(folder, "scissorcal import") as workspace:
         fit, read, path = import_camera(Engine.of(workspace), file)
     camera = fit.camera
-    text = (
+    lines = [
         f"{workspace.relative(path)}: camera of {camera.width} x {camera.height} from {file.name} "
-        f"({read.style})\n{camera_table(fit)}"
-    )
-    result = {"camera": camera, "style": read.style, "rms_px": read.rms_px, "fit": path}
-    return Answer(result, text, fit.verdicts, files=[path])
+        f"({read.style})",
+        camera_table(fit),
+        *(f"note: {sentence}" for sentence in read.notes),
+    ]
+    result = {
+        "camera": camera,
+        "style": read.style,
+        "rms_px": read.rms_px,
+        "fit": path,
+        "notes": read.notes,
+    }
+    return Answer(result, "\n".join(lines), fit.verdicts, files=[path])
 
 
 def pairs(option: str, given: Sequence[str] | None) -> list[tuple[str, str]]:

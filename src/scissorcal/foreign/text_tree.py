@@ -19,22 +19,21 @@ TYPE_KEY = "type_id"
 Tree = str | list[Any] | dict[str, Any]
 
 
-def parse_yaml(text: str) -> Tree:
-    """A document of YAML or JSON; ValueError with the reason where it is none.
+def parse_yaml(text: str) -> list[Tree]:
+    """The documents of YAML or JSON; ValueError with the reason where it is neither.
 
     A type such as ``!!opencv-matrix`` is the mapping's ``type_id``, as it is in JSON and XML. The
     directive ``%YAML:1.0`` of OpenCV is passed over, and so are comments of JSON that begin a line.
 
     >>> parse_yaml("rows: 3\\ndata: [1., .Nan]")
-    {'rows': '3', 'data': ['1.', '.Nan']}
+    [{'rows': '3', 'data': ['1.', '.Nan']}]
     """
     import yaml
 
     plain = re.sub(r"\A\s*%YAML:?[^\n]*\n", "", text.lstrip("\ufeff"))
     plain = re.sub(r"(?m)^\s*//[^\n]*$", "", plain).replace("\t", " ")
     try:
-        node = yaml.compose(plain, Loader=_loader())
-        return "" if node is None else _tree(node, 0)
+        return [_tree(node, 0) for node in yaml.compose_all(plain, Loader=_loader())]
     except yaml.YAMLError as error:
         raise ValueError(" ".join(str(error).split())[:120]) from None
     except RecursionError:
@@ -44,7 +43,8 @@ def parse_yaml(text: str) -> Tree:
 def parse_xml(text: str) -> dict[str, Tree]:
     """An XML document as what is within its root; ValueError with the reason where it is none.
 
-    An element with elements is a dict, of several with one name the last; one without is its text.
+    An element with elements is a dict; one without is its text. Of elements called ``_``, which
+    are a list of OpenCV, the last is kept; any other name stands once.
     """
     from xml.parsers import expat
 
@@ -58,6 +58,8 @@ def parse_xml(text: str) -> dict[str, Tree]:
 
     def end(_: str) -> None:
         name, inner, words = open_elements.pop()
+        if name in open_elements[-1][1] and name != "_":
+            raise ValueError(f"{name[:40]} stands there twice")
         open_elements[-1][1][name] = inner if set(inner) - {TYPE_KEY} else "".join(words)
 
     def refuse(*_: Any) -> None:
@@ -111,5 +113,7 @@ def _tree(node: Any, level: int) -> Tree:
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):
             raise yaml.YAMLError("a key that is not text")
+        if str(key.value) in found:
+            raise yaml.YAMLError(f"{str(key.value)[:40]} stands there twice")
         found[str(key.value)] = _tree(value, level + 1)
     return found

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.foreign.text_tree import TYPE_KEY, parse_xml, parse_yaml
+from scissorcal.foreign.text_tree import TYPE_KEY
 
 MOST_NUMBERS = 100_000
 """Numbers of one matrix; a camera's have nine and fourteen."""
@@ -23,17 +23,6 @@ _TYPE = re.compile(r"(\d{0,2})([ucwsifdhbHIL])")
 _BYTES = {"u": "<u1", "c": "<i1", "w": "<u2", "s": "<i2", "i": "<i4", "f": "<f4", "d": "<f8"}
 _BINARY_HEAD = 24
 """Bytes of text before the numbers of a matrix in base64, which repeat its type."""
-
-
-def read_storage(text: str) -> dict[str, Any]:
-    """The entries of a storage by name; ValueError with the reason where it is none.
-
-    Numbers and matrices in them are read by `number_of` and `matrix_of`.
-    """
-    found = parse_xml(text) if text.lstrip("\ufeff \t\r\n").startswith("<") else parse_yaml(text)
-    if not isinstance(found, dict):
-        raise ValueError("it has no names")  # noqa: TRY004 - the value of a file is wrong
-    return found
 
 
 def number_of(value: Any) -> float | None:

@@ -31,5 +31,5 @@ def imported_camera(read: CameraFile, file: Path) -> CameraFit:
         verdicts=(not_evaluated("fit.camera", "uncertainty", why),),
         inputs_hash=file_digest(file),
         sources=(file.name,),
-        notes=(f"Imported from {file.name} ({read.style}).",),
+        notes=(f"Imported from {file.name} ({read.style}).", *read.notes),
     )

@@ -1,0 +1,148 @@
+"""Whether a matrix is a camera's, with the figure where it is none."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scissorcal.vision.camera_files.refusal import RefusedError
+from scissorcal.vision.photo_decoding import MOST_SIDE_PX
+
+FOCAL_WIDTHS = (0.2, 20.0)
+"""Focal length in the picture's longer sides: views of 136 to 2.9 deg along that side. Wider
+pictures are not of the pinhole model, and narrower ones are of telescopes."""
+
+MOST_SKEW_PX = 0.02
+"""What a skew may shift a pixel of the top edge; corners are found to 0.02 px at best."""
+
+LARGEST_COEFFICIENT = 1e7
+"""k3 goes with the sixth power of the view: 1e6 where that is 3 deg, and bent by 1 % there."""
+
+_MOST_ROW = 1e-6
+"""Of the last row: 1e-6 of a pixel's place is 0.01 px of the largest pictures."""
+
+_MOST_STRETCH = 2.1
+"""Width over height of a pixel: fields of interlaced video and binned rows have 2."""
+
+_USUAL_STRETCH = 1.1
+_USUAL_CENTRE = 0.1
+"""Share of the picture by which a lens is off its middle; whole pictures stay well within."""
+
+
+def check_size(width: float, height: float) -> None:
+    """Raise RefusedError where no picture has this size."""
+    if not all(1.0 <= side <= MOST_SIDE_PX and side == int(side) for side in (width, height)):
+        raise RefusedError(f"has a picture size of {width:g} x {height:g}: correct it.")
+
+
+def check_matrix(K: NDArray[np.float64], width: float, height: float, place: str) -> list[str]:
+    """Notes on what is unusual; raises RefusedError where K is not the matrix of such a picture."""
+    if not np.isfinite(K).all():
+        row, column = np.argwhere(~np.isfinite(K))[0] + 1
+        raise RefusedError(
+            f"row {row}, column {column} of the matrix is not finite. Save the file again.", place
+        )
+    if not K.any():
+        raise RefusedError(
+            "the matrix is all zeros, so the camera was not calibrated. Calibrate it.", place
+        )
+    _check_form(K, width, height, place)
+    _check_focal(K, width, height, place)
+    return _check_centre(K, width, height, place)
+
+
+def _check_form(K: NDArray[np.float64], width: float, height: float, place: str) -> None:
+    unit = np.array([0.0, 0.0, 1.0])
+    sides = np.array([width, height, 1.0])
+    row, column = K[2], K[:, 2]
+    if np.abs((row - unit) * sides).max() > _MOST_ROW:
+        numbers = ", ".join(f"{value:g}" for value in row)
+        if np.allclose(column, unit):
+            raise RefusedError(
+                f"the matrix is transposed: its last row is {numbers} where 0, 0, 1 is needed. "
+                "Write its rows as columns (MATLAB and Open3D write the transpose).",
+                place,
+            )
+        raise RefusedError(
+            f"the last row of the matrix is {numbers} where 0, 0, 1 is needed. Correct it.", place
+        )
+    fx, fy = float(K[0, 0]), float(K[1, 1])
+    if min(fx, fy) <= 0.0:
+        raise RefusedError(
+            f"the focal length is {min(fx, fy):g} px, which is not positive. Correct it.",
+            place,
+        )
+    for value, name in ((float(K[0, 1]), "row 1, column 2"), (float(K[1, 0]), "row 2, column 1")):
+        shift = abs(value) * 0.5 * max(width, height) / min(fx, fy)
+        if shift > MOST_SKEW_PX:
+            raise RefusedError(
+                f"the matrix has a skew of {value:g} ({name}), which shifts pixels by {shift:.2g} "
+                f"px at the edge; {MOST_SKEW_PX:g} px is the limit. Calibrate without skew.",
+                place,
+            )
+
+
+def _check_focal(K: NDArray[np.float64], width: float, height: float, place: str) -> None:
+    longer = max(width, height)
+    low, high = FOCAL_WIDTHS
+    for name, focal in (("fx", float(K[0, 0])), ("fy", float(K[1, 1]))):
+        if not low <= focal / longer <= high:
+            raise RefusedError(
+                f"{name} is {focal:g} px, {focal / longer:.3g} picture widths; {low:g} to {high:g} "
+                "are possible. Check its unit (pixels, not mm or shares of the picture) and the "
+                "picture's size.",
+                place,
+            )
+    stretch = float(K[0, 0] / K[1, 1])
+    if not 1.0 / _MOST_STRETCH <= stretch <= _MOST_STRETCH:
+        raise RefusedError(
+            f"fx is {stretch:.3g} times fy; {1 / _MOST_STRETCH:.2g} to {_MOST_STRETCH:g} are "
+            "possible. Correct the one that is wrong.",
+            place,
+        )
+
+
+def _check_centre(K: NDArray[np.float64], width: float, height: float, place: str) -> list[str]:
+    centre = K[:2, 2]
+    off, swapped = (
+        float(np.abs(centre / sides - 0.5).max()) for sides in ((width, height), (height, width))
+    )
+    where = f"the centre is at {centre[0]:g}, {centre[1]:g} px of {width:g} x {height:g}"
+    if swapped < 0.5 * off and off > _USUAL_CENTRE and swapped < _USUAL_CENTRE:
+        raise RefusedError(
+            f"{where}, which is the middle of {height:g} x {width:g}: width and height are swapped."
+            " Exchange them.",
+            place,
+        )
+    if not all(0.0 < at < side for at, side in zip(centre, (width, height), strict=True)):
+        raise RefusedError(
+            f"{where}, outside the picture. Check that the size belongs to this matrix.", place
+        )
+    if all(at < _USUAL_CENTRE * side for at, side in zip(centre, (width, height), strict=True)):
+        raise RefusedError(
+            f"{where}, in its corner, as where it is counted from the picture's middle. Write it "
+            "from the first pixel.",
+            place,
+        )
+    notes = []
+    if off > _USUAL_CENTRE:
+        notes.append(
+            f"The {where[4:]}, {off:.0%} of the picture off its middle: check that the picture "
+            "was neither cropped nor resized after the calibration."
+        )
+    stretch = max(K[0, 0] / K[1, 1], K[1, 1] / K[0, 0])
+    if stretch > _USUAL_STRETCH:
+        notes.append(
+            f"fx is {K[0, 0]:g} and fy {K[1, 1]:g} px, so pixels are not square: check that the "
+            "order is fx, fy, cx, cy, and that the picture was not stretched."
+        )
+    return notes
+
+
+def check_coefficients(values: NDArray[np.float64], place: str) -> None:
+    """Raise RefusedError where a coefficient is not finite or larger than any lens has."""
+    if not np.isfinite(values).all():
+        raise RefusedError("a distortion coefficient is not finite. Save the file again.", place)
+    if len(values) and np.abs(values).max() > LARGEST_COEFFICIENT:
+        worst = float(values[np.abs(values).argmax()])
+        raise RefusedError(
+            f"a distortion coefficient is {worst:g}, which no camera has. Check their unit.", place
+        )
