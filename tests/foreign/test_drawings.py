@@ -175,6 +175,8 @@ def test_svgz_is_read_within_the_size_of_a_drawing(tmp_path: Path) -> None:
         ('<path d="M0 0a5 5 0 0110 0z"/>', [0, -5, 10, 0]),
         ('<path d="M0,0c0,10,10,10,10,0s10-10,10,0z"/>', [0, -7.5, 20, 7.5]),
         ('<path d="M0 0q5 10 10 0t10 0z"/>', [0, -5, 20, 5]),
+        ('<path d="M0 0q5 10 10 0s20 10 20 5z"/>', [0, 0, 30, 6.4]),
+        ('<path d="M0 0c0 9 9 9 9 0t20 5z"/>', [0, 0, 29, 6.75]),
         ('<rect width="4cm" height="1in" rx="99"/>', [0, 0, 40 * 96 / 25.4, 96]),
         ('<rect width="8" height="4" rx="auto" ry="9"/>', [0, 0, 8, 4]),
         ('<ellipse rx="5" ry="auto"/>', [-5, -5, 5, 5]),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 from xml.parsers import expat
 
-from scissorcal.recipe.svg import names, numbers
+from scissorcal.recipe.svg import names, numbers, paths
 
 MOST_SHAPES = 400
 MOST_POINTS = 4_000
@@ -159,7 +159,7 @@ class _Shapes:
         """A shape as a path; "" where it has no size."""
         if tag in ("path", "polygon", "polyline"):
             most = MOST_POINTS_OF_FILE - self._points
-            read, key = (numbers.path_data, "d") if tag == "path" else (numbers.points, "points")
+            read, key = (paths.path_data, "d") if tag == "path" else (paths.points, "points")
             text = attributes.get(key, "")
             path, count = read("" if text.strip() == "none" else text, most)
             self._points += count

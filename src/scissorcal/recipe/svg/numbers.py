@@ -1,6 +1,6 @@
-"""Lengths, transforms, paths and lists of points as SVG and CSS write them, and nothing else.
+"""Lengths and transforms as SVG and CSS write them, and nothing else.
 
-What breaks the grammar is refused: a viewer draws such a shape in part, elsewhere, or not at all.
+What breaks the grammar is refused: a viewer puts such a shape elsewhere, or draws it not at all.
 Errors are ValueErrors that begin with what is wrong.
 """
 
@@ -23,15 +23,11 @@ LONGEST_NUMBER = 1_000
 
 _MM = {"mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72.0, "pc": 25.4 / 6.0, "px": MM_PER_PX}
 _DEGREES = {"deg": 1.0, "grad": 0.9, "rad": 180.0 / math.pi, "turn": 360.0}
-_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
-_WITH_UNIT = re.compile(rf"({_NUMBER})([a-zA-Z%]*)", re.ASCII)
-_GAP = r"[ \t\r\n\f]*"
-_COMMAND = re.compile(rf"{_GAP}([a-zA-Z])", re.ASCII)
-_ARGUMENT = re.compile(rf"{_GAP}(,?){_GAP}({_NUMBER})", re.ASCII)
-_FLAG = re.compile(rf"{_GAP}(,?){_GAP}([01])", re.ASCII)
-_END = re.compile(rf"{_GAP}\Z")
-_CALL = re.compile(rf"{_GAP}(,?){_GAP}([a-zA-Z]+){_GAP}\(([^()]*)\)", re.ASCII)
-_TAKES = {"m": 2, "l": 2, "h": 1, "v": 1, "c": 6, "s": 4, "q": 4, "t": 2, "a": 7, "z": 0}
+NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_WITH_UNIT = re.compile(rf"({NUMBER})([a-zA-Z%]*)", re.ASCII)
+GAP = r"[ \t\r\n\f]*"
+END = re.compile(rf"{GAP}\Z")
+_CALL = re.compile(rf"{GAP}(,?){GAP}([a-zA-Z]+){GAP}\(([^()]*)\)", re.ASCII)
 _COUNTS = {
     "matrix": (6,),
     "translate": (1, 2),
@@ -52,19 +48,19 @@ def user_length(text: str, key: str) -> float:
     unit = found[2].lower()
     if unit and unit not in _MM:
         raise ValueError(f'its {key}="{text[:40]}" is relative ({found[2][:20]}): state a number')
-    return _finite(found[1]) * (_MM[unit] / MM_PER_PX if unit else 1.0)
+    return finite(found[1]) * (_MM[unit] / MM_PER_PX if unit else 1.0)
 
 
 def page_length_mm(text: str, key: str) -> float:
     """A length of the page, above 0 and in a unit that has a size."""
     found = _WITH_UNIT.fullmatch(text.strip())
     unit = found[2] if found else ""
-    if not found or unit not in _MM or unit == "px" or not _finite(found[1]) > 0.0:
+    if not found or unit not in _MM or unit == "px" or not finite(found[1]) > 0.0:
         raise ValueError(
             f'its {key} is "{text[:40]}": state it with a unit, such as {key}="80mm", so that '
             "lengths are known"
         )
-    return _finite(found[1]) * _MM[unit]
+    return finite(found[1]) * _MM[unit]
 
 
 def view_to_mm(attributes: Mapping[str, str]) -> Matrix:
@@ -73,7 +69,7 @@ def view_to_mm(attributes: Mapping[str, str]) -> Matrix:
     said = attributes.get("viewBox")
     if said is None:
         return (MM_PER_PX, 0.0, 0.0, MM_PER_PX, 0.0, 0.0)
-    box = [_finite(one) for one in re.split(r"[\s,]+", said.strip()) if _is_number(one)]
+    box = [finite(one) for one in re.split(r"[\s,]+", said.strip()) if _is_number(one)]
     if len(box) != 4 or len(re.split(r"[\s,]+", said.strip())) != 4 or not min(box[2:]) > 0.0:
         raise ValueError(
             f'its viewBox is "{said[:40]}": state four numbers, the last two above 0, so that '
@@ -101,7 +97,7 @@ def transform(text: str, *, css: bool = False) -> Matrix:
     matrix, at = IDENTITY, 0
     if text.strip() == "none":
         return matrix
-    while not _END.match(text, at):
+    while not END.match(text, at):
         call = _CALL.match(text, at)
         if not call or (call[1] and (css or not at)):
             raise ValueError(f'its transform="{text[:60]}" is not understood: {_PLAIN}')
@@ -128,54 +124,12 @@ def product(first: Matrix, second: Matrix) -> Matrix:
     )
 
 
-def path_data(text: str, most: int) -> tuple[str, int]:
-    """A path with one command for each segment, and its number of points; ``most`` are taken.
-
-    >>> path_data("M0-1h2 3z", 9)
-    ('M 0.0 -1.0 h 2.0 h 3.0 z', 3)
-    """
-    made: list[str] = []
-    at, count = 0, 0
-    while not _END.match(text, at):
-        command = _COMMAND.match(text, at)
-        if not command or command[1].lower() not in _TAKES or (not made and command[1] not in "mM"):
-            raise _no_path(text, at)
-        letter, at = command[1], command.end()
-        takes, is_first = _TAKES[letter.lower()], True
-        while is_first or (takes and _ARGUMENT.match(text, at)):
-            said = [letter]
-            for place in range(takes):
-                kind = _FLAG if takes == 7 and place in (3, 4) else _ARGUMENT
-                found = kind.match(text, at)
-                if not found or (found[1] and is_first and not place):
-                    raise _no_path(text, at)
-                said.append(found[2] if kind is _FLAG else repr(_finite(found[2])))
-                at = found.end()
-            count += letter not in "zZ" or made[-1] in "zZ"  # to close adds no point
-            made += said
-            if count > most:
-                return " ".join(made), count
-            letter = {"m": "l", "M": "L"}.get(letter, letter)
-            is_first = False
-    return " ".join(made), count
-
-
-def points(text: str, most: int) -> tuple[str, int]:
-    """Corners as a path, not closed, and their number; ``most`` are taken."""
-    made: list[str] = []
-    at = 0
-    while not _END.match(text, at) and len(made) <= 2 * most:
-        found = _ARGUMENT.match(text, at)
-        if not found or (found[1] and not at):
-            raise ValueError(f'its points are no numbers at "{text[at : at + 20]}": draw it anew')
-        made.append(repr(_finite(found[2])))
-        at = found.end()
-    if len(made) % 2 and len(made) <= 2 * most:
-        raise ValueError("its points end with an x without y: draw it anew")
-    return (
-        "M " + " L ".join(map(" ".join, zip(made[::2], made[1::2], strict=False))),
-        len(made) // 2,
-    )
+def finite(text: str) -> float:
+    """A number that is a place on a plate."""
+    value = float(text) if len(text) <= LONGEST_NUMBER else math.inf
+    if not math.isfinite(value):
+        raise ValueError("it has numbers that are no places on a plate")
+    return value
 
 
 _PLAIN = "save it as plain SVG, transforms applied to the shapes"
@@ -191,11 +145,11 @@ def _arguments(call: re.Match[str], name: str, css: bool) -> list[float]:
         if not one:
             raise ValueError(f"its transform has {call[0].strip()[:40]}, no numbers: {_PLAIN}")
         factor = 1.0 if not one[2] else _factor(name, place, one[2].lower()) if css else None
-        is_bare = css and not one[2] and name not in ("matrix", "scale") and _finite(one[1]) != 0.0
+        is_bare = css and not one[2] and name not in ("matrix", "scale") and finite(one[1]) != 0.0
         if factor is None or is_bare:
             what = "has no unit" if is_bare else f"has the unit {one[2][:20]}"
             raise ValueError(f"its transform {call[0].strip()[:40]} {what}: {_PLAIN}")
-        found.append(_finite(one[1]) * factor)
+        found.append(finite(one[1]) * factor)
     if len(found) not in _COUNTS[name] or (css and name == "rotate" and len(found) != 1):
         raise ValueError(f"its transform has {call[0].strip()[:40]}, too many or too few: {_PLAIN}")
     return found
@@ -235,15 +189,4 @@ def _turn(degrees: float) -> tuple[float, float]:
 
 
 def _is_number(text: str) -> bool:
-    return len(text) <= LONGEST_NUMBER and re.fullmatch(_NUMBER, text, re.ASCII) is not None
-
-
-def _finite(text: str) -> float:
-    value = float(text) if len(text) <= LONGEST_NUMBER else math.inf
-    if not math.isfinite(value):
-        raise ValueError("it has numbers that are no places on a plate")
-    return value
-
-
-def _no_path(text: str, at: int) -> ValueError:
-    return ValueError(f'its path breaks off at "{text[at : at + 20].strip()}": draw it anew')
+    return len(text) <= LONGEST_NUMBER and re.fullmatch(NUMBER, text, re.ASCII) is not None
