@@ -92,6 +92,10 @@ def test_corners_of_both_ages_are_where_they_were_rendered(words: str) -> None:
         (WORDS, WORDS.replace("8x6", "5x9"), "with 8 columns.*charuco:8xROWS:30:22:DICT_4X4_50"),
         (WORDS.replace("8x6", "9x5"), WORDS.replace("8x6", "5x9"), "with 9 columns and 5 rows"),
         (OLD.replace("4X4_50", "5X5_100"), WORDS.replace("4X4_50", "5X5_100"), "before 4.6"),
+        (OLD.replace("8x6", "7x6"), WORDS.replace("8x6", "7x6"), "before 4.6"),
+        (WORDS.replace("8x6", "7x6"), OLD.replace("8x6", "7x6"), "since 4.6"),
+        (OLD.replace("8x6", "7x6"), WORDS.replace("8x6", "6x7"), "with 7 columns.*:legacy"),
+        (WORDS.replace("8x6", "9x6"), WORDS.replace("8x6", "10x6"), "with 9 columns.*9xROWS"),
         (WORDS, WORDS.replace("4X4_50", "6X6_250"), "shows markers of DICT_4X4_250"),
     ],
 )

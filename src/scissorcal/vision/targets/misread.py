@@ -31,8 +31,12 @@ WITHIN_SQUARES = 0.5
 marker, which lies at least a square away."""
 
 LEAST_SHARE = 0.75
-"""Of the markers that have to fit. A layout of the other age fits every second row, half of them;
-this is half way to all, and leaves room for what is read as a marker and is none."""
+"""Of the markers that have to fit, so that what is read as a marker and is none does not decide.
+With an even number of columns the layout of the other age fits every second row, half of the
+markers, and this is half way to all; with an odd number it fits most: the better fit decides."""
+
+_SEARCHES = 200
+"""Of four corners by RANSAC: at that share one of 200 has no stray with a chance of 1 - 1e-33."""
 
 MOST_COLUMNS = 40
 
@@ -90,16 +94,25 @@ def _seen(grey: Picture, board: MarkedBoard) -> Seen:
 
 
 def _layout(seen: Seen, board: MarkedBoard) -> MarkedBoard | None:
-    """The only layout that the markers fit, those of the named numbers of squares first."""
-    if _fits(seen, board):
-        return board
-    if not isinstance(board, CharucoBoard) or board in TARGETS:
+    """The layout that most markers fit; the named one of several, and None of several others."""
+    least = max(LEAST_MARKERS, LEAST_SHARE * len(seen.ids))
+    if len(seen.ids) < least:
         return None
-    same = [one for one in _same_squares(board) if _fits(seen, one)]
-    if len(same) == 1:
-        return same[0]
-    others = [] if same else [one for one in _other_columns(seen, board) if _fits(seen, one)]
-    return others[0] if len(others) == 1 else None
+    named: list[MarkedBoard] = [board]
+    if isinstance(board, CharucoBoard) and board not in TARGETS:
+        named += _same_squares(board)
+    others = (
+        _other_columns(seen, board) if len(named) > 1 and isinstance(board, CharucoBoard) else ()
+    )
+    counts = [(_fitting(seen, one), one) for one in (*named, *others)]
+    most = max(count for count, _ in counts)
+    best = [one for count, one in counts if count == most]
+    known = [one for one in best if one in named]
+    if most < least:
+        return None
+    if board in best:
+        return board
+    return known[0] if len(known) == 1 else best[0] if len(best) == 1 else None
 
 
 def _same_squares(board: CharucoBoard) -> Iterator[CharucoBoard]:
@@ -128,25 +141,24 @@ def _other_columns(seen: Seen, board: CharucoBoard) -> Iterator[CharucoBoard]:
         yield replace(board, columns=columns, rows=even, legacy=True)
 
 
-def _fits(seen: Seen, board: MarkedBoard) -> bool:
-    """Whether one homography brings the markers to their places on the board."""
+def _fitting(seen: Seen, board: MarkedBoard) -> int:
+    """How many markers one homography brings to their places on the board."""
     import cv2
 
     places = dict(zip(board.ids, _marker_places(board), strict=False))
     has = [int(one) in places for one in seen.ids]
-    least = max(LEAST_MARKERS, LEAST_SHARE * len(has))
-    if sum(has) < least:
-        return False
+    if sum(has) < LEAST_MARKERS:
+        return 0
     wanted = np.concatenate([places[int(one)] for one in seen.ids[has]])
     pitch = board.square_m if isinstance(board, CharucoBoard) else board.marker_m
     within = WITHIN_SQUARES * pitch
     found = seen.corners[has].reshape(-1, 2)
-    matrix, _ = cv2.findHomography(found, wanted, cv2.RANSAC, within)
+    matrix, _ = cv2.findHomography(found, wanted, cv2.RANSAC, within, maxIters=_SEARCHES)
     if np.shape(matrix) != (3, 3):
-        return False
+        return 0
     mapped = cv2.perspectiveTransform(found[None], np.asarray(matrix))[0]
     off = np.linalg.norm(mapped - wanted, axis=1).reshape(-1, 4).max(axis=1)
-    return int(np.sum(off < within)) >= least
+    return int(np.sum(off < within))
 
 
 def _marker_places(board: MarkedBoard) -> list[Array]:
