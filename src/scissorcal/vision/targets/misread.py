@@ -99,12 +99,12 @@ def _layout(seen: Seen, board: MarkedBoard) -> MarkedBoard | None:
     if len(seen.ids) < least:
         return None
     named: list[MarkedBoard] = [board]
-    if isinstance(board, CharucoBoard) and board not in TARGETS:
-        named += _same_squares(board)
-    others = (
-        _other_columns(seen, board) if len(named) > 1 and isinstance(board, CharucoBoard) else ()
-    )
-    counts = [(_fitting(seen, one), one) for one in (*named, *others)]
+    own = board if isinstance(board, CharucoBoard) and board not in TARGETS else None
+    if own is not None:
+        named += _same_squares(own)
+    counts = [(_fitting(seen, one), one) for one in named]
+    if own is not None and max(count for count, _ in counts) < len(seen.ids):
+        counts += [(_fitting(seen, one), one) for one in _other_columns(seen, own)]
     most = max(count for count, _ in counts)
     best = [one for count, one in counts if count == most]
     known = [one for one in best if one in named]
