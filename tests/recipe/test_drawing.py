@@ -14,14 +14,9 @@ import scissorcal
 from scissorcal.errors import InputError
 from scissorcal.foreign.formats import DRAWING
 from scissorcal.model.plate_pieces import Outline, spans_on_line
-from scissorcal.recipe.drawing import (
-    FLAT_MM,
-    MOST_POINTS,
-    MOST_POINTS_OF_FILE,
-    MOST_SHAPES,
-    parse_drawing,
-    read_drawing,
-)
+from scissorcal.recipe.drawing import parse_drawing, read_drawing
+from scissorcal.recipe.svg.curves import FLAT_MM
+from scissorcal.recipe.svg.elements import MOST_POINTS, MOST_POINTS_OF_FILE, MOST_SHAPES
 from tests.guard import GUARD_S
 
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="60mm" viewBox="0 0 80 60">'
@@ -110,8 +105,8 @@ def test_a_contour_within_another_is_a_hole(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (f'<!DOCTYPE s [<!ENTITY l0 "l">{LAUGHS}]>{HEAD}<text>&l9;</text></svg>', "document type"),
-        (f'<!DOCTYPE s SYSTEM "file:///x">{HEAD}</svg>', "document type"),
+        (f'<!DOCTYPE s [<!ENTITY l0 "l">{LAUGHS}]>{HEAD}<text>&l9;</text></svg>', "entities"),
+        (f'<!DOCTYPE s SYSTEM "file:///x">{HEAD}&x;</svg>', "undefined entity"),
         (f"{HEAD}{'<g/>' * 20_000}</svg>", "elements"),
         (f"{HEAD}{'<g>' * 100}{'</g>' * 100}</svg>", "levels"),
         (f"{HEAD}{'<rect/>' * 401}</svg>", "400 shapes"),
@@ -124,9 +119,9 @@ def test_a_contour_within_another_is_a_hole(tmp_path: Path) -> None:
         (f'{HEAD}<rect width="1" height="1" style="display: none"/></svg>', "no closed shape"),
         (f'{HEAD[:-1]} display="none"><rect width="1" height="1"/></svg>', "no closed shape"),
         (f'{HEAD[:-1]} style="display:none"><g/></svg>', "no closed shape"),
-        (f"{HEAD}<style>a{{color:red;visibility:hidden}}</style></svg>", "that hides something"),
-        (f"{HEAD}<style>DISPLAY : none</style></svg>", "that hides something"),
-        (f'{HEAD}<path d="M0 0L nan 5L5 nan z"/></svg>', "no closed shape"),
+        (f"{HEAD}<style>a{{color:red;visibility:hidden}}</style></svg>", "visibility in a <style>"),
+        (f"{HEAD}<style>DISPLAY : none</style></svg>", "display in a <style>"),
+        (f'{HEAD}<path d="M0 0L nan 5L5 nan z"/></svg>', "path breaks off at"),
         (f'{HEAD}<rect width="1e300" height="1e300"/></svg>', "no places"),
         (f'{HEAD}<rect width="1" height="1" transform="scale(1e400)"/></svg>', "no places"),
         (f"{HEAD}<script>1</script></svg>", "script"),
@@ -188,8 +183,8 @@ def calls(data: bytes) -> int:
 
     sys.setprofile(called)
     try:
-        with contextlib.suppress(ValueError):
-            parse_drawing(data)
+        with contextlib.suppress(InputError):
+            parse_drawing(data, "plate.svg")
     finally:
         sys.setprofile(None)
     return count
@@ -269,8 +264,8 @@ def test_a_comment_in_the_style_of_a_shape_is_none_of_it(tmp_path: Path, style: 
         "backface-visibility: hidden",
         "content-visibility:hidden",
         "--display: none",
-        "-x-display:none",
-        "display: inline",
+        "-inkscape-display:none",
+        "fill: url('a;display:none')",
     ],
 )
 def test_a_style_of_another_property_is_taken(tmp_path: Path, said: str) -> None:

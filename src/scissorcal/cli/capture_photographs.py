@@ -42,7 +42,8 @@ def camera(
         typer.Option(
             "--board",
             help="The printed camera board, or another: chessboard:9x6:25 (inner corners, mm), "
-            "charuco:5x7:40:20:DICT_6X6_250 (squares, mm, mm).",
+            "charuco:5x7:40:20:DICT_6X6_250 (squares, mm, mm); followed by :legacy where OpenCV "
+            "before 4.6 drew an even number of rows.",
         ),
     ] = "camera",
     seed: Seed = 0,

@@ -7,12 +7,13 @@ from scissorcal.vision.targets.boards import CAMERA_BOARD, CharucoBoard, Chessbo
 
 FORMS = (
     "chessboard:COLUMNSxROWS:SQUARE_MM (inner corners) or "
-    "charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY (squares)"
+    "charuco:COLUMNSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY (squares), followed by :legacy where "
+    "OpenCV before 4.6 drew an even number of rows"
 )
 
 _NUMBER = r"(\d+(?:\.\d+)?)"
 _CHESSBOARD = re.compile(rf"chessboard:(\d+)x(\d+):{_NUMBER}")
-_CHARUCO = re.compile(rf"charuco:(\d+)x(\d+):{_NUMBER}:{_NUMBER}:(\w+)")
+_CHARUCO = re.compile(rf"charuco:(\d+)x(\d+):{_NUMBER}:{_NUMBER}:(\w+?)(:legacy)?")
 
 
 def board_from_words(words: str) -> CharucoBoard | Chessboard:
@@ -38,18 +39,39 @@ def board_from_words(words: str) -> CharucoBoard | Chessboard:
             float(found[4]),
         )
         if min(columns, rows) >= 3 and 0.0 < marker < square:
-            return _charuco(columns, rows, 1e-3 * square, 1e-3 * marker, found[5])
+            return _charuco(
+                columns, rows, 1e-3 * square, 1e-3 * marker, found[5], found[6] is not None
+            )
     raise InputError(f"{words!r} is not a board: give {FORMS}, for example chessboard:9x6:25.")
 
 
-def _charuco(columns: int, rows: int, square_m: float, marker_m: float, name: str) -> CharucoBoard:
+def words_of_board(board: CharucoBoard) -> str:
+    """The words that name a ChArUco board.
+
+    >>> words_of_board(board_from_words("charuco:8x6:30:22.5:DICT_4X4_50:legacy"))
+    'charuco:8x6:30:22.5:DICT_4X4_50:legacy'
+    """
+    square, marker = round(1e3 * board.square_m, 6), round(1e3 * board.marker_m, 6)
+    old = ":legacy" if board.begins_white else ""
+    return f"charuco:{board.columns}x{board.rows}:{square:g}:{marker:g}:{board.dictionary}{old}"
+
+
+def _charuco(
+    columns: int, rows: int, square_m: float, marker_m: float, name: str, legacy: bool
+) -> CharucoBoard:
     import cv2
 
     dictionaries = [key for key in dir(cv2.aruco) if key.startswith("DICT_")]
     if name not in dictionaries:
         raise InputError(f"{name} is not a dictionary of markers: give one of {dictionaries}.")
     board = CharucoBoard(
-        f"ChArUco {columns}x{rows}", columns, rows, square_m, marker_m, dictionary=name
+        f"ChArUco {columns}x{rows}",
+        columns,
+        rows,
+        square_m,
+        marker_m,
+        dictionary=name,
+        legacy=legacy,
     )
     held = len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name)).bytesList)
     if len(board.ids) > held:

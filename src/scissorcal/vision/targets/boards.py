@@ -36,6 +36,11 @@ class CharucoBoard:
     kind: Literal["charuco"] = "charuco"
 
     @property
+    def begins_white(self) -> bool:
+        """Whether its upper left square is white."""
+        return self.legacy and self.rows % 2 == 0
+
+    @property
     def width_m(self) -> float:
         return self.columns * self.square_m
 
@@ -69,7 +74,7 @@ class CharucoBoard:
             dictionary(self.dictionary),
             np.array(self.ids),
         )
-        made.setLegacyPattern(self.legacy and self.rows % 2 == 0)
+        made.setLegacyPattern(self.begins_white)
         return made
 
 

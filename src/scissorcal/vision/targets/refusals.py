@@ -12,6 +12,7 @@ from scissorcal.vision.targets.boards import (
     dictionary,
     targets_of,
 )
+from scissorcal.vision.targets.misread import markers_seen, misread_sentence
 
 BLURRED_PX = 2.5
 """A picture is blurred if its sharpest edge has a larger standard deviation."""
@@ -25,8 +26,8 @@ _APRIL = ("DICT_APRILTAG_36h11",)
 def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str:
     """Sentence that says what a photograph shows instead of ``board``.
 
-    Another target of scissorcal, markers of another dictionary, too few corners, a picture too
-    small or too blurred, or nothing.
+    The board in another layout, mirrored or inverted; another target of scissorcal, markers of
+    another dictionary, too few corners, a picture too small or too blurred, or nothing.
     """
     grey = _reduced(photo.grey)
     name = photo.source
@@ -35,6 +36,8 @@ def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str
             f"{name} has only {photo.width} x {photo.height} pixels: take photographs of at least "
             "640 x 480."
         )
+    if not found and (misread := misread_sentence(grey, board, name)):
+        return misread
     other = _other_target(grey, board)
     if other and not found:
         return f"{name} shows {other}, not the {board.name}: {_use(board)}."
@@ -44,6 +47,8 @@ def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str
             f"{name} is too blurred: its sharpest edges are {2.56 * blur:.0f} px wide. Focus on "
             f"the {board.name}, hold the camera still and give more light."
         )
+    if not found and not isinstance(board, Chessboard) and _plain_chessboard(grey, board):
+        return f"{name} shows a plain chessboard, not the {board.name}: {_use(board)}."
     if found:
         return (
             f"{name} shows {found} corners of the {board.name}; {least} are needed. Show the whole "
@@ -53,6 +58,11 @@ def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str
         return (
             f"{name} shows no chessboard of {board.columns} x {board.rows} inner corners: show "
             "the whole board with its white border, and check the number of corners."
+        )
+    if count := markers_seen(grey, board):
+        return (
+            f"{name} shows {count} markers of the {board.name}, but too few, or not where that has "
+            "them: show the whole board, and check its columns, rows and marker numbers."
         )
     return (
         f"{name} shows no marker of the {board.name} ({board.dictionary} {board.ids[0]}-"
@@ -99,23 +109,27 @@ def _other_target(grey: Picture, board: Board) -> str | None:
         return [] if ids is None else [int(marker) for marker in np.ravel(ids)]
 
     own = getattr(board, "dictionary", None)
-    ours = ids_of(DICTIONARY)
-    counts = targets_of(ours)
+    counts = targets_of(ids_of(DICTIONARY))
     counts.pop(board.name, None)
-    if counts and (own != DICTIONARY or board in TARGETS):
+    if counts and (board in TARGETS or not _share_markers(own, DICTIONARY)):
         return f"the {next(iter(counts))}"
     if own is not None and own != DICTIONARY:
         wrong = [marker for marker in ids_of(own) if marker not in getattr(board, "ids", ())]
         if wrong:
             return f"markers of {own} with other numbers ({min(wrong)}-{max(wrong)})"
     for name in (*_OTHERS, *_APRIL):
-        if name != own and len(ids_of(name)) >= 2:
+        if not _share_markers(own, name) and len(ids_of(name)) >= 2:
             return f"markers of {name}"
-    if not isinstance(board, Chessboard):
-        plain = _plain_chessboard(grey, board)
-        if plain:
-            return "a plain chessboard"
     return None
+
+
+def _share_markers(one: str | None, other: str) -> bool:
+    """Whether two dictionaries begin with the same markers, as DICT_4X4_50 and DICT_4X4_250."""
+    if one is None:
+        return False
+    first, second = dictionary(one).bytesList, dictionary(other).bytesList
+    shared = min(len(first), len(second))
+    return first.shape[1:] == second.shape[1:] and bool(np.all(first[:shared] == second[:shared]))
 
 
 def _plain_chessboard(grey: Picture, board: Board) -> bool:

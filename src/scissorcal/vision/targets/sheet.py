@@ -118,7 +118,7 @@ def board_ink(
     if isinstance(board, CharucoBoard):
         square = 1e3 * board.square_m
         for row in range(board.rows):
-            for column in range(row % 2, board.columns, 2):
+            for column in range((row + board.begins_white) % 2, board.columns, 2):
                 yield Rectangle(x + column * square, y + row * square, square, square)
     cells = dictionary(board.dictionary).markerSize + 2
     for marker in board.ids:

@@ -1,0 +1,1 @@
+"""The SVG of plates: what a file may say, and the outlines that it draws."""
