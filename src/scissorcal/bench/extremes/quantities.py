@@ -1,4 +1,7 @@
-"""Every quantity with its everyday and its extreme range: the one place that defines both."""
+"""Every quantity with its everyday and its extreme range.
+
+Everyday ranges are those of :mod:`scissorcal.recipe.everyday`, extreme ones stand here.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,6 +9,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from scissorcal.recipe.everyday import EVERYDAY
 
 Array = NDArray[np.float64]
 Spacing = Literal["linear", "log", "sign-log", "whole"]
@@ -16,7 +21,7 @@ ZERO_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Quantity:
-    """One quantity: its unit, its everyday range, its extreme range, and how values are spaced.
+    """One quantity: its unit, its extreme range, and how values are spaced.
 
     ``spacing``: ``linear``; ``log``, where a lower end of 0 is one value more; ``sign-log``, both
     signs and 0, log-spaced from ``least`` on; ``whole`` numbers, log-spaced. ``parts`` are those of
@@ -25,12 +30,16 @@ class Quantity:
 
     name: str
     unit: str
-    everyday: tuple[float, float]
     extreme: tuple[float, float]
     spacing: Spacing
     parts: tuple[str, ...]
     what: str
     least: float = 0.0
+
+    @property
+    def everyday(self) -> tuple[float, float]:
+        """Ends of the everyday range."""
+        return EVERYDAY[self.name].ends
 
     def values(self, count: int) -> Array:
         """``count`` values from one end of the extreme range to the other, both ends included.
@@ -68,51 +77,51 @@ class Quantity:
 
 _PHYSICS = ("model", "kernel")
 _ROWS = (
-    Quantity("opening", "rad", (0.2, 0.9), (0.0, float(np.pi)), "linear", _PHYSICS,
+    Quantity("opening", "rad", (0.0, float(np.pi)), "linear", _PHYSICS,
              "angle between the blades"),
-    Quantity("opening_rate", "rad/s", (-2.0, 2.0), (-1e3, 1e3), "sign-log", _PHYSICS,
+    Quantity("opening_rate", "rad/s", (-1e3, 1e3), "sign-log", _PHYSICS,
              "rate of the opening; negative closes", 1e-6),
-    Quantity("contact", "blade lengths", (0.2, 0.8), (0.0, 1.5), "linear", _PHYSICS,
+    Quantity("contact", "blade lengths", (0.0, 1.5), "linear", _PHYSICS,
              "place of the crack tip, from the pivot to beyond the tip"),
-    Quantity("indentation", "m", (1e-6, 5e-4), (1e-12, 1e-1), "log", _PHYSICS,
+    Quantity("indentation", "m", (1e-12, 1e-1), "log", _PHYSICS,
              "depth of the edge in the material, where it is given in place of the contact"),
-    Quantity("thickness", "m", (5e-5, 2e-3), (1e-6, 1e-1), "log", _PHYSICS,
+    Quantity("thickness", "m", (1e-6, 1e-1), "log", _PHYSICS,
              "thickness of the plate"),
-    Quantity("force", "N", (0.5, 20.0), (1e-6, 1e6), "log", _PHYSICS,
+    Quantity("force", "N", (1e-6, 1e6), "log", _PHYSICS,
              "response at the reference indentation of 0.3 mm"),
-    Quantity("exponent", "1", (1.0, 2.5), (0.5, 8.0), "log", _PHYSICS,
+    Quantity("exponent", "1", (0.5, 8.0), "log", _PHYSICS,
              "exponent of the response"),
-    Quantity("toughness", "J/m^2", (1e3, 2e4), (1.0, 1e5), "log", _PHYSICS,
+    Quantity("toughness", "J/m^2", (1.0, 1e5), "log", _PHYSICS,
              "energy per area of cut"),
-    Quantity("kappa", "1", (0.5, 1.0), (1e-3, 1.0), "log", _PHYSICS,
+    Quantity("kappa", "1", (1e-3, 1.0), "log", _PHYSICS,
              "share of the fracture energy at which a running crack stops"),
-    Quantity("edge_offset", "m", (-0.01, 0.0), (-0.1, 0.1), "sign-log", _PHYSICS,
+    Quantity("edge_offset", "m", (-0.1, 0.1), "sign-log", _PHYSICS,
              "offset of the edge from the blade's centreline at the pivot", 1e-6),
-    Quantity("taper", "rad", (-0.05, 0.1), (-1.5, 1.5), "linear", _PHYSICS,
+    Quantity("taper", "rad", (-1.5, 1.5), "linear", _PHYSICS,
              "angle of the edge against the centreline; parallel and re-entrant edges included"),
-    Quantity("curvature", "1/m", (-2.0, 2.0), (-1e3, 1e3), "sign-log", _PHYSICS,
+    Quantity("curvature", "1/m", (-1e3, 1e3), "sign-log", _PHYSICS,
              "bend of the edge", 1e-3),
-    Quantity("nick", "m", (0.0, 1e-5), (0.0, 1e-2), "log", _PHYSICS,
+    Quantity("nick", "m", (0.0, 1e-2), "log", _PHYSICS,
              "depth of a nick of 5 mm width in the edge", 1e-7),
-    Quantity("rate_damping", "s/m", (0.0, 10.0), (0.0, 1e12), "log", _PHYSICS,
+    Quantity("rate_damping", "s/m", (0.0, 1e12), "log", _PHYSICS,
              "growth of the force with the speed of indentation", 1e-3),
-    Quantity("blade_length", "m", (0.05, 0.12), (1e-3, 10.0), "log", _PHYSICS,
+    Quantity("blade_length", "m", (1e-3, 10.0), "log", _PHYSICS,
              "length of the blade"),
-    Quantity("time_step", "s", (2.5e-4, 2e-3), (1e-5, 1.0), "log", ("kernel", "signals"),
+    Quantity("time_step", "s", (1e-5, 1.0), "log", ("kernel", "signals"),
              "time between two samples; with gaps, duplicates and backward jumps", 1e-5),
-    Quantity("inertia", "kg m^2", (1e-5, 1e-3), (1e-6, 1e2), "log", ("kernel", "signals"),
+    Quantity("inertia", "kg m^2", (1e-6, 1e2), "log", ("kernel", "signals"),
              "inertia of the blades about the pivot"),
-    Quantity("table_size", "knots", (33, 128), (2, 256), "whole", ("kernel",),
+    Quantity("table_size", "knots", (2, 256), "whole", ("kernel",),
              "knots of a table"),
-    Quantity("rotation", "rad", (0.0, 1.0), (0.0, float(np.pi)), "linear", ("vision",),
+    Quantity("rotation", "rad", (0.0, float(np.pi)), "linear", ("vision",),
              "angle of a pose; quaternions near half a turn"),
-    Quantity("tilt", "rad", (0.3, 1.0), (0.0, float(np.pi / 2)), "linear", ("vision",),
+    Quantity("tilt", "rad", (0.0, float(np.pi / 2)), "linear", ("vision",),
              "angle between a plate's normal and the view: 0 is square-on, pi/2 edge-on"),
-    Quantity("samples", "1", (1e3, 1e6), (1, 1e7), "whole", ("inference", "signals"),
+    Quantity("samples", "1", (1, 1e7), "whole", ("inference", "signals"),
              "samples of a recording"),
-    Quantity("scale", "1", (1e-3, 1e3), (1e-12, 1e12), "log", ("inference",),
+    Quantity("scale", "1", (1e-12, 1e12), "log", ("inference",),
              "scale of a parameter or of data"),
-    Quantity("outlier", "sd", (0.0, 5.0), (0.0, 1e6), "log", ("inference", "signals"),
+    Quantity("outlier", "sd", (0.0, 1e6), "log", ("inference", "signals"),
              "distance of an outlier from the rest", 1.0),
 )  # fmt: skip
 
