@@ -266,11 +266,16 @@ def _table_model(model: type[BaseModel], table: Path) -> type[BaseModel] | None:
         if key not in model.model_fields:
             return None
         annotation = model.model_fields[key].annotation
-        inner = _model_within(annotation) or _model_listed(annotation)
+        inner = table_model(annotation)
         if inner is None:
             return None
         model = inner
     return model
+
+
+def table_model(annotation: Any) -> type[BaseModel] | None:
+    """The model of a table, or of a list of tables; None for the type of a value."""
+    return _model_within(annotation) or _model_listed(annotation)
 
 
 def _model_within(annotation: Any) -> type[BaseModel] | None:
