@@ -282,3 +282,16 @@ def toml(value: object) -> str:
 def test_a_share_is_at_most_all_of_it() -> None:
     text = PAPER + "\n[fit.blade.priors]\ngrain_percent = 120.0\n"
     assert "grain_percent" in refused(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a_" * 200_000 + "b = 1\n" + PAPER, "a_m" + "1" * 5000 + " = 1\n" + PAPER]
+    + [".".join(["a"] * 3000) + " = 1\n" + PAPER, 'x = "' + "y" * 100_000 + '"\n' + PAPER],
+    ids=["long key", "power of 5000 digits", "deep table", "long value"],
+)
+def test_long_names_give_short_messages(text: str) -> None:
+    message = refused(text)
+    assert "line 1, " in message
+    assert "unknown key" in message
+    assert len(message) < 400

@@ -38,6 +38,9 @@ _EXPECTED = {
 MOST_MISTAKES = 20
 """As many as one reads before one corrects them and tries again."""
 
+LONGEST_KEY = 100
+"""Characters of a key, with its tables, that are shown; the schema's longest has 57."""
+
 _MOST_COMPARED = 500
 """Unknown keys whose likely meaning is looked for; a recipe has fewer keys."""
 
@@ -103,7 +106,7 @@ def _mistake(
 def dotted(path: Path) -> str:
     """Write a path as people do: ``scene.contact_mm[1]``."""
     words = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
-    return words.lstrip(".")
+    return _short(words.lstrip("."))
 
 
 def _path(item: Any) -> Path:
@@ -206,6 +209,8 @@ def _elsewhere(key: str, path: Path, model: type[BaseModel]) -> str:
 def _suggest(path: Path, model: type[BaseModel], document: Any) -> str | None:
     """Return the key that was probably meant: same stem in another unit, else a near spelling."""
     key = str(path[-1])
+    if len(key) > LONGEST_KEY:
+        return None
     present = document
     for part in path[:-1]:
         present = present[part]
@@ -312,7 +317,13 @@ def _show(value: Any) -> str:
         text = json.dumps(value, ensure_ascii=False)
     except (TypeError, ValueError):
         text = str(value)
+    except RecursionError:
+        text = "what is nested too deeply"
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _short(key: str) -> str:
+    return key if len(key) <= LONGEST_KEY else key[: LONGEST_KEY - 3] + "..."
 
 
 def _kind_of(value: Any) -> str:
