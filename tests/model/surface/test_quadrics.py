@@ -220,7 +220,7 @@ def test_a_radius_must_be_one(kind, radius):
 
 
 def test_an_axis_must_have_an_angle():
-    with pytest.raises(InputError, match="axis .rad. must be finite"):
+    with pytest.raises(InputError, match=r"axis \(rad\) must be finite"):
         Cylinder(0.02, math.nan)
 
 
