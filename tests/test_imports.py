@@ -153,7 +153,7 @@ LOADS = {
         "try:\n    run(['plan', '--json'])\n"
         "except SystemExit as end:\n    assert end.code == 0, end.code\n",
         {"numpy", "h5py", "mcap", "scissorcal.device", "scissorcal.calibration"},
-        327,
+        329,
     ),
     "package": (
         "import scissorcal.package.build, scissorcal.workday.runs.package\n",

@@ -23,6 +23,10 @@ class InputError(ScissorcalError):
     exit_code = 2
 
 
+class ModelError(InputError, ValueError):
+    """A law or a shape of the model has an unknown name or an impossible number (exit code 2)."""
+
+
 class VerdictError(ScissorcalError):
     """A verdict failed, so the result is not handed out (exit code 3)."""
 

@@ -360,8 +360,8 @@ def test_a_mechanism_without_constraints_moves_freely():
     [
         (lambda: AxisLaw(0.0, FrictionLaw()), "inertia of an axis"),
         (lambda: AxisLaw(1.0, FrictionLaw(), rest_rate=-1.0), "rest rate"),
-        (lambda: ContactLaw(-1.0), "stiffness and damping"),
-        (lambda: ContactLaw(1.0, math.nan), "stiffness and damping"),
+        (lambda: ContactLaw(-1.0), "stiffness of a contact"),
+        (lambda: ContactLaw(1.0, math.nan), "damping of a contact"),
         (
             lambda: free_acceleration(
                 Mechanism(np.array([[1.0, 2.0], [2.0, 1.0]]), RIG.effort), [0, 0], [0, 0], [0, 0]

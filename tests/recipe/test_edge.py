@@ -42,7 +42,7 @@ def refused(edge: str) -> str:
         ("offset_mm = 1.0", "taper_deg and length_mm are missing: add them in [rig.edge]"),
         ("offset_mm = 1.0\ntaper_deg = 1.0", "length_mm is missing: add length_mm in [rig.edge]"),
         (
-            "offset_mm = 1.0\ntaper_deg = 1.0\nlength_mm = 9.0\ncurvature_per_m = 1.0",
+            "offset_mm = 1.0\ntaper_deg = 1.0\nlength_mm = 90.0\ncurvature_per_m = 1.0",
             'curvature_per_m needs family = "arc"',
         ),
         ('family = "points"\npoints_mm = [[0, 1], [9, 2]]', "3 to 200 points, and these are 2"),

@@ -93,12 +93,14 @@ def test_builtin_recipes_load(name: str) -> None:
         (
             "length_mm = 75.0",
             "length_mm = 75000.0",
-            "rig.edge.length_mm: 75000.0 must be at most 1000.",
+            "rig.edge.length_mm: 75000.0 must be at most 1000. Was it in um? 75000 um = 75 mm, so "
+            "write length_mm = 75.",
         ),
         (
             "contact_mm = [15.0, 60.0]",
             "contact_mm = [15.0, 60000.0]",
-            "scene.contact_mm: contact_mm must not exceed 1000: it is a place along the blades.",
+            "scene.contact_mm: contact_mm must not exceed 1000: it is a place along the blades. "
+            "Was it in um? 60000 um = 60 mm, so write contact_mm = [0.015, 60].",
         ),
         (
             "force_N = 30.0",
@@ -189,6 +191,17 @@ def test_all_mistakes_are_told_at_once_in_the_order_of_the_file() -> None:
     assert "rig.edge.length_cm" in second
 
 
+def test_twenty_mistakes_are_told_and_all_are_counted() -> None:
+    """In the message's size; the time is that of twenty mistakes, too."""
+    many = "".join(f"unknown_{number} = 1\n" for number in range(20_000))
+    for text in (many + PAPER, PAPER.replace("[material]\n", "[material]\n" + many)):
+        message = refused(text)
+        head, *told = message.splitlines()
+        assert head == "recipe.toml has 20000 mistakes; 20 of them:"
+        assert len(told) == 20
+        assert len(message) < 10_000
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -269,3 +282,16 @@ def toml(value: object) -> str:
 def test_a_share_is_at_most_all_of_it() -> None:
     text = PAPER + "\n[fit.blade.priors]\ngrain_percent = 120.0\n"
     assert "grain_percent" in refused(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a_" * 200_000 + "b = 1\n" + PAPER, "a_m" + "1" * 5000 + " = 1\n" + PAPER]
+    + [".".join(["a"] * 3000) + " = 1\n" + PAPER, 'x = "' + "y" * 100_000 + '"\n' + PAPER],
+    ids=["long key", "power of 5000 digits", "deep table", "long value"],
+)
+def test_long_names_give_short_messages(text: str) -> None:
+    message = refused(text)
+    assert "line 1, " in message
+    assert "unknown key" in message
+    assert len(message) < 400

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.model.checks import check_moving_blades, check_numbers
 from scissorcal.model.edge import Edge
 
 Array = NDArray[np.float64]
@@ -22,7 +23,7 @@ class BladePoint:
     (:meth:`on_edge`).
 
     ``q`` and ``rates`` are (..., 2), in rad and m, rad/s and m/s. Complex values pass through, for
-    derivatives by a complex step (doi:10.1137/S003614459631241X). ValueError for a number of moving
+    derivatives by a complex step (doi:10.1137/S003614459631241X). ModelError for a number of moving
     blades other than 1 or 2, and for a place that is not finite.
 
     >>> tip = BladePoint(station_m=0.07, offset_m=-0.008, moving_blades=1)
@@ -39,10 +40,9 @@ class BladePoint:
     moving_blades: int
 
     def __post_init__(self) -> None:
-        if self.moving_blades not in (1, 2):
-            raise ValueError(f"1 or 2 blades move, not {self.moving_blades}")
-        if not np.isfinite([self.station_m, self.offset_m]).all():
-            raise ValueError("the place of a point on the blade has to be finite")
+        check_moving_blades(self.moving_blades)
+        check_numbers("the station of a point on the blade (m)", self.station_m)
+        check_numbers("the offset of a point on the blade (m)", self.offset_m)
 
     @classmethod
     def on_edge(cls, edge: Edge, station_m: float, moving_blades: int) -> "BladePoint":

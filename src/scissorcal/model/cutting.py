@@ -1,15 +1,18 @@
 """Cutting: where the crack tip settles, and the torque that the blades feel there."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.model.checks import SMALLEST, check_moving_blades, check_name, check_numbers
 from scissorcal.model.edge import Edge, EdgeView, edge_height
 from scissorcal.model.response import Response
 
 Array = NDArray[np.float64]
+Closure = Literal["work", "eq4"]
+_CLOSURES = get_args(Closure)
 
 SETTLING_STEPS = 200
 STEEPEST_START = 1e-9
@@ -45,6 +48,8 @@ class Cutting:
     the fracture energy at which a running crack stops: 1 is smooth, below 1 ripples. ``closure`` is
     the torque's law: ``work`` derives from the stored energy, ``eq4`` is tau = x_c g cos(alpha).
     ``rate_damping`` c (s/m) makes the force at the edge g (1 + c d(delta)/dt), never below 0.
+    ModelError for other blades or closures, for a fracture energy that is not above 0, a kappa
+    that is not above 0 and at most 1, a negative upper face or damping, and what is not finite.
     """
 
     edge: Edge
@@ -53,8 +58,17 @@ class Cutting:
     upper_face_m: float
     fracture_energy: float | Array | None
     kappa: float | Array = 1.0
-    closure: Literal["work", "eq4"] = "work"
+    closure: Closure = "work"
     rate_damping: float | Array = 0.0
+
+    def __post_init__(self) -> None:
+        check_moving_blades(self.moving_blades)
+        check_numbers("the height of the plate's upper face (m)", self.upper_face_m, 0.0)
+        if self.fracture_energy is not None:
+            check_numbers("the fracture energy of a cut (J/m)", self.fracture_energy, SMALLEST)
+        check_numbers("kappa, the share at which a crack stops,", self.kappa, SMALLEST, 1.0)
+        check_name("closure of a cut", self.closure, _CLOSURES)
+        check_numbers("the rate damping of a cut (s/m)", self.rate_damping, 0.0)
 
 
 def cut_torque_along(

@@ -3,15 +3,21 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.errors import ModelError
 from scissorcal.model.bspline import FEWEST, spline_slope, spline_value
+from scissorcal.model.checks import SMALLEST, check_name, check_numbers
 
 Array = NDArray[np.float64]
 Family = Literal["line", "arc", "cubic", "spline"]
+_FAMILIES = get_args(Family)
+
+UPRIGHT = 0.5 * np.pi
+"""A taper of a right angle, rad: beyond it a blade has no edge that faces the cut."""
 
 NEWTON_STEPS = 30
 HALVINGS = 64
@@ -33,7 +39,9 @@ class Edge:
       ``spline_start_m`` to ``length_m``, straight on beyond both.
 
     Parameters may be arrays of one shape that broadcasts with the stations, such as (draws, 1);
-    the weights then have one axis more.
+    the weights then have one axis more. ModelError for an unknown family, for a number that is not
+    finite, a taper beyond a right angle, a length that is not above 0, weights that are fewer than
+    4, and a bend of a family that has none.
 
     >>> float(Edge("line", offset_m=-0.008, taper_rad=0.0, length_m=0.07).offset_at(0.03))
     -0.008
@@ -47,6 +55,31 @@ class Edge:
     bend_per_m2: float | Array = 0.0
     spline_m: tuple[float, ...] | Array = ()
     spline_start_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_name("family of an edge", self.family, _FAMILIES)
+        check_numbers("the offset of an edge (m)", self.offset_m)
+        check_numbers("the taper of an edge (rad)", self.taper_rad, -UPRIGHT, UPRIGHT)
+        check_numbers("the length of an edge (m)", self.length_m, SMALLEST)
+        check_numbers("the curvature of an edge (1/m)", self.curvature_per_m)
+        check_numbers("the bend of an edge (1/m^2)", self.bend_per_m2)
+        if self.family == "spline":
+            check_numbers("the weights of an edge (m)", self.spline_m)
+            before_the_tip = np.nextafter(self.length_m, -np.inf)
+            check_numbers(
+                "the start of an edge's spline (m)", self.spline_start_m, high=before_the_tip
+            )
+            if np.shape(self.spline_m)[-1] < FEWEST:
+                raise ModelError(
+                    f"An edge that is a spline needs {FEWEST} weights or more; it has "
+                    f"{np.shape(self.spline_m)[-1]}."
+                )
+        elif np.shape(self.spline_m)[-1]:
+            raise ModelError(f'An edge with weights is a "spline", not a "{self.family}".')
+        if self.family == "line" and _any(self.curvature_per_m):
+            raise ModelError('An edge with a curvature is an "arc" or a "cubic", not a "line".')
+        if self.family in ("line", "arc") and _any(self.bend_per_m2):
+            raise ModelError(f'An edge with a bend is a "cubic", not a "{self.family}".')
 
     @property
     def straight(self) -> bool:
@@ -116,6 +149,9 @@ class Edge:
             return np.where(np.isfinite(station), station, np.nan)
 
 
+_PARAMETERS = ("offset_m", "taper_rad", "curvature_per_m", "bend_per_m2")
+
+
 @dataclass(frozen=True)
 class EdgeBelief:
     """An edge with what is known of its parameters: normal, mean ``edge``, with ``covariance``.
@@ -137,8 +173,14 @@ class EdgeBelief:
 
     def __post_init__(self) -> None:
         count = len(self.names)
+        for name in self.names:
+            if not _is_weight(name):
+                check_name("parameter of an edge", name, _PARAMETERS)
+        check_numbers("the covariance of an edge", self.covariance)
         if self.covariance.shape != (count, count):
-            raise ValueError(f"{count} names of edge parameters need a covariance of their size")
+            raise ModelError(f"{count} names of edge parameters need a covariance of their size.")
+        if count and np.min(np.diagonal(self.covariance)) < 0.0:
+            raise ModelError("The variances of an edge's parameters must be 0 or more.")
 
     @property
     def mean(self) -> Array:
@@ -341,6 +383,10 @@ def _turning_stations(edge: Edge, tilt: Array) -> Array:
     turns = ends[:-1] + shares * np.diff(ends)
     borders = np.broadcast_to(ends, (len(tilt), len(ends)))
     return np.sort(np.concatenate([borders, *turns], axis=1), axis=1)
+
+
+def _any(value: float | Array) -> bool:
+    return value != 0.0 if isinstance(value, float) else bool(np.any(value))
 
 
 def _plain(value: Array) -> float | Array:

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.model.checks import check_name, check_numbers
 from scissorcal.model.friction_terms import PARAMETERS, TERMS, side_of
 from scissorcal.model.terms import Motion, Role, Term
+from scissorcal.model.transforms import LOG, LOGIT
 
 Array = NDArray[np.float64]
 
@@ -36,16 +38,25 @@ class FrictionLaw:
 
     ``values`` are parameters by name (:mod:`scissorcal.model.friction_terms`), adopted terms among
     them; the place c is ``angle_center``. Values may be arrays that broadcast with what the law is
-    evaluated on. ValueError for a name that is in no row.
+    evaluated on. ModelError for a name that is in no row, for a level, a scale or a length below
+    0, a share outside 0 to 1, and what is not finite.
     """
 
     values: Mapping[str, float | Array] = field(default_factory=dict)
     angle_center: float = 0.0
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.values if _row(name) is None]
-        if unknown:
-            raise ValueError(f'"{unknown[0]}" is no parameter of a friction law')
+        for name, value in self.values.items():
+            row = _row(name)
+            if row is None:
+                check_name("parameter of a friction law", name, _known_names())
+            elif row.transform is LOG:
+                check_numbers(f'"{name}" of a friction law', value, 0.0)
+            elif row.transform is LOGIT:
+                check_numbers(f'"{name}" of a friction law', value, 0.0, 1.0)
+            else:
+                check_numbers(f'"{name}" of a friction law', value)
+        check_numbers("the centre of a friction law", self.angle_center)
 
     @classmethod
     def of_fit(cls, values: Mapping[str, float | Array], angle_center: float) -> "FrictionLaw":
@@ -165,6 +176,13 @@ def _sum(law: FrictionLaw, motion: Motion, role: Role) -> Array:
     if role is Role.SLIDING:
         return np.where(motion.direction == 0.0, 0.0, total)
     return total
+
+
+def _known_names() -> list[str]:
+    rows = {name: _row(name) for name in (*PARAMETERS, *TERMS)}
+    stems = [name for name, row in rows.items() if row is not None]
+    sided = [f"{row.name}_{side}" for row in rows.values() if row for side in ("pos", "neg")]
+    return stems + sided
 
 
 def _row(name: str) -> Term | None:

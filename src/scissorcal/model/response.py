@@ -2,14 +2,19 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.errors import ModelError
+from scissorcal.model.checks import SMALLEST, check_name, check_numbers
 from scissorcal.model.log_spline import Bounds, LogSpline
 
 Array = NDArray[np.float64]
+
+Family = Literal["power", "exponential", "spline"]
+_FAMILIES = get_args(Family)
 
 LARGEST_ARGUMENT = 700.0
 """exp() overflows a float64 just above this; beyond it the exponential response is held."""
@@ -33,18 +38,39 @@ class Response:
       between each two of them: their logarithms change by ``shape`` (..., k - 2) from one to the
       next, and ``exponent`` is their geometric mean. Beyond the knots the outermost powers go on.
 
-    For delta <= 0 there is no contact and no force.
+    For delta <= 0 there is no contact and no force. ModelError for an unknown family, for a number
+    that is not finite and above 0 (``shape``: finite), and for knots that do not rise or are not
+    two more than the changes of shape.
 
     >>> float(Response("power", force=2.0, exponent=1.5, reference_m=3e-4).force_at(3e-4))
     2.0
     """
 
-    family: Literal["power", "exponential", "spline"]
+    family: Family
     force: float | Array
     exponent: float | Array
     reference_m: float
     shape: tuple[float, ...] | Array = ()
     knots_m: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_name("family of a response", self.family, _FAMILIES)
+        check_numbers("the force of a response (N)", self.force, SMALLEST)
+        check_numbers("the exponent of a response", self.exponent, SMALLEST)
+        check_numbers("the reference indentation of a response (m)", self.reference_m, SMALLEST)
+        if self.family == "spline":
+            self._check_knots()
+
+    def _check_knots(self) -> None:
+        check_numbers("the changes of shape of a response", self.shape)
+        check_numbers("the knots of a response (m)", self.knots_m, SMALLEST)
+        changes, knots = np.shape(self.shape)[-1], len(self.knots_m)
+        if knots < 2 or changes != knots - 2 or np.any(np.diff(self.knots_m) <= 0.0):
+            raise ModelError(
+                "A response that is a spline needs knots that rise, 2 or more, and one change of "
+                f"shape for each inner knot: it has {knots} knots, {self.knots_m}, and {changes} "
+                "changes."
+            )
 
     def force_at(self, indentation: ArrayLike) -> Array:
         """Force g in newtons, shape of the broadcast of ``indentation`` (m) and parameters."""

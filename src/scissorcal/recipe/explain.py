@@ -6,12 +6,14 @@ import math
 import types
 import typing
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from scissorcal.recipe.locate import key_lines
 from scissorcal.recipe.units import conversion, split_unit
+from scissorcal.recipe.unlikely import Unlikely
 
 Path = tuple[str | int, ...]
 
@@ -33,44 +35,78 @@ _EXPECTED = {
 }
 
 
+MOST_MISTAKES = 20
+"""As many as one reads before one corrects them and tries again."""
+
+LONGEST_KEY = 100
+"""Characters of a key, with its tables, that are shown; the schema's longest has 57."""
+
+_MOST_COMPARED = 500
+"""Unknown keys whose likely meaning is looked for; a recipe has fewer keys."""
+
+
+@dataclass(frozen=True)
+class Mistakes:
+    """Sentences in the order of the file, at most ``MOST_MISTAKES``, and how many there are."""
+
+    sentences: tuple[str, ...]
+    count: int
+
+
 def explain(
-    error: ValidationError, document: Mapping[str, Any], text: str, model: type[BaseModel]
-) -> list[str]:
-    """Turn what pydantic found into sentences in the order of the file, each with its line.
+    error: ValidationError | None,
+    unlikely: Sequence[Unlikely],
+    document: Mapping[str, Any],
+    text: str,
+    model: type[BaseModel],
+) -> Mistakes:
+    """Turn what pydantic found, and ``unlikely`` numbers, into sentences, each with its line.
 
     A key that was written under another name (a wrong unit, a typo) is one mistake, not two: the
-    name that stands there is reported, the name that is therefore missing is not.
+    name that stands there is reported, the name that is therefore missing is not. An unlikely
+    number that breaks a rule is one mistake, too: the rule, with the likely slip.
     """
-    details = error.errors(include_url=False)
+    details = error.errors(include_url=False) if error is not None else []
     unknown = [_path(item) for item in details if item["type"] == "extra_forbidden"]
-    meant = {path: _suggest(path, model, document) for path in unknown}
+    meant = {path: _suggest(path, model, document) for path in unknown[:_MOST_COMPARED]}
     excused = {(*path[:-1], key) for path, key in meant.items() if key is not None}
-    mistakes: list[tuple[Path, str]] = []
-    for item in details:
-        path = _path(item)
-        if item["type"] == "missing":
-            if path not in excused:
-                mistakes.append((path[:-1], _missing(path)))
-        elif item["type"] == "extra_forbidden":
-            mistakes.append((path, _unknown(path, meant[path], item["input"], model)))
-        elif item["type"] == "value_error":
-            mistakes.append(_broken_rule(path, item))
-        else:
-            fields = _fields(model, path)
-            mistakes.append((path, f"{dotted(path)}: {_wrong_value(item, fields)}"))
+    details = [one for one in details if one["type"] != "missing" or _path(one) not in excused]
+    mistakes = [_mistake(item, meant, model) for item in details[:MOST_MISTAKES]]
+    slips = {one.path: one.slip for one in unlikely}
+    mistakes = [(path, f"{said} {slips.get(path, '')}".rstrip()) for path, said in mistakes]
+    wrong = {path[:depth] for path, _ in mistakes for depth in range(1, len(path) + 1)}
+    alone = [one for one in unlikely if one.path not in wrong]
+    count = len(details) + len(alone)
+    mistakes = [*((one.path, one.told) for one in alone), *mistakes][:MOST_MISTAKES]
     lines = key_lines(text, [_given(document, path) for path, _ in mistakes])
-    return [
-        f"line {line}, {sentence}" if path and line else sentence
-        for line, (path, sentence) in sorted(
-            zip(lines, mistakes, strict=True), key=lambda pair: pair[0] or 0
-        )
-    ]
+    ordered = sorted(zip(lines, mistakes, strict=True), key=lambda pair: pair[0] or 0)
+    return Mistakes(
+        tuple(
+            f"line {line}, {sentence}" if path and line else sentence
+            for line, (path, sentence) in ordered
+        ),
+        count,
+    )
+
+
+def _mistake(
+    item: Any, meant: Mapping[Path, str | None], model: type[BaseModel]
+) -> tuple[Path, str]:
+    """Where one of pydantic's findings is told, and its sentence."""
+    path = _path(item)
+    if item["type"] == "missing":
+        return path[:-1], _missing(path)
+    if item["type"] == "extra_forbidden":
+        return path, _unknown(path, meant.get(path), item["input"], model)
+    if item["type"] == "value_error":
+        return _broken_rule(path, item)
+    return path, f"{dotted(path)}: {_wrong_value(item, _fields(model, path))}"
 
 
 def dotted(path: Path) -> str:
     """Write a path as people do: ``scene.contact_mm[1]``."""
     words = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
-    return words.lstrip(".")
+    return _short(words.lstrip("."))
 
 
 def _path(item: Any) -> Path:
@@ -173,6 +209,8 @@ def _elsewhere(key: str, path: Path, model: type[BaseModel]) -> str:
 def _suggest(path: Path, model: type[BaseModel], document: Any) -> str | None:
     """Return the key that was probably meant: same stem in another unit, else a near spelling."""
     key = str(path[-1])
+    if len(key) > LONGEST_KEY:
+        return None
     present = document
     for part in path[:-1]:
         present = present[part]
@@ -233,11 +271,16 @@ def _table_model(model: type[BaseModel], table: Path) -> type[BaseModel] | None:
         if key not in model.model_fields:
             return None
         annotation = model.model_fields[key].annotation
-        inner = _model_within(annotation) or _model_listed(annotation)
+        inner = table_model(annotation)
         if inner is None:
             return None
         model = inner
     return model
+
+
+def table_model(annotation: Any) -> type[BaseModel] | None:
+    """The model of a table, or of a list of tables; None for the type of a value."""
+    return _model_within(annotation) or _model_listed(annotation)
 
 
 def _model_within(annotation: Any) -> type[BaseModel] | None:
@@ -274,7 +317,13 @@ def _show(value: Any) -> str:
         text = json.dumps(value, ensure_ascii=False)
     except (TypeError, ValueError):
         text = str(value)
+    except RecursionError:
+        text = "what is nested too deeply"
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _short(key: str) -> str:
+    return key if len(key) <= LONGEST_KEY else key[: LONGEST_KEY - 3] + "..."
 
 
 def _kind_of(value: Any) -> str:

@@ -13,7 +13,9 @@ from scissorcal.recipe.locate import broken_statement
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
+    from scissorcal.recipe.explain import Mistakes
     from scissorcal.recipe.schema import Recipe
+    from scissorcal.recipe.unlikely import Unlikely
 
     Model = TypeVar("Model", bound=BaseModel)
 
@@ -21,42 +23,56 @@ if TYPE_CHECKING:
 def load_recipe(path: Path | str) -> "Recipe":
     """Read and check a recipe file.
 
-    Raises InputError naming file, line, key, what is allowed and a suggestion, for every mistake
-    found; and InputError where the file cannot be read.
+    Raises InputError naming file, line, key, what is allowed and a suggestion, for the first 20
+    mistakes; and InputError where the file cannot be read. A number that is unlikely in its unit
+    (:mod:`scissorcal.recipe.unlikely`) is a mistake unless the recipe's ``unusual`` names its key.
 
     >>> from scissorcal.recipe.library import recipe_path
     >>> load_recipe(recipe_path("paper-80gsm")).material.thickness_mm
     0.1
     """
+    return parse_recipe(read_text(Path(path)), str(path))
+
+
+def parse_recipe(text: str, source: str = "recipe", *, judged: bool = True) -> "Recipe":
+    """Check a recipe given as text; ``source`` names it in messages.
+
+    ``judged`` is false for a text that a capture wrote or a recording holds: its numbers were
+    judged where a person wrote them, and what was captured by them stays readable.
+    """
     from scissorcal.recipe.schema import Recipe
+    from scissorcal.recipe.unlikely import unlikely_numbers
 
-    return load_toml(Path(path), Recipe)
-
-
-def parse_recipe(text: str, source: str = "recipe") -> "Recipe":
-    """Check a recipe given as text; ``source`` names it in messages."""
-    from scissorcal.recipe.schema import Recipe
-
-    return parse_toml(text, Recipe, source)
+    document = _parse(text, source)
+    unlikely = unlikely_numbers(document) if judged else []
+    return _checked(document, unlikely, text, Recipe, source)
 
 
 def load_toml(path: Path, model: "type[Model]") -> "Model":
     """Read a TOML file into ``model``; mistakes raise InputError as in `load_recipe`."""
-    return parse_toml(read_text(path), model, str(path))
+    text = read_text(path)
+    return _checked(_parse(text, str(path)), [], text, model, str(path))
 
 
-def parse_toml(text: str, model: "type[Model]", source: str) -> "Model":
-    """Check TOML text against ``model``; mistakes raise InputError as in `load_recipe`."""
+def _checked(
+    document: dict[str, Any],
+    unlikely: "list[Unlikely]",
+    text: str,
+    model: "type[Model]",
+    source: str,
+) -> "Model":
     from pydantic import ValidationError
 
     from scissorcal.recipe.explain import explain
 
-    document = _parse(text, source)
+    error = None
     try:
-        return model.model_validate(document)
-    except ValidationError as error:
-        mistakes = explain(error, document, text, model)
-    raise InputError(_message(source, mistakes))
+        found = model.model_validate(document)
+        if not unlikely:
+            return found
+    except ValidationError as raised:
+        error = raised
+    raise InputError(_message(source, explain(error, unlikely, document, text, model)))
 
 
 def read_text(path: Path) -> str:
@@ -113,8 +129,10 @@ def _syntax_hint(line: str, reason: str) -> str:
     return ""
 
 
-def _message(source: str, mistakes: list[str]) -> str:
-    if len(mistakes) == 1:
-        return f"{source}, {mistakes[0]}"
-    lines = "".join(f"\n  {mistake}" for mistake in mistakes)
-    return f"{source} has {len(mistakes)} mistakes:{lines}"
+def _message(source: str, mistakes: "Mistakes") -> str:
+    if mistakes.count == 1:
+        return f"{source}, {mistakes.sentences[0]}"
+    lines = "".join(f"\n  {sentence}" for sentence in mistakes.sentences)
+    shown = len(mistakes.sentences)
+    of_them = f"; {shown} of them" if shown < mistakes.count else ""
+    return f"{source} has {mistakes.count} mistakes{of_them}:{lines}"

@@ -21,6 +21,8 @@ def key_lines(text: str, paths: Sequence[Sequence[str | int]]) -> list[int | Non
         for index, path in enumerate(paths):
             if found[index] is None and _has(document, path):
                 found[index] = start
+        if None not in found:
+            break
     return found
 
 

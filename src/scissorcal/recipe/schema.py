@@ -318,12 +318,17 @@ class Fit(Section):
 
 
 class Recipe(Section):
-    """A whole recipe. ``format`` names the schema's version."""
+    """A whole recipe. ``format`` names the schema's version.
+
+    ``unusual`` are keys whose numbers are meant although they are far from the everyday range, such
+    as "rig.handle_radius_mm"; without it they are refused where the recipe is read.
+    """
 
     format: Literal["scissorcal-recipe/1"]
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
     description: str = ""
     specimen: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")] | None = None
+    unusual: Annotated[tuple[str, ...], Strict(False)] = Field(default=(), exclude=True)
     rig: Rig
     material: Material
     scene: Scene

@@ -28,6 +28,8 @@ _BASE: dict[str, tuple[str, float]] = {
 _PREFIX = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3}
 _PREFIXED = {"m", "g", "s", "Hz", "rad", "N", "Nm", "J", "V", "A"}
 _SPECIAL: dict[str, tuple[str, float]] = {"Ncm": ("N m", 1e-2), "Nmm": ("N m", 1e-3)}
+_MOST_FACTORS = 12
+"""Words at a name's end in which its unit is looked for; "Nm_s_per_rad" has four."""
 _DIMENSION = {
     "m": {"m": 1},
     "kg": {"kg": 1},
@@ -78,10 +80,11 @@ def parse_unit(text: str) -> Unit | None:
             return None
         for token in part.split("_") if part else ():
             symbol = token.rstrip("0123456789")
-            power = sign * int(token[len(symbol) :] or 1)
+            digits = token[len(symbol) :] or "1"
             known = _symbol(symbol)
-            if known is None or abs(power) > 9:
+            if known is None or len(digits) > 1:
                 return None
+            power = sign * int(digits)
             base, scale = known
             factor *= scale**power
             for name, exponent in _DIMENSION[base].items():
@@ -99,7 +102,7 @@ def split_unit(key: str) -> tuple[str, Unit | None]:
     >>> split_unit("family")
     ('family', None)
     """
-    words = key.split("_")
+    words = key.rsplit("_", _MOST_FACTORS)
     for start in range(1, len(words)):
         unit = parse_unit("_".join(words[start:]))
         if unit is not None:

@@ -149,11 +149,20 @@ def _contradiction(table: Table, channel: str, heading: str | None, stated: str 
     )
 
 
+def _in_last_brackets(heading: str) -> str | None:
+    """What stands in the brackets that end a heading, None where none do."""
+    if not heading.endswith(("]", ")")):
+        return None
+    body = heading[:-1]
+    inside = body[max(body.rfind("]"), body.rfind(")")) + 1 :]
+    opened = [place for place in (inside.find("["), inside.find("(")) if place >= 0]
+    return inside[min(opened) + 1 :].strip() if opened else None
+
+
 def _unit_in(heading: str) -> str | None:
     """Return the unit that a heading names, in brackets or after its last words."""
-    brackets = re.search(r"[\[(]([^\])]*)[\])]\s*$", heading)
-    if brackets:
-        text = brackets[1].strip()
+    text = _in_last_brackets(heading.rstrip())
+    if text is not None:
         known = _is_raw(text) or parse_unit(_of_force(_plain(text))[0])
         return text if known else None
     _, unit = split_unit(heading.strip())

@@ -284,7 +284,7 @@ def _captured(recording: "Recording", kind: CaptureKind) -> dict[str, object] | 
     if not recording.recipe_toml:
         return None
     try:
-        return dict(capture_facts(parse_recipe(recording.recipe_toml), kind))
+        return dict(capture_facts(parse_recipe(recording.recipe_toml, judged=False), kind))
     except InputError:
         return "the recipe at its capture cannot be read by this version"
 

@@ -215,12 +215,12 @@ def test_points_that_are_none_have_no_nearest_point():
 @pytest.mark.parametrize("kind", [Sphere, Cylinder])
 @pytest.mark.parametrize("radius", [0.0, math.nan, math.inf])
 def test_a_radius_must_be_one(kind, radius):
-    with pytest.raises(InputError, match=f"The radius of a {kind.__name__.lower()} is"):
+    with pytest.raises(InputError, match=f"The radius of a {kind.__name__.lower()}.* must"):
         kind(radius)
 
 
 def test_an_axis_must_have_an_angle():
-    with pytest.raises(InputError, match="axis must be a finite number"):
+    with pytest.raises(InputError, match=r"axis \(rad\) must be finite"):
         Cylinder(0.02, math.nan)
 
 

@@ -1,11 +1,16 @@
-"""Every quantity with its everyday and its extreme range: the one place that defines both."""
+"""Every quantity with its everyday and its extreme range.
+
+Everyday ranges are those of :mod:`scissorcal.recipe.everyday`, extreme ones stand here.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from scissorcal.recipe.everyday import EVERYDAY
 
 Array = NDArray[np.float64]
 Spacing = Literal["linear", "log", "sign-log", "whole"]
@@ -66,54 +71,58 @@ class Quantity:
         return 0.0 if rng.random() < ZERO_SHARE else min(max(value, low), high)
 
 
+def _quantity(name: str, unit: str, *others: Any) -> Quantity:
+    return Quantity(name, unit, EVERYDAY[name].ends, *others)
+
+
 _PHYSICS = ("model", "kernel")
 _ROWS = (
-    Quantity("opening", "rad", (0.2, 0.9), (0.0, float(np.pi)), "linear", _PHYSICS,
-             "angle between the blades"),
-    Quantity("opening_rate", "rad/s", (-2.0, 2.0), (-1e3, 1e3), "sign-log", _PHYSICS,
-             "rate of the opening; negative closes", 1e-6),
-    Quantity("contact", "blade lengths", (0.2, 0.8), (0.0, 1.5), "linear", _PHYSICS,
-             "place of the crack tip, from the pivot to beyond the tip"),
-    Quantity("indentation", "m", (1e-6, 5e-4), (1e-12, 1e-1), "log", _PHYSICS,
-             "depth of the edge in the material, where it is given in place of the contact"),
-    Quantity("thickness", "m", (5e-5, 2e-3), (1e-6, 1e-1), "log", _PHYSICS,
-             "thickness of the plate"),
-    Quantity("force", "N", (0.5, 20.0), (1e-6, 1e6), "log", _PHYSICS,
-             "response at the reference indentation of 0.3 mm"),
-    Quantity("exponent", "1", (1.0, 2.5), (0.5, 8.0), "log", _PHYSICS,
-             "exponent of the response"),
-    Quantity("toughness", "J/m^2", (1e3, 2e4), (1.0, 1e5), "log", _PHYSICS,
-             "energy per area of cut"),
-    Quantity("kappa", "1", (0.5, 1.0), (1e-3, 1.0), "log", _PHYSICS,
-             "share of the fracture energy at which a running crack stops"),
-    Quantity("edge_offset", "m", (-0.01, 0.0), (-0.1, 0.1), "sign-log", _PHYSICS,
-             "offset of the edge from the blade's centreline at the pivot", 1e-6),
-    Quantity("taper", "rad", (-0.05, 0.1), (-1.5, 1.5), "linear", _PHYSICS,
-             "angle of the edge against the centreline; parallel and re-entrant edges included"),
-    Quantity("curvature", "1/m", (-2.0, 2.0), (-1e3, 1e3), "sign-log", _PHYSICS,
-             "bend of the edge", 1e-3),
-    Quantity("nick", "m", (0.0, 1e-5), (0.0, 1e-2), "log", _PHYSICS,
-             "depth of a nick of 5 mm width in the edge", 1e-7),
-    Quantity("rate_damping", "s/m", (0.0, 10.0), (0.0, 1e12), "log", _PHYSICS,
-             "growth of the force with the speed of indentation", 1e-3),
-    Quantity("blade_length", "m", (0.05, 0.12), (1e-3, 10.0), "log", _PHYSICS,
-             "length of the blade"),
-    Quantity("time_step", "s", (2.5e-4, 2e-3), (1e-5, 1.0), "log", ("kernel", "signals"),
-             "time between two samples; with gaps, duplicates and backward jumps", 1e-5),
-    Quantity("inertia", "kg m^2", (1e-5, 1e-3), (1e-6, 1e2), "log", ("kernel", "signals"),
-             "inertia of the blades about the pivot"),
-    Quantity("table_size", "knots", (33, 128), (2, 256), "whole", ("kernel",),
-             "knots of a table"),
-    Quantity("rotation", "rad", (0.0, 1.0), (0.0, float(np.pi)), "linear", ("vision",),
-             "angle of a pose; quaternions near half a turn"),
-    Quantity("tilt", "rad", (0.3, 1.0), (0.0, float(np.pi / 2)), "linear", ("vision",),
-             "angle between a plate's normal and the view: 0 is square-on, pi/2 edge-on"),
-    Quantity("samples", "1", (1e3, 1e6), (1, 1e7), "whole", ("inference", "signals"),
-             "samples of a recording"),
-    Quantity("scale", "1", (1e-3, 1e3), (1e-12, 1e12), "log", ("inference",),
-             "scale of a parameter or of data"),
-    Quantity("outlier", "sd", (0.0, 5.0), (0.0, 1e6), "log", ("inference", "signals"),
-             "distance of an outlier from the rest", 1.0),
+    _quantity("opening", "rad", (0.0, float(np.pi)), "linear", _PHYSICS,
+              "angle between the blades"),
+    _quantity("opening_rate", "rad/s", (-1e3, 1e3), "sign-log", _PHYSICS,
+              "rate of the opening; negative closes", 1e-6),
+    _quantity("contact", "blade lengths", (0.0, 1.5), "linear", _PHYSICS,
+              "place of the crack tip, from the pivot to beyond the tip"),
+    _quantity("indentation", "m", (1e-12, 1e-1), "log", _PHYSICS,
+              "depth of the edge in the material, where it is given in place of the contact"),
+    _quantity("thickness", "m", (1e-6, 1e-1), "log", _PHYSICS,
+              "thickness of the plate"),
+    _quantity("force", "N", (1e-6, 1e6), "log", _PHYSICS,
+              "response at the reference indentation of 0.3 mm"),
+    _quantity("exponent", "1", (0.5, 8.0), "log", _PHYSICS,
+              "exponent of the response"),
+    _quantity("toughness", "J/m^2", (1.0, 1e5), "log", _PHYSICS,
+              "energy per area of cut"),
+    _quantity("kappa", "1", (1e-3, 1.0), "log", _PHYSICS,
+              "share of the fracture energy at which a running crack stops"),
+    _quantity("edge_offset", "m", (-0.1, 0.1), "sign-log", _PHYSICS,
+              "offset of the edge from the blade's centreline at the pivot", 1e-6),
+    _quantity("taper", "rad", (-1.5, 1.5), "linear", _PHYSICS,
+              "angle of the edge against the centreline; parallel and re-entrant edges included"),
+    _quantity("curvature", "1/m", (-1e3, 1e3), "sign-log", _PHYSICS,
+              "bend of the edge", 1e-3),
+    _quantity("nick", "m", (0.0, 1e-2), "log", _PHYSICS,
+              "depth of a nick of 5 mm width in the edge", 1e-7),
+    _quantity("rate_damping", "s/m", (0.0, 1e12), "log", _PHYSICS,
+              "growth of the force with the speed of indentation", 1e-3),
+    _quantity("blade_length", "m", (1e-3, 10.0), "log", _PHYSICS,
+              "length of the blade"),
+    _quantity("time_step", "s", (1e-5, 1.0), "log", ("kernel", "signals"),
+              "time between two samples; with gaps, duplicates and backward jumps", 1e-5),
+    _quantity("inertia", "kg m^2", (1e-6, 1e2), "log", ("kernel", "signals"),
+              "inertia of the blades about the pivot"),
+    _quantity("table_size", "knots", (2, 256), "whole", ("kernel",),
+              "knots of a table"),
+    _quantity("rotation", "rad", (0.0, float(np.pi)), "linear", ("vision",),
+              "angle of a pose; quaternions near half a turn"),
+    _quantity("tilt", "rad", (0.0, float(np.pi / 2)), "linear", ("vision",),
+              "angle between a plate's normal and the view: 0 is square-on, pi/2 edge-on"),
+    _quantity("samples", "1", (1, 1e7), "whole", ("inference", "signals"),
+              "samples of a recording"),
+    _quantity("scale", "1", (1e-12, 1e12), "log", ("inference",),
+              "scale of a parameter or of data"),
+    _quantity("outlier", "sd", (0.0, 1e6), "log", ("inference", "signals"),
+              "distance of an outlier from the rest", 1.0),
 )  # fmt: skip
 
 QUANTITIES: Mapping[str, Quantity] = {row.name: row for row in _ROWS}

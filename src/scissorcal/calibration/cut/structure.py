@@ -1,7 +1,6 @@
 """The discrete choices and the geometry of a cut, and the model that they and parameters make."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.model import Cutting, Edge, EdgeBelief, Response
+from scissorcal.model.checks import LARGEST, SMALLEST
 from scissorcal.model.transforms import IDENTITY
 from scissorcal.recipe.edge import stated_curve
 from scissorcal.recipe.schema import Recipe
@@ -37,12 +37,15 @@ def cutting_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> C
 def response_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Response:
     """The response of a fit's structure, with parameters by name."""
     family, reference = structure["response"], structure["reference_indentation_m"]
-    plain = Response(family, values["response_force"], values["response_exponent"], reference)
+    # a trial far out may overflow; its torque is then no number, and the trial is rejected
+    force, exponent = (
+        np.clip(values[name], SMALLEST, LARGEST) for name in ("response_force", "response_exponent")
+    )
     if family != "spline":
-        return plain
+        return Response(family, force, exponent, reference)
     knots = tuple(structure["response_knots_m"])
     steps = [values[f"response_shape_{index}"] for index in range(1, len(knots) - 1)]
-    return replace(plain, shape=np.stack(steps, axis=-1), knots_m=knots)
+    return Response(family, force, exponent, reference, np.stack(steps, axis=-1), knots)
 
 
 def edge_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Edge:

@@ -1,12 +1,12 @@
 """The rig's two axes as identified: inertia, friction and offset of opening and advance."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.model.checks import SMALLEST, check_numbers
 from scissorcal.model.friction import FrictionLaw, friction_torque
 from scissorcal.model.mechanism.dynamics import Mechanism
 
@@ -20,7 +20,7 @@ class AxisLaw:
     ``inertia`` in kg m^2 (kg for a sliding axis), ``offset`` in N m (N). Dry friction jumps at
     rest; below ``rest_rate`` (rad/s or m/s) friction is the damper F(rest_rate) / rest_rate, as a
     package's tables have it (0: it jumps, and no integrator of fixed steps stands still).
-    ValueError for an inertia that is not positive.
+    ModelError for an inertia that is not positive.
     """
 
     inertia: float
@@ -29,10 +29,9 @@ class AxisLaw:
     rest_rate: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.inertia) and self.inertia > 0.0):
-            raise ValueError(f"the inertia of an axis has to be positive, not {self.inertia:g}")
-        if not self.rest_rate >= 0.0:
-            raise ValueError(f"the rest rate of an axis has to be 0 or more, not {self.rest_rate}")
+        check_numbers("the inertia of an axis (kg m^2 or kg)", self.inertia, SMALLEST)
+        check_numbers("the offset of an axis (N m or N)", self.offset)
+        check_numbers("the rest rate of an axis (rad/s or m/s)", self.rest_rate, 0.0)
 
     @classmethod
     def of_fit(

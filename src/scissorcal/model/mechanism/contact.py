@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.model.blade_point import BladePoint
+from scissorcal.model.checks import check_numbers
 
 Array = NDArray[np.float64]
 
@@ -41,9 +42,8 @@ class ContactLaw:
     damping_N_s_per_m: float = 0.0
 
     def __post_init__(self) -> None:
-        levels = (self.stiffness_N_per_m, self.damping_N_s_per_m)
-        if not (np.isfinite(levels).all() and min(levels) >= 0.0):
-            raise ValueError("stiffness and damping of a contact have to be finite and 0 or more")
+        check_numbers("the stiffness of a contact (N/m)", self.stiffness_N_per_m, 0.0)
+        check_numbers("the damping of a contact (N s/m)", self.damping_N_s_per_m, 0.0)
 
     def force(self, gap: ArrayLike, gap_rate: ArrayLike) -> Array:
         """lambda [N] at gaps [m] and their rates [m/s], which broadcast."""

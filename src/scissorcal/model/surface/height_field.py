@@ -6,7 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.errors import ModelError
 from scissorcal.model.bspline import FEWEST, spline_powers
+from scissorcal.model.checks import check_numbers
 from scissorcal.model.surface.protocol import Array, NearestPoints, SurfacePoint, as_points
 
 _BEYOND = 3
@@ -23,13 +25,28 @@ class HeightField:
     over which the curvature falls to 0, and as a plane beyond the corners: f is twice
     differentiable everywhere. Nothing was probed out there, which :meth:`inside` tells.
     ``outline`` (k, 3), rows (a, b, c) with a x + b y + c <= 0 inside, bounds the probed points
-    within the rectangle.
+    within the rectangle. ModelError for numbers that are not finite, ends that do not rise, and
+    fewer than one interval.
     """
 
     x_m: tuple[float, float]
     y_m: tuple[float, float]
     weights_m: Array
     outline: Array | None = None
+
+    def __post_init__(self) -> None:
+        for axis, ends in (("x", self.x_m), ("y", self.y_m)):
+            check_numbers(f"the ends of a height field along {axis} (m)", ends)
+            if not ends[0] < ends[1]:
+                raise ModelError(f"A height field's end along {axis} must lie beyond its start.")
+        check_numbers("the weights of a height field (m)", self.weights_m)
+        if self.outline is not None:
+            check_numbers("the outline of a height field", self.outline)
+        if self.weights_m.ndim != 2 or min(self.weights_m.shape) < FEWEST:
+            raise ModelError(
+                f"A height field needs {FEWEST} weights or more along both axes; the shape of its "
+                f"weights is {self.weights_m.shape}."
+            )
 
     def at(self, point: Array) -> SurfacePoint:
         """Level, gradient and Hessian at one point (3,)."""

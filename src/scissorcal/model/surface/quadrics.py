@@ -13,7 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scissorcal.errors import InputError
+from scissorcal.errors import ModelError
+from scissorcal.model.checks import check_numbers
 from scissorcal.model.surface.protocol import Array, NearestPoints, SurfacePoint, as_points
 
 _ROUNDING = 1e-13
@@ -114,9 +115,8 @@ class Cylinder(_Quadric):
     axis_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        _refuse_radius("cylinder", self.radius_m)
-        if not math.isfinite(self.axis_rad):
-            raise InputError("The angle of a cylinder's axis must be a finite number.")
+        _check_radius("cylinder", self.radius_m)
+        check_numbers("the angle of a cylinder's axis (rad)", self.axis_rad)
 
     @property
     def _bend(self) -> float:
@@ -135,7 +135,7 @@ class Sphere(_Quadric):
     radius_m: float
 
     def __post_init__(self) -> None:
-        _refuse_radius("sphere", self.radius_m)
+        _check_radius("sphere", self.radius_m)
 
     @property
     def _bend(self) -> float:
@@ -146,9 +146,10 @@ class Sphere(_Quadric):
         return np.eye(2, 3)
 
 
-def _refuse_radius(kind: str, radius_m: float) -> None:
-    if not math.isfinite(radius_m) or radius_m == 0.0:
-        raise InputError(
-            f"The radius of a {kind} is {radius_m * 1e3:g} mm, but it must be finite and not 0: "
-            "positive where the surface bulges out of the material, negative where it is hollow."
+def _check_radius(kind: str, radius_m: float) -> None:
+    check_numbers(f"the radius of a {kind} (m)", radius_m)
+    if radius_m == 0.0:
+        raise ModelError(
+            f"The radius of a {kind} must not be 0: it is positive where the surface bulges out of "
+            "the material, negative where it is hollow."
         )

@@ -143,14 +143,14 @@ def capture_into(
         if design:
             recipe, sentence = designed_for(workspace, kind, link.identity)
             text = with_designed_captures(recipe, text)
-            recipe = parse_recipe(text, str(workspace.recipe_path))
+            recipe = parse_recipe(text, str(workspace.recipe_path), judged=False)
             if say is not None:
                 say(sentence)
         if kind == "friction":
             usable, too_slow = with_usable_sweeps(recipe, link.identity, probe)
             if too_slow:
                 text = with_designed_captures(usable, text)
-                recipe = parse_recipe(text, str(workspace.recipe_path))
+                recipe = parse_recipe(text, str(workspace.recipe_path), judged=False)
                 if say is not None:
                     say(too_slow)
         path = workspace.new_recording(kind)
