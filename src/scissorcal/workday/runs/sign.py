@@ -60,9 +60,9 @@ def sign_report(
         place = ".".join(str(part) for part in first["loc"])
         raise InputError(f"The {place} cannot be signed with: {first['msg']}.") from None
     if key is not None:
-        from scissorcal.package.keys import sign_digest
+        from scissorcal.package.keys import signer
 
-        signed = sign_digest(key, review.digest, passphrase)
+        signed = signer(key, passphrase)(review.signed_text)
         review = review.model_copy(update={"key": signed})
     _write(engine.file("report sign"), engine.workspace.report_html, review)
     engine.refresh()
