@@ -34,11 +34,9 @@ def stated_recipe(provenance: Provenance) -> Recipe:
     try:
         return Recipe.model_validate_json(text)
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"]) or "the whole"
         raise InputError(
-            f"provenance.recipe is not a recipe of this version ({place}: {first['msg']}; the "
-            f"package was built by version {provenance.scissorcal_version})"
+            f"provenance.recipe is not a recipe of this version ({_first(error)}; the package was "
+            f"built by version {provenance.scissorcal_version})"
         ) from None
 
 
@@ -47,11 +45,15 @@ def refuse_contradictions(manifest: Manifest, recipe: Recipe, model: ExactModel)
 
     ``model`` is the exact model of the manifest's parameters.
     """
-    for place, stated, compiled in _pairs(manifest, recipe, model):
-        for key, found, wanted in _differences(place, stated, compiled):
-            raise InputError(
-                f"{key} is {found!r}, and the recipe and parameters in the package give {wanted!r}"
-            )
+    try:
+        for place, stated, compiled in _pairs(manifest, recipe, model):
+            for key, found, wanted in _differences(place, stated, compiled):
+                raise InputError(
+                    f"{key} is {found!r}, and the recipe and parameters in the package give "
+                    f"{wanted!r}"
+                )
+    except ValidationError as error:
+        raise InputError(f"its recipe and parameters give no package ({_first(error)})") from None
 
 
 def _pairs(manifest: Manifest, recipe: Recipe, model: ExactModel) -> Iterator[tuple[str, Any, Any]]:
@@ -100,6 +102,12 @@ def _differences(place: str, stated: Any, compiled: Any) -> Iterator[tuple[str, 
                 yield from _differences(f"{place}.{index}", left, right)
     elif one != other:
         yield place, stated, compiled
+
+
+def _first(error: ValidationError) -> str:
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"]) or "the whole"
+    return f"{place}: {first['msg']}"
 
 
 def _plain(value: Any) -> Any:
