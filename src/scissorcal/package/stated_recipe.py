@@ -71,6 +71,9 @@ def _pairs(manifest: Manifest, recipe: Recipe, model: ExactModel) -> Iterator[tu
         yield "mechanics.friction", manifest.mechanics.friction, None
     yield "plate_pose", manifest.plate_pose, scene.plate_pose
     yield "bound.allowed_share", manifest.bound.allowed_share, SHARE_OF_TOLERANCE * share
+    friction = manifest.mechanics.friction
+    slowest = friction.rate_eps_rad_per_s if friction else 0.0
+    yield "bound.from_rate_rad_per_s", manifest.bound.from_rate_rad_per_s, slowest
     if manifest.pieces is not None:
         yield "pieces", "of a drawn plate", "of a drawn plate" if recipe.plate.layers else None
     if manifest.reach is not None:

@@ -18,6 +18,7 @@ import pytest
 from scissorcal.calibration.store import load, save
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
+from scissorcal.foreign.formats import RECORDS
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.plan import make_plan
@@ -338,3 +339,22 @@ def test_records_survive_a_torn_header(tmp_path: Path) -> None:
         assert records == [{"value": 1.5}]
         with pytest.raises(ValueError, match="not JSON compliant"):
             file.append({"value": np.nan})
+
+
+@pytest.mark.parametrize("inputs", [b'["../../x"]', b'"../../../"', b'"a\\u0000b"', b"7" * 5000])
+def test_records_of_a_strange_hash_are_put_aside_here(tmp_path: Path, inputs: bytes) -> None:
+    path = tmp_path / "a.jsonl"
+    path.write_bytes(b'{"format":"scissorcal-records/1","inputs":%s}\n' % inputs)
+    with RecordFile(path, "one") as file:
+        assert file.records == []
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["a.jsonl", "a.jsonl.unreadable"]
+
+
+def test_what_is_no_file_holds_no_records(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.jsonl")
+    (tmp_path / "device.jsonl").symlink_to("/dev/zero")
+    with (tmp_path / "large.jsonl").open("wb") as large:
+        large.truncate(RECORDS.most_bytes + 1)
+    for name, words in (("pipe", "named pipe"), ("device", "a device"), ("large", "another file")):
+        with pytest.raises(InputError, match=words), RecordFile(tmp_path / f"{name}.jsonl", "one"):
+            pass
