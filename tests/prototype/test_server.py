@@ -343,17 +343,15 @@ UNREADABLE = {
 def test_what_is_no_request_is_a_line_on_the_terminal(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    answers: dict[str, bytes] = {}
-
     async def act(server: PrototypeServer) -> None:
         port = urlsplit(server.url).port
         for _ in range(3):
-            for what, request in UNREADABLE.items():
+            for request in UNREADABLE.values():
                 reader, writer = await asyncio.open_connection("127.0.0.1", port)
                 writer.write(request)
                 writer.write_eof()
                 with contextlib.suppress(ConnectionError):
-                    answers[what] = await reader.read()
+                    await reader.read()
                 writer.close()
                 with contextlib.suppress(ConnectionError):
                     await writer.wait_closed()
@@ -364,4 +362,3 @@ def test_what_is_no_request_is_a_line_on_the_terminal(
     assert len(set(told)) == len(told)
     assert all("cannot read was refused (" in line for line in told)
     assert all(line.isprintable() for line in told)
-    assert answers["a long address"].startswith(b"HTTP/1.1 400")

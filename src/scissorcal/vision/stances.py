@@ -58,7 +58,7 @@ def _stance(row: list[str], head: list[str], where: str) -> tuple[str, tuple[flo
     if len(row) != len(head):
         raise InputError(
             f"{where}: the first line names {len(head)} columns, and this one has {len(row)}. "
-            "Write numbers with a point, such as 'rig-01.jpg,30.5,25', names with a comma in quotes."
+            "Write numbers with a point, and names with a comma in quotes: 'rig-01.jpg,30.5,25'."
         )
     cells = dict(zip(head, row, strict=True))
     name = re.split(r"[/\\]", cells["file"].strip())[-1]
