@@ -34,7 +34,7 @@ class VerdictError(ScissorcalError):
 
 
 class DeviceError(ScissorcalError):
-    """The rig or the link to it failed (exit code 4).
+    """The rig, a cluster, or the link to one of them failed (exit code 4).
 
     ``stop`` names the servo's stop (``scissorcal.kernel.StopReason``) where that was one.
     """

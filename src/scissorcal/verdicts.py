@@ -196,6 +196,10 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "what the package is made from: checks that its fits failed",
     ),
     "package review": ("at least", "whether the report was accepted: 1 if so"),
+    "package signature": (
+        "at least",
+        "whether what is rendered is what a key signed that is trusted: 1 if so",
+    ),
     "render admission": (
         "at most",
         "stability of what is felt: rendered stiffness over what the rig renders in a hand",

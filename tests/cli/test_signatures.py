@@ -169,10 +169,19 @@ def test_a_key_shows_who_signed(day: Workspace, cli: Cli, tmp_path: Path) -> Non
     assert fingerprint in signed.out
     assert fingerprint in day.report_html.read_text(encoding="utf-8")
     assert cli("package", "build").code == 0
+    unsigned = cli("package", "check", "--trusted-key", f"{lab}.pub")
+    assert unsigned.code == 3
+    assert "has no signature of its content" in unsigned.out
+    assert "package build --key" in unsigned.out
+    built = cli("package", "build", "--key", lab)
+    assert (built.code, fingerprint in built.out) == (0, True)
+    again = cli("package", "build", "--key", lab)
+    assert "nothing changed since it was built" in again.out
     assert cli("package", "check", "--trusted-key", f"{lab}.pub").code == 0
     refused = cli("package", "check", "--trusted-key", other)
     assert refused.code == 3
     assert "none of the trusted keys signed" in refused.out
+    assert "none of the trusted ones" in refused.out
     run_words = ("render", "--device", "sim", "--yes", "--no-record", "--seconds", "0.3")
     refused = cli(*run_words, "--trusted-key", other)
     assert refused.code == 3
@@ -182,7 +191,25 @@ def test_a_key_shows_who_signed(day: Workspace, cli: Cli, tmp_path: Path) -> Non
     put_manifest(path, lambda manifest: typed_in(manifest, with_digest=True))
     forged = cli("package", "check")
     assert forged.code == 3
-    assert "forged review" in forged.out
+    assert "not of this review" in forged.out
+    assert "not of this package" in forged.out
+
+
+@needs_ssh_keygen
+def test_another_review_leaves_the_old_signature_out_and_says_so(
+    day: Workspace, cli: Cli, tmp_path: Path
+) -> None:
+    lab = tmp_path / "lab"
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(lab)], check=True)
+    assert cli("package", "build", "--key", lab).code == 0
+    assert cli("package", "build").code == 0
+    path = day.package_path(day.recipe())
+    assert open_package(path, warn=False).manifest.signature is not None
+    assert cli("report", "sign", "--name", "B", "--decision", "accept").code == 0
+    built = cli("package", "build")
+    assert built.code == 0
+    assert "The package's signature was left out" in built.out
+    assert open_package(path, warn=False).manifest.signature is None
 
 
 @needs_ssh_keygen

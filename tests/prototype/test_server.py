@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import logging
 import sys
 from collections.abc import Callable, Coroutine
 from pathlib import Path
@@ -324,3 +325,40 @@ def test_what_waits_for_a_page_is_bounded_and_counted() -> None:
         assert sum(len(m["time_s"]) + m["lost"] for m in samples) == 100 * 8
 
     asyncio.run(trial())
+
+
+UNREADABLE = {
+    "a long address": b"GET /" + b"a" * 20_000 + b" HTTP/1.1\r\nHost: x\r\n\r\n",
+    "a long header": b"GET / HTTP/1.1\r\nHost: " + b"a" * 20_000 + b"\r\n\r\n",
+    "no HTTP": b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n",
+    "a bad method": b"G\x1b[31mT / HTTP/1.1\r\nHost: x\r\n\r\n",
+    "a bad header": b"GET / HTTP/1.1\r\nHo st: x\r\n\r\n",
+    "two lengths": b"GET / HTTP/1.1\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\n",
+    "an escape in the address": b"GET /\x1b]0;x\x07 HTTP/1.1\r\nHost: x\r\n\r\n",
+    "a bad version": b"GET / HTTP/9999999999999\r\n\r\n",
+    "a bad chunk": b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\nxyz\r\n\r\n",
+}
+
+
+def test_what_is_no_request_is_a_line_on_the_terminal(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def act(server: PrototypeServer) -> None:
+        port = urlsplit(server.url).port
+        for _ in range(3):
+            for request in UNREADABLE.values():
+                reader, writer = await asyncio.open_connection("127.0.0.1", port)
+                writer.write(request)
+                writer.write_eof()
+                with contextlib.suppress(ConnectionError):
+                    await reader.read()
+                writer.close()
+                with contextlib.suppress(ConnectionError):
+                    await writer.wait_closed()
+
+    served(tmp_path, act)
+    told = [logging.Formatter().format(record) for record in caplog.records]
+    assert 1 <= len(told) <= len(UNREADABLE)
+    assert len(set(told)) == len(told)
+    assert all("cannot read was refused (" in line for line in told)
+    assert all(line.isprintable() for line in told)

@@ -57,7 +57,7 @@ TrustedKey = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE",
-        help="Public keys (OpenSSH, one a line): one of them must have signed the review.",
+        help="Public keys (OpenSSH, one a line) that must have signed the package and its review.",
     ),
 ]
 

@@ -9,6 +9,7 @@ from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder, Seed, TrustedKey
 from scissorcal.cli.output import Answer, command
+from scissorcal.cli.signing import SigningKey, signer_of
 
 if TYPE_CHECKING:
     from scissorcal.package import Manifest
@@ -44,12 +45,14 @@ def build(
             help="Build from a fit that failed a check; the package warns on every use.",
         ),
     ] = False,
+    key: SigningKey = None,
     seed: Seed = 0,
     folder: Folder = None,
 ) -> Answer:
     """Compile the workspace's fits into package/<recipe>.zip, and check it.
 
-    A fit that failed a check is refused, with the command that may clear it.
+    A fit that failed a check is refused, with the command that may clear it. With --key its
+    content and review are signed, which --trusted-key of 'package check' and 'render' asks for.
 
     \b
     Example:
@@ -57,14 +60,21 @@ def build(
       package/paper-photographed.zip: 6 tables, 200 draws, error bound 0.00055 N m (proved: 0.00039)
       ...
     """
+    from scissorcal.package.signature import signer_words
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.runs.package import build_workspace_package
 
     with writes_in(folder, "scissorcal package build") as workspace:
         built = build_workspace_package(
-            Engine.of(workspace), seed=seed, force=force, allow_failed=allow_failed
+            Engine.of(workspace),
+            seed=seed,
+            force=force,
+            allow_failed=allow_failed,
+            sign=signer_of(key),
         )
     head = f"{workspace.relative(built.path)}: {_contents(built.manifest)}"
+    if built.manifest.signature:
+        head += f"\n{signer_words(built.manifest)}"
     if built.cached:
         head += "\nnothing changed since it was built, so it is as it was"
     said = built.choice.sentences if built.choice else ()
@@ -87,10 +97,10 @@ def check(
     trusted_key: TrustedKey = None,
     folder: Folder = None,
 ) -> Answer:
-    """Check a package: bytes, error bound, extremes, fits, review.
+    """Check a package: bytes, error bound, extremes, fits, review, signature.
 
-    A review names who signed and every file that was reviewed. Without a key anyone can write one;
-    --trusted-key demands one that was signed by a key that you know.
+    A review names who signed and every file that was reviewed. Without a key anyone can write one,
+    and the whole package; --trusted-key demands that keys that you know signed both.
 
     \b
     Example:
@@ -162,6 +172,7 @@ def _facts(manifest: "Manifest") -> dict[str, object]:
     return {
         "name": manifest.name,
         "content_hash": manifest.content_hash,
+        "signed_by": manifest.signature.fingerprint if manifest.signature else None,
         "inputs_hash": manifest.provenance.inputs_hash,
         "bound": manifest.bound.model_dump(),
         "ranges": manifest.ranges.model_dump(),

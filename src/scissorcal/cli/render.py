@@ -90,16 +90,15 @@ def render(
       ...
     """
     from scissorcal.cli.live_view import LiveView
+    from scissorcal.package.keys import read_public_keys
     from scissorcal.render import VirtualStrokes
     from scissorcal.workday.runs.render import (
         package_warnings,
-        refuse_untrusted,
         render_workspace,
     )
 
     workspace = open_workspace(folder)
-    if trusted_key is not None:
-        refuse_untrusted(workspace, package_path, trusted_key)
+    trusted = read_public_keys(trusted_key) if trusted_key else None
     for sentence in package_warnings(workspace, package_path):
         note(sentence)
     with LiveView(ask=not yes) as view:
@@ -120,6 +119,7 @@ def render(
             taps_s=taps,
             accept_derated=accept_derated,
             allow_mismatch=allow_mismatch,
+            trusted=trusted,
         )
     result = asdict(rendered.result)
     verdicts = rendered.result.verdicts

@@ -9,8 +9,8 @@ import typer
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import writes_in
 from scissorcal.cli.options import Folder
-from scissorcal.cli.output import Answer, command, is_interactive
-from scissorcal.errors import InputError
+from scissorcal.cli.output import Answer, command
+from scissorcal.cli.signing import SigningKey, passphrase
 
 _COMMANDS = {
     "compare": ("scissorcal.cli.report:compare", "Put two runs side by side."),
@@ -118,13 +118,7 @@ def sign(
     note: Annotated[
         str, typer.Option(help="Why, or under which condition.", show_default=False)
     ] = "",
-    key: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Private Ed25519 key of OpenSSH that signs too: others can check who did.",
-        ),
-    ] = None,
+    key: SigningKey = None,
     folder: Folder = None,
 ) -> Answer:
     """Sign the report that lies in the workspace: report/signature.json.
@@ -146,7 +140,7 @@ def sign(
 
     with writes_in(folder, "scissorcal report sign") as workspace:
         engine = Engine.of(workspace)
-        review = sign_report(engine, name, decision, note, key=key, passphrase=_passphrase)
+        review = sign_report(engine, name, decision, note, key=key, passphrase=passphrase)
     path = workspace.signature_path
     text = (
         f"{workspace.relative(path)}: {review.words}\n"
@@ -160,12 +154,3 @@ def sign(
             "unverified: a trust check that is made later voids this signature"
         )
     return Answer(review.model_dump(), text, files=[path])
-
-
-def _passphrase() -> str:
-    if not is_interactive():
-        raise InputError(
-            "The key has a passphrase, and nobody is there to be asked for it: sign in a terminal, "
-            "or use a key without one."
-        )
-    return str(typer.prompt("Passphrase of the key", hide_input=True, err=True))

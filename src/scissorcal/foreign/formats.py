@@ -103,6 +103,9 @@ PHOTO_INDEX = Format("an index of photographs", 50 * _MB, "Capture its photograp
 STATE = Format("a file of this workspace", 100 * _MB, "Remove it; it is made again.")
 """Indexes, designs, probes and studies that scissorcal writes for itself; kilobytes to 10 MB."""
 
+RECORDS = Format("records of a run", 500 * _MB, "Move it away; the run begins anew.")
+"""100,000 fits of a trust check with 50 parameters of five numbers have 500 MB; most have 1 MB."""
+
 SURFACE = Format("a table of probed points", 5 * _MB, "Write x_mm, y_mm, z_mm, one point a line.")
 """200,000 points of 25 characters."""
 

@@ -38,6 +38,7 @@ from scissorcal.package.manifest import (
 )
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.review import Review
+from scissorcal.package.signature import Sign, signed_text
 from scissorcal.package.table_record import Bound
 from scissorcal.recipe.edge import Edge, stated_curve
 from scissorcal.recipe.schema import Recipe
@@ -83,6 +84,7 @@ def build_package(
     rig: RigRecord | None = None,
     inputs_hash: str = NO_IDENTITY,
     allow_failed: bool = False,
+    sign: Sign | None = None,
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
@@ -99,7 +101,8 @@ def build_package(
     recipe's drawn plate on the line of the cut, none for a uniform sheet. ``rig`` is that of the
     recordings: a rendering on another one is refused. ``inputs_hash`` is the
     identity that a workspace gives to recipe, fits and algorithm (`workday.engine`); where it has
-    another one now, the package is stale.
+    another one now, the package is stale. ``sign`` signs its content hash and review
+    (`signature.signed_text`), such as `keys.signer` of a private key.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
     belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where a fit
@@ -109,7 +112,7 @@ def build_package(
     """
     # the report imports this module to read packages; only a build needs what follows
     from scissorcal.package.by_load import rendered_fits
-    from scissorcal.package.check import check_package
+    from scissorcal.package.check import check_built
     from scissorcal.package.reach import data_reach
     from scissorcal.package.simplest.model import simplest_model
     from scissorcal.package.stated_bound import stated_bound
@@ -152,8 +155,11 @@ def build_package(
         )
     )
     package = ModelPackage(manifest, arrays, str(path))
-    verdicts = check_package(package)
+    verdicts = check_built(package)
     _refuse_failed(path, verdicts)
+    if sign is not None:
+        manifest = manifest.model_copy(update={"signature": sign(signed_text(manifest))})
+        package = ModelPackage(manifest, arrays, str(path))
     write_archive(path, manifest, arrays)
     return PackageSummary(
         path=path,
@@ -168,13 +174,21 @@ def _energy(fracture: Fracture | None) -> float:
     return fracture.energy_J_per_m if fracture else 0.0
 
 
-def put_review(package: ModelPackage, review: Review | None, path: Path) -> ModelPackage:
+def put_review(
+    package: ModelPackage, review: Review | None, path: Path, sign: Sign | None = None
+) -> ModelPackage:
     """Write an open package to ``path`` with another review, or none; nothing else changes.
 
-    Raises InputError where the file cannot be written.
+    ``sign`` signs the result; without it a signature stays only where it is of the result. Raises
+    InputError where the file cannot be written, and what ``sign`` raises.
     """
     # hashed anew: a package of an older version lacks keys that this version writes
-    manifest = _hashed(package.manifest.model_copy(update={"review": review}))
+    before = package.manifest
+    manifest = _hashed(before.model_copy(update={"review": review}))
+    signature = before.signature if signed_text(manifest) == signed_text(before) else None
+    if sign is not None:
+        signature = sign(signed_text(manifest))
+    manifest = manifest.model_copy(update={"signature": signature})
     write_archive(path, manifest, package.arrays)
     return ModelPackage(manifest, package.arrays, str(path))
 

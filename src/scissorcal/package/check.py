@@ -8,10 +8,13 @@ import numpy as np
 from scissorcal.package.bound import deviation
 from scissorcal.package.grid import spread_points
 from scissorcal.package.model_package import ModelPackage, open_package
+from scissorcal.package.review import against as review_refusal
+from scissorcal.package.signature import signature_refusal, signer_words, unasked_words
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 
 SCOPE = "package"
 REVIEW_CHECK = "review"
+SIGNATURE_CHECK = "signature"
 FITS_CHECK = "failed fits"
 GRID_POINTS = 13_337
 """Differs from the count of the bound's points, so that the points differ."""
@@ -24,13 +27,19 @@ EXTREME_STEPS = 4_000
 def check_package(
     package: ModelPackage | Path | str, trusted: Sequence[str] | None = None
 ) -> tuple[Verdict, ...]:
-    """Judge a package, open or in a file: error bound, extremes, centre, fits, review.
+    """Judge a package, open or in a file: `check_built`, and whose signature it has.
 
-    ``trusted`` are public keys (OpenSSH) of which one must have signed the review; None asks for
-    none. Raises MissingError or InputError where the file cannot even be opened as a package.
+    ``trusted`` are public keys (OpenSSH) of which one must have signed the package and one its
+    review; None asks for none. Raises MissingError or InputError where the file cannot even be
+    opened as a package.
     """
     if not isinstance(package, ModelPackage):
         package = open_package(package, warn=False)
+    return (*check_built(package, trusted), _signature(package, trusted))
+
+
+def check_built(package: ModelPackage, trusted: Sequence[str] | None = None) -> tuple[Verdict, ...]:
+    """Judge what its builder cannot know beforehand: bound, extremes, centre, fits, review."""
     return (
         *_bound(package),
         _extremes(package),
@@ -108,13 +117,24 @@ def _fits(package: ModelPackage) -> Verdict:
 
 
 def _review(package: ModelPackage, trusted: Sequence[str] | None) -> Verdict:
-    review = package.manifest.review
-    against = " ".join(package.against_review(trusted))
+    manifest = package.manifest
+    review, against = manifest.review, review_refusal(manifest.review, manifest.fit_hashes, trusted)
+    sentence = f"The package {manifest.name} {against}." if against else ""
     if review is None and trusted is None:
-        return not_evaluated(SCOPE, REVIEW_CHECK, against)
-    accepted = 0.0 if against else 1.0
+        return not_evaluated(SCOPE, REVIEW_CHECK, sentence)
     why = ""
     if review is not None:
         whose = ", which you trust" if trusted is not None else ""
         why = f"The report of its fits was {review.words}; {review.identity_words}{whose}."
-    return judge(SCOPE, REVIEW_CHECK, accepted, 1.0, why, against)
+    return judge(SCOPE, REVIEW_CHECK, 0.0 if against else 1.0, 1.0, why, sentence)
+
+
+def _signature(package: ModelPackage, trusted: Sequence[str] | None) -> Verdict:
+    """Whether a key signed what is here; without trusted keys, what nobody can tell from it."""
+    manifest = package.manifest
+    against = signature_refusal(manifest, trusted)
+    if trusted is None and not against:
+        return not_evaluated(SCOPE, SIGNATURE_CHECK, unasked_words(manifest))
+    whose = f"Its content is {signer_words(manifest)}, which you trust."
+    sentence = f"The package {manifest.name} {against}."
+    return judge(SCOPE, SIGNATURE_CHECK, 0.0 if against else 1.0, 1.0, whose, sentence)

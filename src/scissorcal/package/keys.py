@@ -1,4 +1,4 @@
-"""Ed25519 keys, as OpenSSH keeps them: sign a review's digest, and check such a signature.
+"""Ed25519 keys, as OpenSSH keeps them: sign a review or a package, and check such a signature.
 
 'ssh-keygen -t ed25519 -f lab-key' makes a pair. Signing and checking are those of the package
 cryptography (RFC 8032), which the extra ``keys`` brings.
@@ -21,12 +21,10 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 MAKE_KEY = "ssh-keygen -t ed25519 -f lab-key"
-_SIGNED = b"scissorcal-signature/2\n"
-"""Stands before the digest, so that a signature of anything else is none of a review."""
 
 
-def sign_digest(path: Path, digest: str, passphrase: Callable[[], str]) -> KeySignature:
-    """Sign a review's digest by the private key in a file.
+def signer(path: Path, passphrase: Callable[[], str] = str) -> Callable[[str], KeySignature]:
+    """What signs a text by the private key in a file, read at once: a ``signed_text``.
 
     ``passphrase`` is asked for where the key is encrypted. Raises InputError where
     it is no such key, is not there, where others may read it, or without cryptography.
@@ -36,8 +34,12 @@ def sign_digest(path: Path, digest: str, passphrase: Callable[[], str]) -> KeySi
 
     private = _private_key(path, passphrase)
     public = private.public_key().public_bytes(Encoding.OpenSSH, PublicFormat.OpenSSH).decode()
-    signed = private.sign(_SIGNED + digest.encode())
-    return KeySignature(public_key=public, signature=base64.b64encode(signed).decode())
+
+    def sign(text: str) -> KeySignature:
+        signed = private.sign(text.encode())
+        return KeySignature(public_key=public, signature=base64.b64encode(signed).decode())
+
+    return sign
 
 
 def can_check() -> bool:
@@ -45,8 +47,8 @@ def can_check() -> bool:
     return find_spec("cryptography") is not None
 
 
-def holds(key: KeySignature, digest: str) -> bool:
-    """Whether the key signed this digest."""
+def holds(key: KeySignature, text: str) -> bool:
+    """Whether the key signed this text."""
     from cryptography.exceptions import InvalidSignature
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
@@ -54,7 +56,7 @@ def holds(key: KeySignature, digest: str) -> bool:
     # an OpenSSH blob ends with the key's 32 bytes
     public = Ed25519PublicKey.from_public_bytes(blob[-32:])
     try:
-        public.verify(base64.b64decode(key.signature), _SIGNED + digest.encode())
+        public.verify(base64.b64decode(key.signature), text.encode())
     except InvalidSignature:
         return False
     return True

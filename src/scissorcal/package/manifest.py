@@ -10,7 +10,7 @@ from pydantic import Field, Strict, model_validator
 
 from scissorcal.identity import bytes_digest
 from scissorcal.package.drawn_plate import Pieces
-from scissorcal.package.review import Digest, Review
+from scissorcal.package.review import Digest, KeySignature, Review
 from scissorcal.package.simplest.record import Simplification
 from scissorcal.package.table_record import (
     Bound,
@@ -27,6 +27,7 @@ from scissorcal.recipe.schema import FrictionRung, FrictionTerm
 
 FORMAT = "scissorcal-package/1"
 
+_NOT_HASHED = ("content_hash", "review", "signature")
 LARGEST_MEMBER = 4_000_000
 """Bytes; a package of 200 draws and five tables has some 40 kB."""
 
@@ -281,9 +282,10 @@ class PlateRecord(Section):
 class Manifest(Section):
     """The whole manifest, ``manifest.json`` in the archive.
 
-    ``content_hash`` is the SHA-256 of the canonical JSON of everything here except itself and
-    ``review``; through ``members`` it covers every byte of every array. ``review`` is the signature
-    under the report of the package's fits, null as long as there is none. ``simplification`` says
+    ``content_hash`` is the SHA-256 of the canonical JSON of everything here except itself,
+    ``review`` and ``signature``; through ``members`` it covers every byte of every array.
+    ``review`` is the signature under the report of the package's fits, null as long as there is
+    none. ``signature`` is a key's, of content hash and review together. ``simplification`` says
     which simpler laws were enough for the scene, so that they stand here in the place of the fits'
     own: structure, parameters and draws are of the law that is rendered. It is null in packages
     that were built before there was such a choice. ``plate_pose`` is the scene's: "estimated" makes
@@ -309,6 +311,7 @@ class Manifest(Section):
     rig: RigRecord | None = None
     reach: DataReach | None = None
     review: Review | None
+    signature: KeySignature | None = None
     content_hash: Digest
 
     @model_validator(mode="after")
@@ -373,8 +376,8 @@ def expected_files(manifest: Manifest) -> set[str]:
 
 
 def content_hash(facts: dict[str, Any]) -> str:
-    """Hash of a manifest given as plain JSON, whatever its ``content_hash`` and ``review``."""
-    kept = {key: value for key, value in facts.items() if key not in ("content_hash", "review")}
+    """Hash of a manifest given as plain JSON, but for hash, review and signature."""
+    kept = {key: value for key, value in facts.items() if key not in _NOT_HASHED}
     return bytes_digest(canonical(kept))
 
 

@@ -26,6 +26,8 @@ from scissorcal.package.exact import (
 from scissorcal.package.manifest import CutRecord, FrictionRecord, Manifest
 from scissorcal.package.reach import reach_sentences
 from scissorcal.package.review import against
+from scissorcal.package.signature import signature_refusal
+from scissorcal.recipe.schema import Recipe
 
 Array = NDArray[np.float64]
 
@@ -176,6 +178,13 @@ class ModelPackage:
         return kernel_pieces(self.manifest.pieces) if self.manifest.pieces else ()
 
     @cached_property
+    def recipe(self) -> Recipe:
+        """The recipe that it was built from; InputError where the manifest's text is none."""
+        from scissorcal.package.stated_recipe import stated_recipe
+
+        return stated_recipe(self.manifest.provenance)
+
+    @cached_property
     def exact(self) -> ExactModel:
         """The exact model, in float64, that the tables were compiled from."""
         record = self.manifest.provenance
@@ -219,13 +228,17 @@ class ModelPackage:
 
     @property
     def review_warnings(self) -> tuple[str, ...]:
-        """Why its review is not valid: missing, of other fits, forged, or a rejection."""
+        """Why its signature or review is not valid: missing, of something else, a rejection."""
         return self.against_review()
 
     def against_review(self, trusted: Sequence[str] | None = None) -> tuple[str, ...]:
-        """The same where one of the ``trusted`` public keys (OpenSSH) must have signed it, too."""
-        why = against(self.manifest.review, self.manifest.fit_hashes, trusted)
-        return (f"The package {self.manifest.name} {why}.",) if why else ()
+        """The same where ``trusted`` public keys (OpenSSH) must have signed package and review."""
+        manifest = self.manifest
+        wrong = (
+            signature_refusal(manifest, trusted),
+            against(manifest.review, manifest.fit_hashes, trusted),
+        )
+        return tuple(f"The package {manifest.name} {why}." for why in wrong if why)
 
     @property
     def draws(self) -> int:
@@ -264,6 +277,8 @@ def open_package(path: Path | str, *, warn: bool = True) -> ModelPackage:
     >>> package.torque(opening=0.5, opening_rate=-0.2, contact=0.03)  # doctest: +SKIP
     array(0.0307)
     """
+    from scissorcal.package.stated_recipe import refuse_contradictions
+
     path = Path(path)
     manifest, arrays = read_archive(path)
     package = ModelPackage(manifest, arrays, str(path))
@@ -280,6 +295,10 @@ def open_package(path: Path | str, *, warn: bool = True) -> ModelPackage:
         raise InputError(
             f"{path}: its tables and parameters do not form a model ({error}). {REMEDY}"
         ) from error
+    try:
+        refuse_contradictions(manifest, package.recipe, package.exact)
+    except InputError as error:
+        raise InputError(f"{path}: {error}. {REMEDY}") from None
     for sentence in package.fit_warnings if warn else ():
         warnings.warn(sentence, FailedFitsWarning, stacklevel=2)
     return package

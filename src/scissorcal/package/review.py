@@ -24,7 +24,7 @@ _FILE_NAME = Field(min_length=1, max_length=500)
 
 
 class KeySignature(BaseModel):
-    """An Ed25519 signature of a review's digest, with the public key as OpenSSH writes it."""
+    """An Ed25519 signature of a review or a package, with the public key as OpenSSH writes it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
@@ -92,6 +92,11 @@ class Review(BaseModel):
         return f"{done} by {self.name} on {self.time_utc[:10]}{note}"
 
     @property
+    def signed_text(self) -> str:
+        """What a key signs; its first line makes a signature of anything else none of a review."""
+        return f"{self.format}\n{self.digest}"
+
+    @property
     def identity_words(self) -> str:
         """What shows who signed: the key's fingerprint, or that nothing does."""
         if self.key is None:
@@ -127,19 +132,9 @@ def against(
             "sign it, then 'scissorcal package build'"
         )
     if review.key is not None:
-        from scissorcal.package.keys import can_check, holds
-
-        if not can_check():
-            return (
-                f"has a review ({review.words}) whose signature by the key "
-                f"{review.key.fingerprint} is not checked, because cryptography is not installed: "
-                "pip install 'scissorcal[keys]'"
-            )
-        if not holds(review.key, review.digest):
-            return (
-                f"has a forged review ({review.words}): the signature by the key "
-                f"{review.key.fingerprint} is not of this review. Fetch an unchanged copy"
-            )
+        why = unproved(review.key, review.signed_text, "review")
+        if why:
+            return f"has a review ({review.words}) with a signature {why}"
     if trusted is not None and (review.key is None or review.key.public_key not in trusted):
         return (
             f"has a review that none of the trusted keys signed ({review.words}; "
@@ -147,4 +142,24 @@ def against(
         )
     if review.decision == "reject":
         return f"should not be rendered: its report was {review.words}"
+    return ""
+
+
+def unproved(key: KeySignature, text: str, what: str) -> str:
+    """Why a key's signature does not show who signed a text; empty where it does.
+
+    ``what`` names what has the text, such as "review". The rest of a sentence on the signature.
+    """
+    from scissorcal.package.keys import can_check, holds
+
+    if not can_check():
+        return (
+            f"by the key {key.fingerprint} that is not checked, because cryptography is not "
+            "installed: pip install 'scissorcal[keys]'"
+        )
+    if not holds(key, text):
+        return (
+            f"by the key {key.fingerprint} that is not of this {what}: it is forged, or the {what} "
+            "was changed since. Fetch an unchanged copy"
+        )
     return ""

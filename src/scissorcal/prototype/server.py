@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 import socket as sockets
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from aiohttp import WSMsgType, web
+from aiohttp.http_exceptions import HttpProcessingError
 
 from scissorcal.errors import InputError
 from scissorcal.prototype.guard import Guard
@@ -91,6 +93,7 @@ class PrototypeServer:
         app.router.add_get("/rig", self._give_rig, allow_head=False)
         runner = web.AppRunner(
             app,
+            logger=_request_log(),
             access_log=None,
             handle_signals=False,
             shutdown_timeout=1.0,
@@ -229,6 +232,41 @@ def _bounded(server: web.Server | None) -> Callable[[], asyncio.BaseProtocol]:
     """A protocol for each new connection: closed at once where there are too many."""
     assert server is not None, "the runner is set up"
     return lambda: server() if len(server.connections) < MOST_CONNECTIONS else _Closed()
+
+
+def _request_log() -> logging.Logger:
+    """The log of one server's requests: what it refuses is a line, told once of each kind."""
+    log = logging.Logger("scissorcal.prototype.requests", logging.WARNING)
+    log.parent = logging.getLogger()
+    log.addFilter(_RefusedOnce())
+    return log
+
+
+class _RefusedOnce(logging.Filter):
+    """Turns refusals of what is no HTTP, which anyone on this computer may send, into one line.
+
+    Nothing of the request is shown: it may hold the token, or what a terminal obeys. A fault of
+    this program keeps its traceback.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._told: set[str] = set()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        error = record.exc_info[1] if record.exc_info else None
+        if not isinstance(error, HttpProcessingError):
+            return True
+        kind = type(error).__name__
+        if kind in self._told:
+            return False
+        self._told.add(kind)
+        record.msg = (
+            "A request that the page's server cannot read was refused (%s); further ones are not "
+            "shown."
+        )
+        record.args, record.exc_info, record.exc_text = (kind,), None, None
+        return True
 
 
 class _Closed(asyncio.Protocol):

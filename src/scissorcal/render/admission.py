@@ -7,7 +7,6 @@ suits the encoder and the delay. What cannot be rendered even so is refused, wit
 What all of it changes of the felt torque is stated beside the tolerance of the scene.
 """
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -210,15 +209,13 @@ def passivity_config(admission: Admission, identity: Identity) -> PassivityConfi
 
 def _asked(package: ModelPackage, limit: float) -> Asked:
     """What the scene asks for, as the recipe in the package states it."""
-    manifest, recipe = package.manifest, json.loads(package.manifest.provenance.recipe)
-    mechanics, rates = manifest.mechanics, manifest.ranges.opening_rate_rad_per_s
-    hand = float(recipe["rig"].get("hand_damping_N_s_per_m", 0.0))
+    recipe, rates = package.recipe, package.manifest.ranges.opening_rate_rad_per_s
     return Asked(
         limit_Nm=limit,
         slowest=rates[0],
         fastest=rates[1],
-        tolerance=0.01 * float(recipe["scene"]["tolerance_percent"]),
-        hand_damping=hand * mechanics.handle_radius_m**2 / mechanics.moving_blades,
+        tolerance=0.01 * recipe.scene.tolerance_percent,
+        hand_damping=recipe.rig.hand_damping_Nm_s_per_rad,
     )
 
 

@@ -1,7 +1,5 @@
 """Which plate a rendering follows: a tracker's, the package's own fitted pose, or none."""
 
-import json
-
 from scissorcal.errors import MissingError
 from scissorcal.kernel import ModelTables
 from scissorcal.package import ModelPackage
@@ -37,12 +35,12 @@ def plate_placer(
                 "fit plate' and 'scissorcal package build', or give the pose of a tracker."
             )
         source = fixed_plate(manifest.plate)
-    scene = json.loads(manifest.provenance.recipe)["scene"]
+    scene = package.recipe.scene
     return PlatePlacer(
         source,
         tables,
-        tolerance=scene["tolerance_percent"] / 100.0,
-        confidence=scene["confidence_percent"] / 100.0,
+        tolerance=scene.tolerance_percent / 100.0,
+        confidence=scene.confidence_percent / 100.0,
         torque_limit_Nm=torque_limit_Nm,
         record=PlateRecord(writer) if writer else None,
     )

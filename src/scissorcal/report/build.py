@@ -14,8 +14,8 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError, file_error
 from scissorcal.files import replacing
-from scissorcal.foreign import read_foreign
-from scissorcal.foreign.formats import SIGNATURE
+from scissorcal.foreign import read_foreign, read_foreign_text
+from scissorcal.foreign.formats import REPORT, SIGNATURE
 from scissorcal.identity import bytes_digest
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN, Review
 from scissorcal.recipe.schema import Recipe
@@ -151,7 +151,7 @@ def sign_page(html: Path, review: Review) -> None:
     from scissorcal.report.signature_block import with_signature
 
     try:
-        page = with_signature(html.read_text(encoding="utf-8"), review)
+        page = with_signature(read_foreign_text(html, REPORT), review)
         with replacing(html) as part:
             part.write_text(page, encoding="utf-8")
     except OSError as error:
@@ -178,13 +178,13 @@ def _with_earlier_time(document: ReportDocument, path: Path) -> tuple[ReportDocu
     """The document with its twin, and the time of the report there where that says the same."""
     twin = twin_text(document)
     try:
-        there = path.read_text(encoding="utf-8")
+        there = read_foreign_text(path, REPORT)
         before, _, rest = _parted(twin)
         earlier, stated, same = _parted(there)
         if (earlier, same) != (before, rest):
             return document, twin
         return replace(document, created=datetime.fromisoformat(stated)), there
-    except (OSError, ValueError):
+    except (InputError, ValueError):  # there is none, or one of another making
         return document, twin
 
 

@@ -28,7 +28,7 @@ def unsigned_digest(page: str) -> str:
     # a page without the place is not one that was signed: its digest differs
     with contextlib.suppress(ValueError):
         page = with_signature(page, None)
-    return bytes_digest(page.encode())
+    return bytes_digest(page.encode("utf-8", "surrogateescape"))
 
 
 def signature_block(review: "Review | None") -> str:

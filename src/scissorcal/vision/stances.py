@@ -1,45 +1,88 @@
 """Stances: advance and opening of the rig in each photograph of its card."""
 
 import csv
+import io
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
 from scissorcal.errors import InputError
-from scissorcal.foreign import read_foreign_text, reading
+from scissorcal.foreign import read_foreign_text
 from scissorcal.foreign.formats import STANCES
 
 Stances = Mapping[str, tuple[float, float]]
 """Stance of the rig by the photograph's file name: advance in mm, opening in deg."""
 
+COLUMNS = ("file", "advance_mm", "opening_deg")
+LARGEST_MM = 10_000.0
+"""Ten metres: no sledge of a bench is as long; what is more is in another unit."""
+LARGEST_DEG = 180.0
+"""Blades that point away from each other."""
+
 
 def read_stances(path: Path) -> Stances:
-    """Read a CSV file of stances with the columns file, advance_mm, opening_deg.
+    """Read a CSV file with the columns file, advance_mm and opening_deg, in any order.
 
-    Raises InputError with the file and line that is wrong.
+    Further columns are passed over, and so are folders before a file's name. Raises InputError with
+    the file and line that is wrong: a column that is missing or there twice, a line with more or
+    fewer cells than the first, what is no number, and a photograph with two stances.
     """
-    text = read_foreign_text(path, STANCES)
-    with reading(path, STANCES):
-        rows = list(csv.DictReader(text.splitlines()))
-    wanted = {"file", "advance_mm", "opening_deg"}
-    if not rows or not wanted <= set(rows[0]):
-        raise InputError(
-            f"{path} needs a first line 'file,advance_mm,opening_deg' and a line for each "
-            "photograph below it."
-        )
-    found: dict[str, tuple[float, float]] = {}
-    for number, row in enumerate(rows, start=2):
-        try:
-            stance = float(row["advance_mm"]), float(row["opening_deg"])
-        except (TypeError, ValueError):
-            stance = (float("nan"), float("nan"))
-        if not all(map(math.isfinite, stance)):
+    rows = csv.reader(io.StringIO(read_foreign_text(path, STANCES), newline=""), strict=True)
+    try:
+        head = [name.strip() for name in next(rows, [])]
+        if any(head.count(name) != 1 for name in COLUMNS):
             raise InputError(
-                f"{path}, line {number}: advance_mm and opening_deg must be numbers, such as "
-                "'rig-01.jpg,30,25'."
+                f"{path} needs a first line 'file,advance_mm,opening_deg' and a line for each "
+                "photograph below it."
             )
-        found[Path(row["file"]).name] = stance
+        found: dict[str, tuple[float, float]] = {}
+        for row in rows:
+            if not any(cell.strip() for cell in row):
+                continue
+            where = f"{path}, line {rows.line_num}"
+            name, stance = _stance(row, head, where)
+            if found.setdefault(name, stance) != stance:
+                raise InputError(f"{where}: {name} has another stance above. Keep the right one.")
+    except csv.Error as error:
+        raise InputError(
+            f"{path}, line {rows.line_num}: this is no line of CSV ({error}). {STANCES.remedy}"
+        ) from None
+    if not found:
+        raise InputError(f"{path} has no line below its first. {STANCES.remedy}")
     return found
+
+
+def _stance(row: list[str], head: list[str], where: str) -> tuple[str, tuple[float, float]]:
+    """A photograph's name and its stance."""
+    if len(row) != len(head):
+        raise InputError(
+            f"{where}: the first line names {len(head)} columns, and this one has {len(row)}. "
+            "Write numbers with a point, and names with a comma in quotes: 'rig-01.jpg,30.5,25'."
+        )
+    cells = dict(zip(head, row, strict=True))
+    name = re.split(r"[/\\]", cells["file"].strip())[-1]
+    stance = _number(cells["advance_mm"]), _number(cells["opening_deg"])
+    if not name:
+        raise InputError(f"{where}: the name of its photograph is missing.")
+    if not all(map(math.isfinite, stance)):
+        raise InputError(
+            f"{where}: advance_mm and opening_deg must be numbers, such as 'rig-01.jpg,30,25'."
+        )
+    if abs(stance[0]) > LARGEST_MM or abs(stance[1]) > LARGEST_DEG:
+        raise InputError(
+            f"{where}: {stance[0]:g} mm and {stance[1]:g} deg are no stance of a rig (at most "
+            f"{LARGEST_MM:g} mm and {LARGEST_DEG:g} deg). Check the units."
+        )
+    return name, stance
+
+
+def _number(cell: str) -> float:
+    """A plain decimal number; NaN for what is none, such as 1_000 and digits of other scripts."""
+    try:
+        return float(cell) if cell.isascii() and "_" not in cell else math.nan
+    except ValueError:
+        return math.nan
 
 
 def stance_of(path: Path, stances: Stances) -> tuple[float, float]:

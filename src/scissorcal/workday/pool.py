@@ -1,19 +1,27 @@
 """Where the fits of a trust check run: here, in processes of this machine, or on a cluster."""
 
 import gc
+import logging
 import multiprocessing
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
 
-from scissorcal.errors import InputError, ScissorcalError, needs_extra
+from scissorcal.errors import DeviceError, InputError, ScissorcalError, needs_extra
 from scissorcal.workday.answers import answering, read_answer
 
 P = ParamSpec("P")
@@ -48,7 +56,8 @@ class Pool:
         """Do ``job`` for every item and call ``finished`` here with each result, as they come.
 
         ``kind`` is the type of a result, to which a cluster's answers are held.
-        Raises what a job raised, and ScissorcalError where a worker died.
+        Raises what a job raised, ScissorcalError where a worker died, and DeviceError where the
+        cluster did.
         """
         todo = iter(items)
         running: set[Future[Any]] = set()
@@ -64,7 +73,7 @@ class Pool:
                     return
                 done, running = wait(running, return_when=FIRST_COMPLETED)
                 for future in done:
-                    found = future.result()
+                    found = self._result(future)
                     finished(read_answer(found, kind) if self.remote else found)
         except BrokenProcessPool as error:
             raise ScissorcalError(
@@ -74,6 +83,19 @@ class Pool:
         finally:
             for future in running:
                 future.cancel()
+
+    def _result(self, future: "Future[Any]") -> Any:
+        """What a job gave; a cluster's answers are text, so its own errors are the connection's."""
+        try:
+            return future.result()
+        except (CancelledError, OSError) as error:
+            if not self.remote:
+                raise
+            raise DeviceError(
+                "The cluster ended while it worked: its scheduler was stopped, or the network to "
+                "it failed. Start it again, and run the same command again: 'scissorcal verify' "
+                "and 'scissorcal bench trade' go on from what was finished."
+            ) from error
 
 
 @contextmanager
@@ -149,6 +171,8 @@ def _cluster(address: str) -> Iterator[Pool]:
             f"{address} asks for TLS, and dask knows no certificates: name them in its "
             "configuration, as docs/cluster.md shows."
         )
+    for handler in logging.getLogger("distributed").handlers:
+        handler.addFilter(_without_traceback)
     try:
         client = distributed.Client(address, timeout="10s", set_as_default=False)
     except (OSError, ValueError) as error:
@@ -168,6 +192,12 @@ def _cluster(address: str) -> Iterator[Pool]:
             yield Pool(executor, threads, remote=True)
     finally:
         client.close()
+
+
+def _without_traceback(record: logging.LogRecord) -> bool:
+    """Keep a line of dask's that has words; the errors that it logs are raised here, too."""
+    record.exc_info = record.exc_text = None
+    return bool(record.getMessage().strip())
 
 
 @contextmanager

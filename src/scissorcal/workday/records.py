@@ -9,6 +9,8 @@ from typing import Any
 
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
+from scissorcal.foreign import open_foreign, refuse_unless_regular
+from scissorcal.foreign.formats import RECORDS
 from scissorcal.recording.partfile import try_lock
 
 FORMAT = "scissorcal-records/1"
@@ -39,7 +41,11 @@ class RecordFile:
         self.note = ""
 
     def __enter__(self) -> "RecordFile":
-        """Open the file and read what is there. Raises InputError where another run holds it."""
+        """Open the file and read what is there.
+
+        Raises InputError where another run holds it, or what stands there is no file of records'
+        size.
+        """
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._open()
         known, self.records, sound = _read(self.path)
@@ -82,6 +88,8 @@ class RecordFile:
         return {"format": FORMAT, "inputs": self.inputs}
 
     def _open(self) -> None:
+        if self.path.exists():
+            refuse_unless_regular(self.path, RECORDS)
         self._stream = self.path.open("a+b")
         if not try_lock(self._stream):
             self._stream.close()
@@ -91,7 +99,8 @@ class RecordFile:
             )
 
     def _aside(self, known: str) -> Path:
-        base = f"{self.path.name}.{known[:8] or 'unreadable'}"
+        named = known[:8] if known.isascii() and known.isalnum() else "unreadable"
+        base = f"{self.path.name}.{named}"
         aside, number = self.path.with_name(base), 1
         while aside.exists():
             number += 1
@@ -109,7 +118,8 @@ def _line(record: Record) -> bytes:
 
 def _read(path: Path) -> tuple[str, list[Record], int]:
     """The inputs' hash, the records, and the length of what is whole; an empty hash if none is."""
-    data = path.read_bytes()
+    with open_foreign(path, RECORDS) as file:
+        data = file.read()
     lines = data.splitlines(keepends=True)
     found: list[Record] = []
     sound = 0

@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from scissorcal.foreign import read_foreign
+from scissorcal.foreign.formats import REPORT
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN
 from scissorcal.recipe.plate_layers import drawings
 from scissorcal.report.signature_block import unsigned_digest, with_signature
@@ -70,15 +72,20 @@ def _photographs(engine: "Engine", name: str) -> "list[Path]":
 
 def _page_digest(engine: "Engine", page: Path) -> str:
     def read(path: Path) -> dict[str, Any]:
-        return {"sha256": unsigned_digest(path.read_text("utf-8", errors="surrogateescape"))}
+        return {"sha256": unsigned_digest(_page_text(path))}
 
     return str(engine.index.facts(page, "sha256 without signature", read)["sha256"])
 
 
 def _shows(page: Path, review: "Review") -> bool:
     """Whether the page shows this signature and no other."""
-    text = page.read_text("utf-8", errors="replace")
+    text = _page_text(page)
     try:
         return with_signature(text, review) == text
     except ValueError:
         return False
+
+
+def _page_text(page: Path) -> str:
+    """A page whatever its bytes: it is compared, not shown."""
+    return read_foreign(page, REPORT).decode("utf-8", errors="surrogateescape")

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping
+from concurrent.futures import Executor, Future
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ import pytest
 from scissorcal.calibration.store import load, save
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
+from scissorcal.foreign.formats import RECORDS
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.plan import make_plan
@@ -338,3 +340,86 @@ def test_records_survive_a_torn_header(tmp_path: Path) -> None:
         assert records == [{"value": 1.5}]
         with pytest.raises(ValueError, match="not JSON compliant"):
             file.append({"value": np.nan})
+
+
+@pytest.mark.parametrize("inputs", [b'["../../x"]', b'"../../../"', b'"a\\u0000b"', b"7" * 5000])
+def test_records_of_a_strange_hash_are_put_aside_here(tmp_path: Path, inputs: bytes) -> None:
+    path = tmp_path / "a.jsonl"
+    path.write_bytes(b'{"format":"scissorcal-records/1","inputs":%s}\n' % inputs)
+    with RecordFile(path, "one") as file:
+        assert file.records == []
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["a.jsonl", "a.jsonl.unreadable"]
+
+
+def test_what_is_no_file_holds_no_records(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.jsonl")
+    (tmp_path / "device.jsonl").symlink_to("/dev/zero")
+    with (tmp_path / "large.jsonl").open("wb") as large:
+        large.truncate(RECORDS.most_bytes + 1)
+    for name, words in (("pipe", "named pipe"), ("device", "a device"), ("large", "another file")):
+        with pytest.raises(InputError, match=words), RecordFile(tmp_path / f"{name}.jsonl", "one"):
+            pass
+
+
+DYING = """
+import subprocess, sys
+from scissorcal.errors import DeviceError
+from scissorcal.workday.pool import open_pool
+if __name__ == "__main__":
+    words = ("distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard")
+    scheduler = subprocess.Popen([sys.executable, "-m", *words], stderr=subprocess.PIPE, text=True)
+    address = next(line.split()[-1] for line in scheduler.stderr if "Scheduler at:" in line)
+    words = ("distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny")
+    worker = subprocess.Popen(
+        [sys.executable, "-m", *words, "--no-dashboard"], stderr=subprocess.PIPE, text=True
+    )
+    next(line for line in worker.stderr if "Registered to" in line)
+    found = []
+
+    def finished(value):
+        found.append(value)
+        if len(found) == int(sys.argv[1]):
+            scheduler.kill()
+
+    try:
+        with open_pool(cluster=address) as pool:
+            pool.work(abs, range(-40, 0), finished, int)
+        print("whole", len(found))
+    except DeviceError as error:
+        print(error.exit_code, len(found) < 40, error)
+    finally:
+        worker.kill()
+        scheduler.kill()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("after", "words"), [("2", "4 True The cluster ended while it worked"), ("40", "whole 40")]
+)
+def test_a_scheduler_that_dies_is_a_sentence(tmp_path: Path, after: str, words: str) -> None:
+    pytest.importorskip("distributed")
+    program = tmp_path / "dying.py"
+    program.write_text(DYING, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, str(program), after], capture_output=True, text=True, timeout=4 * GUARD_S
+    )
+    assert words in done.stdout, done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_cluster_that_ends_is_told_as_one() -> None:
+    from scissorcal.errors import DeviceError
+    from scissorcal.workday.pool import Pool
+
+    class Ended(Executor):
+        def submit(self, *_: Any, **__: Any) -> Any:
+            future: Future[Any] = Future()
+            future.cancel()
+            future.set_running_or_notify_cancel()
+            return future
+
+    found: list[int] = []
+    with pytest.raises(DeviceError, match="The cluster ended while it worked"):
+        Pool(Ended(), 1, remote=True).work(abs, [1, 2], found.append, int)
+    assert found == []

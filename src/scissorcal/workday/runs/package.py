@@ -17,7 +17,13 @@ from scissorcal.workday.steps import BY_NAME
 if TYPE_CHECKING:
     from scissorcal.package import Manifest
     from scissorcal.package.manifest import RigRecord
+    from scissorcal.package.signature import Sign
     from scissorcal.package.simplest.choice import SceneChoice
+
+UNSIGNED = (
+    "The package's signature was left out, as it was given with another review: sign it again "
+    "with 'scissorcal package build --key'."
+)
 
 
 @dataclass(frozen=True)
@@ -36,18 +42,27 @@ class Built:
 
 
 def build_workspace_package(
-    engine: Engine, *, seed: int = 0, force: bool = False, allow_failed: bool = False
+    engine: Engine,
+    *,
+    seed: int = 0,
+    force: bool = False,
+    allow_failed: bool = False,
+    sign: "Sign | None" = None,
 ) -> Built:
     """Compile the fits of a workspace into package/<recipe>.zip.
 
     The package carries the signature under the report, where there is one that stands. Nothing is
     done where the package there was built from the same fits, recipe and signature, unless
-    ``force``. Raises VerdictError where a fit failed, unless ``allow_failed``, MissingError where a
-    fit is missing or stale, and what `scissorcal.package.build_package` raises.
+    ``force``. ``sign`` signs content and review (`scissorcal.package.keys.signer`).
+
+    Raises VerdictError where a fit failed, unless ``allow_failed``, MissingError where a fit is
+    missing or stale, and what `scissorcal.package.build_package` raises.
     """
     import numpy as np
 
-    from scissorcal.package import build_package, check_package, open_package, put_review
+    from scissorcal.package import build_package, open_package, put_review
+    from scissorcal.package.check import check_built
+    from scissorcal.package.signature import signed_text
     from scissorcal.recipe.plate_layers import plate_pieces
     from scissorcal.workday.runs.simplest import store_scene_choice, workspace_scene_choice
 
@@ -66,13 +81,18 @@ def build_workspace_package(
         except InputError:
             package = None
         if package and package.manifest.provenance.inputs_hash == engine.identity("package build"):
-            cached = package.manifest.review == review
+            before = package.manifest
+            cached = before.review == review
+            if sign is not None:
+                cached = cached and before.signature == sign(signed_text(before))
             if not cached:
-                package = put_review(package, review, path)
+                package = put_review(package, review, path, sign)
             warnings = _void(engine) + package.warnings
+            if before.signature and not package.manifest.signature:
+                warnings += (UNSIGNED,)
             engine.refresh()
             choice = workspace_scene_choice(engine)
-            verdicts = check_package(package)
+            verdicts = check_built(package)
             return Built(path, package.manifest, verdicts, warnings, cached, choice)
     summary = build_package(
         engine.recipe,
@@ -86,6 +106,7 @@ def build_workspace_package(
         rig=recorded_rig(engine.workspace.captures_dir, fits),
         inputs_hash=engine.identity("package build"),
         allow_failed=allow_failed,
+        sign=sign,
     )
     engine.refresh()
     warnings = _void(engine) + summary.warnings

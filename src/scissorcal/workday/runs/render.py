@@ -17,6 +17,8 @@ from scissorcal.workday.runs.probe import Say, ensure_probed
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from scissorcal.device.loading import Confirm
     from scissorcal.package import ModelPackage
     from scissorcal.recipe.plate_tracking import PlateTracking
@@ -60,6 +62,7 @@ def render_workspace(
     taps_s: float = 0.0,
     accept_derated: bool = False,
     allow_mismatch: bool = False,
+    trusted: "Sequence[str] | None" = None,
 ) -> Rendered:
     """Render the workspace's package (or another) on ``device``, within the recipe's limits.
 
@@ -84,6 +87,8 @@ def render_workspace(
 
     recipe = workspace.recipe()
     package = open_package(package_path or workspace.package_path(recipe), warn=False)
+    if trusted is not None:
+        _refuse_untrusted(package, trusted)
     stale = "" if package_path else _stale(Engine.of(workspace))
     if not allow_mismatch:
         if stale:
@@ -143,11 +148,20 @@ def _stale(engine: Engine) -> str:
     return f"The package is stale: {state.found}. Run '{state.command}'."
 
 
+def _refuse_untrusted(package: "ModelPackage", trusted: "Sequence[str]") -> None:
+    """Raise VerdictError where none of the public keys signed what was loaded."""
+    said = package.against_review(trusted)
+    if said:
+        raise VerdictError(f"{' '.join(said)} Nothing was rendered.")
+
+
 def _refuse_other_blades(recipe: "Recipe", package: "ModelPackage") -> None:
     """Raise InputError where recipe and package are of rigs whose joints or blades differ."""
-    stated = json.loads(package.manifest.provenance.recipe)["rig"]
-    for key, now in (("joint", recipe.rig.joint), ("moving", recipe.rig.moving)):
-        was = stated.get(key, now)
+    stated = package.recipe.rig
+    for key, was, now in (
+        ("joint", stated.joint, recipe.rig.joint),
+        ("moving", stated.moving, recipe.rig.moving),
+    ):
         if was != now:
             raise InputError(
                 f"The package {package.manifest.name} is of another rig: its recipe has rig.{key} "
@@ -235,18 +249,6 @@ def _write_admission(package_path: Path, done: "RenderResult", rig: str) -> None
     }
     with replacing(package_path.with_suffix(".admission.json")) as part:
         part.write_text(json.dumps(facts, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def refuse_untrusted(workspace: Workspace, package_path: Path | None, keys: Path) -> None:
-    """Raise VerdictError where none of the public keys in a file signed the package's review."""
-    from scissorcal.package import open_package
-    from scissorcal.package.keys import read_public_keys
-
-    trusted = read_public_keys(keys)
-    path = package_path or workspace.package_path(workspace.recipe())
-    said = open_package(path, warn=False).against_review(trusted)
-    if said:
-        raise VerdictError(f"{' '.join(said)} Nothing was rendered.")
 
 
 def package_warnings(workspace: Workspace, package_path: Path | None = None) -> tuple[str, ...]:

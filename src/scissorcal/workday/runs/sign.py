@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.files import replacing
+from scissorcal.foreign import read_foreign
+from scissorcal.foreign.formats import REPORT
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.fit import available
 
@@ -60,9 +62,9 @@ def sign_report(
         place = ".".join(str(part) for part in first["loc"])
         raise InputError(f"The {place} cannot be signed with: {first['msg']}.") from None
     if key is not None:
-        from scissorcal.package.keys import sign_digest
+        from scissorcal.package.keys import signer
 
-        signed = sign_digest(key, review.digest, passphrase)
+        signed = signer(key, passphrase)(review.signed_text)
         review = review.model_copy(update={"key": signed})
     _write(engine.file("report sign"), engine.workspace.report_html, review)
     engine.refresh()
@@ -81,13 +83,12 @@ def _write(path: Path, html: Path, review: "Review") -> None:
     """Sign the page and write the signature, or leave both as they were."""
     from scissorcal.report import sign_page
 
-    before = html.read_bytes() if html.is_file() else None
+    before = read_foreign(html, REPORT)
     try:
         with replacing(path) as part:
             part.write_text(review.model_dump_json(indent=2) + "\n", encoding="utf-8")
             sign_page(html, review)
     except OSError as error:
-        if before is not None:
-            with replacing(html) as part:
-                part.write_bytes(before)
+        with replacing(html) as part:
+            part.write_bytes(before)
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error

@@ -1,0 +1,65 @@
+"""The signature of a package: a key signs its content hash together with the review it carries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from scissorcal.package.manifest import Manifest
+from scissorcal.package.review import KeySignature, unproved
+
+Sign = Callable[[str], KeySignature]
+"""Signs a text, such as `keys.signer` of a private key."""
+
+SIGNATURE_FORMAT = "scissorcal-package-signature/1"
+
+_UNSIGNED = (
+    "has no signature of its content, so that tables and limits may have been changed since its "
+    "report was reviewed: build it again with 'scissorcal package build --key FILE', or fetch a "
+    "copy that was signed so"
+)
+
+
+def signed_text(manifest: Manifest) -> str:
+    """What a key signs: format, content hash, and the review's digest or that there is none.
+
+    The first line makes a signature of anything else, such as a review, none of a package.
+    """
+    review = manifest.review.digest if manifest.review else "no review"
+    return f"{SIGNATURE_FORMAT}\n{manifest.content_hash}\n{review}"
+
+
+def signature_refusal(manifest: Manifest, trusted: Sequence[str] | None = None) -> str:
+    """Why a package's signature does not show that this is what was signed.
+
+    ``trusted`` are public keys (OpenSSH) of which one must have signed it; None asks for no key,
+    but a signature that is there has to be of this package. Empty where nothing is wrong, else
+    the rest of a sentence that begins with the package.
+    """
+    signature = manifest.signature
+    if signature is None:
+        return "" if trusted is None else _UNSIGNED
+    why = unproved(signature, signed_text(manifest), "package")
+    if why:
+        return f"has a signature {why}"
+    if trusted is not None and signature.public_key not in trusted:
+        return f"is {signer_words(manifest)}, which is none of the trusted ones"
+    return ""
+
+
+def signer_words(manifest: Manifest) -> str:
+    """Which key signed a package."""
+    signature = manifest.signature
+    return f"signed with the key {signature.fingerprint}" if signature else "not signed with a key"
+
+
+def unasked_words(manifest: Manifest) -> str:
+    """What cannot be known of a package where no trusted key is named."""
+    if manifest.signature is not None:
+        return (
+            f"Its content is {signer_words(manifest)}. Whose key that is cannot be known from the "
+            "package: --trusted-key asks for a key that you know."
+        )
+    return (
+        "Its hashes show that it is whole, not who made it: whoever can write the file can write "
+        "them. 'scissorcal package build --key FILE' signs it, and --trusted-key asks for that."
+    )
