@@ -1,6 +1,5 @@
 """What every law and shape of the model refuses: unknown names and impossible numbers."""
 
-import difflib
 import sys
 from collections.abc import Iterable
 from typing import Any
@@ -25,6 +24,8 @@ There are: power, exponential.
     known = tuple(names)
     if given in known:
         return
+    import difflib  # loads three modules, for a message alone
+
     listed = f" There are: {', '.join(known)}." if len(known) <= 8 else ""
     close = difflib.get_close_matches(str(given)[:100].lower(), known, 1, 0.5)
     hint = f' Did you mean "{close[0]}"?' if close else ""
