@@ -23,6 +23,22 @@ class InputError(ScissorcalError):
     exit_code = 2
 
 
+class OtherKindError(InputError):
+    """A file is of another kind than is needed: not damaged, and not to be removed.
+
+    ``found`` names what it is and ``wanted`` what is needed, each with an article; ``use`` is a
+    sentence on what to do with the file.
+
+    >>> print(OtherKindError("cut.nc", "a cut fit", "a camera fit"))
+    cut.nc is a cut fit, not a camera fit. Name another file, or put the right one in its place.
+    """
+
+    def __init__(self, path: object, found: str, wanted: str, use: str = "") -> None:
+        remedy = use or "Name another file, or put the right one in its place."
+        super().__init__(f"{path} is {found}, not {wanted}. {remedy}")
+        self.found = found
+
+
 class VerdictError(ScissorcalError):
     """A verdict failed, so the result is not handed out (exit code 3)."""
 

@@ -385,6 +385,8 @@ class FitResult(Result):
     hashes need no second fit.
     """
 
+    title = "friction or cut fit"
+
     what: Literal["friction", "friction-advance", "cut"]
     effort: Effort
     rung: str

@@ -1,4 +1,4 @@
-"""Files of other kinds, told by their first bytes."""
+"""Files that do not begin as a recording, and are of no other known kind."""
 
 from pathlib import Path
 
@@ -15,20 +15,7 @@ def refuse_other_formats(path: Path, data: bytes) -> None:
             f"{path} is cut off within its first {len(MAGIC)} bytes: nothing can be recovered "
             "from it. Capture again."
         )
-    known = {
-        b"\x89PNG": "a PNG image",
-        b"\xff\xd8\xff": "a JPEG image",
-        b"PK\x03\x04": "a zip archive",
-        b"PAR1": "a Parquet table (use 'scissorcal import')",
-        b"MATLAB": "a MATLAB file (use 'scissorcal import')",
-        b"\x89HDF": "an HDF5 file",
-    }
-    looks = next((words for start, words in known.items() if data.startswith(start)), "")
-    if not looks:
-        printable = sum(32 <= byte < 127 or byte in b"\r\n\t" for byte in data[:1000])
-        text = printable > 0.9 * len(data[:1000])
-        looks = "text (for a table use 'scissorcal import')" if text else "an unknown format"
     raise InputError(
-        f"{path} is not a recording: its first bytes are those of {looks}. Name an .mcap file that "
-        "scissorcal wrote."
+        f"{path} is not a recording: its first bytes are those of an unknown format. Name an .mcap "
+        "file that scissorcal wrote."
     )
