@@ -32,13 +32,14 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.result import FitResult, Result, Stored, command_words
+from scissorcal.calibration.result import FitResult, Result, Stored
 from scissorcal.errors import InputError, OtherKindError, ScissorcalError
 from scissorcal.files import replacing
 from scissorcal.foreign import Format, parse_isolated, read_foreign, read_json
 from scissorcal.foreign.formats import FIT
 from scissorcal.foreign.kinds import FIT_SEAL, fit_name
 from scissorcal.identity import bytes_digest
+from scissorcal.recipe.requirements import command_words
 
 if TYPE_CHECKING:
     import h5netcdf
