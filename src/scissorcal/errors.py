@@ -64,6 +64,17 @@ class MissingError(ScissorcalError):
     exit_code = 5
 
 
+def needs_unix(what: str) -> DeviceError:
+    """The refusal of what takes a Unix terminal or the C loop's port, on a system without them.
+
+    >>> print(needs_unix("A virtual rig"))
+    A virtual rig needs a Unix terminal, which this system lacks: use Linux or macOS for it.
+    """
+    return DeviceError(
+        f"{what} needs a Unix terminal, which this system lacks: use Linux or macOS for it."
+    )
+
+
 def needs_extra(what: str, package: str, extra: str, otherwise: str = "") -> InputError:
     """The refusal of what takes a package that a plain install does not bring.
 

@@ -15,9 +15,9 @@ class Format:
 
     ``remedy`` is a whole sentence. ``holds`` are the kinds of file that it may be
     (:mod:`scissorcal.foreign.kinds`); one of another known kind is refused by its name, and one of
-    none goes to the parser. Where the parser runs in a child process, ``memory_bytes`` is
-    what a file may add to what that holds, ``processor_s`` the processor time that it has, and
-    ``wall_s`` the time.
+    none goes to the parser; "*" holds all. Where the parser runs in a child process,
+    ``memory_bytes`` is what a file may add to what that holds, ``processor_s`` the processor time
+    that it has, and ``wall_s`` the time.
     """
 
     name: str
@@ -34,6 +34,9 @@ class Format:
         return f"more than {self.memory_bytes / 1e9:g} GB of memory"
 
 
+ANY = Format("a file", 2 * _GB, "Name another file.", holds=("*",))
+"""What is read for its bytes alone, such as for their digest."""
+
 RECIPE = Format(
     "a recipe",
     _MB,
@@ -41,6 +44,14 @@ RECIPE = Format(
     ("recipe", "text"),
 )
 """The longest built-in recipe has 6 kB."""
+
+SPECIMEN = Format(
+    "a specimen",
+    _MB,
+    "Correct it, or name a built-in one, such as office-paper.",
+    ("specimen", "text"),
+)
+"""The longest built-in specimen has 1.2 kB."""
 
 LOG = Format("a table in text", 500 * _MB, "Save it as CSV in UTF-8, one row a line.")
 """An hour at 1 kHz with 100 characters a line has 360 MB."""

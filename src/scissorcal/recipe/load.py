@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from scissorcal.errors import InputError
 from scissorcal.foreign import read_foreign_text
-from scissorcal.foreign.formats import RECIPE
+from scissorcal.foreign.formats import RECIPE, Format
 from scissorcal.recipe.locate import broken_statement
 
 if TYPE_CHECKING:
@@ -40,9 +40,12 @@ def parse_recipe(text: str, source: str = "recipe") -> "Recipe":
     return parse_toml(text, Recipe, source)
 
 
-def load_toml(path: Path, model: "type[Model]") -> "Model":
-    """Read a TOML file into ``model``; mistakes raise InputError as in `load_recipe`."""
-    return parse_toml(read_text(path), model, str(path))
+def load_toml(path: Path, model: "type[Model]", kind: Format = RECIPE) -> "Model":
+    """Read a TOML file into ``model``; mistakes raise InputError as in `load_recipe`.
+
+    A file of another known kind than ``kind`` is refused by its name.
+    """
+    return parse_toml(read_foreign_text(path, kind), model, str(path))
 
 
 def parse_toml(text: str, model: "type[Model]", source: str) -> "Model":

@@ -9,7 +9,7 @@ from typing import Any
 
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
-from scissorcal.recording.partfile import try_lock
+from scissorcal.locks import NO_LOCKS, try_lock
 
 FORMAT = "scissorcal-records/1"
 
@@ -83,7 +83,13 @@ class RecordFile:
 
     def _open(self) -> None:
         self._stream = self.path.open("a+b")
-        if not try_lock(self._stream):
+        try:
+            free = try_lock(self._stream)
+        except OSError as error:
+            if error.errno not in NO_LOCKS:
+                raise
+            free = True
+        if not free:
             self._stream.close()
             raise InputError(
                 f"{self.path} is being written by another run of this command: wait for it, or "
