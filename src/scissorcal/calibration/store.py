@@ -37,7 +37,7 @@ from scissorcal.errors import InputError, OtherKindError, ScissorcalError
 from scissorcal.files import replacing
 from scissorcal.foreign import Format, parse_isolated, read_foreign, read_json
 from scissorcal.foreign.formats import FIT
-from scissorcal.foreign.kinds import FIT_SEAL, fit_name
+from scissorcal.foreign.kinds import FIT_SEAL, OF_SCISSORCAL, UNKNOWN, fit_name, is_unknown
 from scissorcal.identity import bytes_digest
 from scissorcal.recipe.requirements import command_words
 
@@ -57,8 +57,6 @@ COMPRESSED_BYTES = 4096
 """Size from which an array is compressed."""
 FITS = ("friction", "friction-advance", "cut", "camera", "blade", "plate")
 """Names of the files that fits have in a workspace, without ".nc"."""
-OF_SCISSORCAL = b"scissorcal"
-"""Stands in every stored result several times: in names of attributes and in its seal."""
 _VERIFY = "scissorcal verify"
 _LOAD = "scissorcal.calibration.store_contents:load_contents"
 _SEAL = FIT_SEAL
@@ -192,6 +190,8 @@ def _opened(path: Path, kind: type[Result], *, with_variables: bool = True) -> _
                     f"{path} was written by an earlier version of scissorcal ({version}), which "
                     f"this version does not read: remove it and run '{kind.command}' again."
                 )
+        if is_unknown(content):
+            raise OtherKindError(path, UNKNOWN, form.name)
         if OF_SCISSORCAL not in content and _opens_as_hdf5(content, path, form):
             raise OtherKindError(path, "an HDF5 file of another program", form.name)
         raise ValueError("its SHA-256 does not match its content")

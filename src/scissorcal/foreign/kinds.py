@@ -5,6 +5,7 @@ import re
 from codecs import getincrementaldecoder
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from typing import IO
 
 from scissorcal.errors import OtherKindError
@@ -14,6 +15,9 @@ SHORTEST_TEXT = 16
 """Bytes from which printable ones are text: magic numbers, which may be printable, have 8."""
 FIT_SEAL = b"\nscissorcal sha256 "
 """What the last line of a stored fit begins with."""
+UNKNOWN = "a file of an unknown kind"
+OF_SCISSORCAL = b"scissorcal"
+"""Stands in every stored result and package several times."""
 _LARGEST_FIT = 500_000_000
 
 
@@ -108,6 +112,16 @@ def refuse_other_kind(file: IO[bytes], path: object, name: str, holds: Sequence[
     if found is not None and found.key not in holds:
         what = _fit_in(file) if found.key == "fit" else found.name
         raise OtherKindError(path, what, name, found.use)
+
+
+def is_unknown(content: bytes) -> bool:
+    """Whether nothing in a file's bytes is of a known kind, or of scissorcal.
+
+    A damaged file of scissorcal has its name in several places; one of a few bytes says nothing.
+    """
+    if len(content) < SHORTEST_TEXT or OF_SCISSORCAL in content:
+        return False
+    return kind_of(BytesIO(content)) is None
 
 
 def fit_name(what: str) -> str:

@@ -29,7 +29,6 @@ from scissorcal.workday.recordings import (
     refuse_mixed_joints,
     why_unused,
 )
-from scissorcal.workday.remedies import remedy
 from scissorcal.workday.states import CHANGED, WAITING, State, StepState, counted
 from scissorcal.workday.steps import BY_NAME, EFFORTS, STEPS, Step
 from scissorcal.workday.workspace import Workspace
@@ -282,7 +281,7 @@ class Engine:
             return made("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
         notes = self._little_used(step)
         if failed:
-            command = remedy(step, failed, facts.get("effort", ""), self.state)
+            command = self._remedy(step, failed, facts.get("effort", ""))
             found = f"{facts['label']}; failed: {', '.join(failed)}"
             return made("failed", found, command, notes=notes, **kept)
         if facts.get("lacks"):
@@ -296,10 +295,15 @@ class Engine:
         if check and check.state == "failed":
             found = f"{facts['label']}; its trust check failed: {', '.join(check.failed)}"
             kept["failed"] = tuple(f"{check.name} {one}" for one in check.failed)
-            return made("failed", found, remedy(step, kept["failed"], "", self.state), **kept)
+            return made("failed", found, self._remedy(step, kept["failed"], ""), **kept)
         if check and check.state != "done":
             return made("unverified", facts["label"], check.command, notes=notes, **kept)
         return made("done", facts["label"], "", notes=notes, **kept)
+
+    def _remedy(self, step: Step, failed: tuple[str, ...], effort: str) -> str:
+        from scissorcal.workday.remedies import remedy  # a day on which all went well needs none
+
+        return remedy(step, failed, effort, self.state)
 
     def _failed_below(self, step: Step) -> StepState | None:
         """A fit that this fit builds on and that failed, if only by its trust check."""
