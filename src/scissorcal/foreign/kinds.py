@@ -160,7 +160,7 @@ def _zip(head: bytes, tail: bytes) -> FileKind | None:
     name = head[30 : 30 + int.from_bytes(head[26:28], "little")]
     if name == b"manifest.json" and b"scissorcal-package/" in head:
         return FileKind("package", "a model package")
-    if name.endswith(b".npy"):
+    if name.endswith(b".npy") and b"/" not in name:
         return FileKind("npz", "a NumPy archive (.npz)")
     if name in (b"[Content_Types].xml", b"_rels/.rels", b"mimetype"):
         return FileKind("office", "an Office document", "Save its table as CSV in UTF-8.")
@@ -182,7 +182,8 @@ def _picture(head: bytes, tail: bytes) -> FileKind | None:
 
 
 def _parquet(head: bytes, tail: bytes) -> FileKind | None:
-    if head.startswith(b"PAR1") and tail.endswith(b"PAR1") and len(head) > 12:
+    whole = tail.endswith(b"PAR1") and len(head) > 12
+    if head.startswith(b"PAR1") and (whole or b"\0" in head):  # PAR1 alone may be a heading
         return FileKind("parquet", "a Parquet table", _NAMED.format(".parquet"))
     return None
 
