@@ -12,7 +12,7 @@ import pytest
 import scissorcal
 
 PACKAGE = Path(scissorcal.__file__).parent
-LEAVES = {"errors", "verdicts", "identity", "files", "foreign", "<root>"}
+LEAVES = {"errors", "verdicts", "identity", "files", "foreign", "locks", "<root>"}
 LOWEST = {"kernel", "model", "inference", "recipe", "recording"}
 MIDDLE = {"device", "vision", "calibration", "package", "render", "report", "tracking", "control"}
 MAY_IMPORT: dict[str, set[str]] = {
@@ -21,6 +21,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "identity": set(),
     "files": set(),
     "foreign": set(),
+    "locks": set(),
     "kernel": set(),
     "model": set(),
     "inference": set(),

@@ -27,6 +27,22 @@ class ModelError(InputError, ValueError):
     """A law or a shape of the model has an unknown name or an impossible number (exit code 2)."""
 
 
+class OtherKindError(InputError):
+    """A file is of another kind than is needed: not damaged, and not to be removed.
+
+    ``found`` names what it is and ``wanted`` what is needed, each with an article; ``use`` is a
+    sentence on what to do with the file.
+
+    >>> print(OtherKindError("cut.nc", "a cut fit", "a camera fit"))
+    cut.nc is a cut fit, not a camera fit. Name another file, or put the right one in its place.
+    """
+
+    def __init__(self, path: object, found: str, wanted: str, use: str = "") -> None:
+        remedy = use or "Name another file, or put the right one in its place."
+        super().__init__(f"{path} is {found}, not {wanted}. {remedy}")
+        self.found = found
+
+
 class VerdictError(ScissorcalError):
     """A verdict failed, so the result is not handed out (exit code 3)."""
 
@@ -50,6 +66,17 @@ class MissingError(ScissorcalError):
     """A previous step is missing: nothing captured, fitted or built yet (exit code 5)."""
 
     exit_code = 5
+
+
+def needs_unix(what: str) -> DeviceError:
+    """The refusal of what takes a Unix terminal or the C loop's port, on a system without them.
+
+    >>> print(needs_unix("A virtual rig"))
+    A virtual rig needs a Unix terminal, which this system lacks: use Linux or macOS for it.
+    """
+    return DeviceError(
+        f"{what} needs a Unix terminal, which this system lacks: use Linux or macOS for it."
+    )
 
 
 def needs_extra(what: str, package: str, extra: str, otherwise: str = "") -> InputError:

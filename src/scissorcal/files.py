@@ -33,7 +33,7 @@ def replacing(path: Path) -> Iterator[Path]:
         with part.open("rb") as file:
             os.fsync(file.fileno())
         part.replace(path)
-        _keep_name(path.parent)
+        keep_name(path.parent)
     except BaseException as error:
         with contextlib.suppress(OSError):
             part.unlink()
@@ -56,7 +56,7 @@ def rename_folder(part: Path, folder: Path) -> None:
             with path.open("rb") as file:
                 os.fsync(file.fileno())
     part.rename(folder)
-    _keep_name(folder.parent)
+    keep_name(folder.parent)
 
 
 def discard_folder(folder: Path) -> None:
@@ -91,7 +91,7 @@ def put_beside(source: Path, target: Path) -> None:
         with contextlib.suppress(OSError):
             part.unlink()
         raise
-    _keep_name(target.parent)
+    keep_name(target.parent)
 
 
 def left_over(folder: Path) -> tuple[Path, ...]:
@@ -130,7 +130,12 @@ def remove_left_over(folder: Path, *, folders: bool = True) -> tuple[Path, ...]:
 
 
 def is_running(pid: int) -> bool:
-    """Whether a process of this computer has the number ``pid``."""
+    """Whether a process of this computer has the number ``pid``.
+
+    On Windows, where a signal would end the process, each counts as running: what it left stays.
+    """
+    if os.name == "nt":
+        return True
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -140,12 +145,19 @@ def is_running(pid: int) -> bool:
     return True
 
 
+def host_name() -> str:
+    """The computer's name; empty where it has none."""
+    return os.uname().nodename if hasattr(os, "uname") else os.environ.get("COMPUTERNAME", "")
+
+
 def _host() -> str:
-    return re.sub(r"[^A-Za-z0-9_-]", "-", os.uname().nodename)[:_LONGEST_NAME] or "unnamed"
+    return re.sub(r"[^A-Za-z0-9_-]", "-", host_name())[:_LONGEST_NAME] or "unnamed"
 
 
-def _keep_name(folder: Path) -> None:
+def keep_name(folder: Path) -> None:
     """Have the folder's list of names on the disk; some file systems cannot be asked for it."""
+    if os.name == "nt":  # no folder is opened there
+        return
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)

@@ -6,9 +6,12 @@ Each function is also an attribute of ``scissorcal`` and loads what it needs whe
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.errors import MissingError
+from scissorcal.errors import InputError, MissingError
 
 if TYPE_CHECKING:
+    from scissorcal.calibration.camera.result import CameraFit
+    from scissorcal.calibration.edge.result import BladeResult
+    from scissorcal.calibration.plate.result import PlateFit
     from scissorcal.calibration.result import FitResult
     from scissorcal.package import ModelPackage
     from scissorcal.recording import Recording
@@ -21,7 +24,7 @@ def open_workspace(path: Path | str = ".") -> "Workspace":
     The workspace names its files: ``recipe()``, ``recordings("friction")`` (all of them, excluded
     ones too), ``fit_path("cut")``.
     Unlike the commands it recovers no interrupted capture. Raises MissingError where there is no
-    such folder, or no recipe.toml in it or above it.
+    such folder, or no recipe.toml in it or above it, InputError where it is a file.
 
     >>> from pathlib import Path
     >>> from scissorcal.recipe.library import recipe_path
@@ -32,6 +35,8 @@ def open_workspace(path: Path | str = ".") -> "Workspace":
     from scissorcal.workday.workspace import find_workspace
 
     folder = Path(path)
+    if folder.is_file():
+        raise InputError(f"{path} is a file, not a folder. Name the folder of a workspace.")
     if not folder.is_dir():
         raise MissingError(
             f"There is no folder {folder}. Give the folder of a workspace, or start one with "
@@ -59,19 +64,21 @@ def open_recording(path: Path | str) -> "Recording":
     return read_recording(_existing(path, "Record one with 'scissorcal capture'."))
 
 
-def open_fit(path: Path | str) -> "FitResult":
-    """Read a fit (fits/friction.nc or fits/cut.nc): parameters, draws, data, verdicts.
+def open_fit(path: Path | str) -> "FitResult | CameraFit | BladeResult | PlateFit":
+    """Read a fit: of friction, of a cut, or of photographs of a camera, a blade or a plate.
 
-    ``arviz.from_netcdf`` reads the same file. Raises MissingError where there is no file,
-    InputError where it is no fit of scissorcal.
+    Each has what it is of (``what``), ``verdicts``, ``sources`` and ``notes``; a fit of friction or
+    of a cut has ``parameters``, ``draws`` and ``series`` besides. ``arviz.from_netcdf`` reads the
+    same file. Raises MissingError where there is no file, InputError where it is no fit of
+    scissorcal.
 
     >>> open_fit("fits/cut.nc")
     Traceback (most recent call last):
     scissorcal.errors.MissingError: There is no file fits/cut.nc. Make it with 'scissorcal fit'.
     """
-    from scissorcal.calibration.store import load_fit
+    from scissorcal.calibration.store import load_any_fit
 
-    return load_fit(_existing(path, "Make it with 'scissorcal fit'."))
+    return load_any_fit(_existing(path, "Make it with 'scissorcal fit'."))
 
 
 def open_package(path: Path | str) -> "ModelPackage":
@@ -92,6 +99,8 @@ def open_package(path: Path | str) -> "ModelPackage":
 
 
 def _existing(path: Path | str, remedy: str) -> Path:
+    if Path(path).is_dir():
+        raise InputError(f"{path} is a folder, not a file. Name a file in it.")
     if not Path(path).is_file():
         raise MissingError(f"There is no file {path}. {remedy}")
     return Path(path)

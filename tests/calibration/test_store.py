@@ -143,7 +143,7 @@ def test_a_file_of_another_format_is_refused(tmp_path: Path, content: bytes) -> 
 
 
 def test_a_result_of_another_kind_is_refused(stored: Path) -> None:
-    with pytest.raises(InputError, match=r"is not a camera fit .* holds a PlateFit"):
+    with pytest.raises(InputError, match=r"plate.nc is a plate fit, not a camera fit\."):
         load(stored, CameraFit)
 
 

@@ -201,7 +201,7 @@ def foreign_mcap(path: Path) -> None:
         ("a.mcap", b"", r"is empty \(0 bytes\).*Capture again"),
         ("a.mcap", b"\x89MC", "cut off within its first 8 bytes"),
         ("a.mcap", b"\x89PNG\r\n\x1a\n" + bytes(200), "a PNG image"),
-        ("a.mcap", b"time,opening\n0,1\n", "text .*import"),
+        ("a.mcap", b"time,opening\n0,1\n", "is text, not a recording.*import"),
         ("a.mcap", b"PAR1" + bytes(100), "Parquet"),
         ("a.mcap", bytes(range(256)) * 9, "an unknown format"),
         ("a.mcap", b"\x89MCAP0\r\n" + bytes(range(200, 256)) * 9, "description is missing"),

@@ -162,7 +162,7 @@ def test_a_truncated_file_is_refused(tmp_path: Path, kind: str, share: float) ->
 
 def test_a_file_that_is_no_image_is_refused(tmp_path: Path) -> None:
     for name, content, words in (
-        ("notes.txt", b"a list of things", "not a readable photograph"),
+        ("notes.txt", b"a list of things", "is text, not a photograph"),
         ("empty.jpg", b"", "is empty"),
         ("phone.heic", b"\0\0\0\x18ftypheic" + bytes(40), "HEIF"),
     ):

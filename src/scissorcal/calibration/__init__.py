@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
     from scissorcal.calibration.friction.model import FrictionExperiment
     from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
-    from scissorcal.calibration.store import load, load_fit, read_header, save
+    from scissorcal.calibration.store import load, load_any_fit, load_fit, read_header, save
 
 __all__ = [
     "CutExperiment",
@@ -25,6 +25,7 @@ __all__ = [
     "fit_friction",
     "friction_experiment",
     "load",
+    "load_any_fit",
     "load_fit",
     "read_header",
     "save",
@@ -38,7 +39,7 @@ _HOMES = {
     "friction.fit": ("fit_friction", "friction_experiment"),
     "friction.model": ("FrictionExperiment",),
     "result": ("FitResult", "FitSeries", "FittedParameter", "StrokeError"),
-    "store": ("load", "load_fit", "read_header", "save"),
+    "store": ("load", "load_any_fit", "load_fit", "read_header", "save"),
 }
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.recipe.requirements import command_words
 from scissorcal.verdicts import Verdict, failed
 
 Array = NDArray[np.float64]
@@ -40,11 +41,6 @@ class Stored:
 def by_name(group: str, columns: str) -> Stored:
     """Draws (n, k) as ArviZ reads them: a variable (chain, draw) for each named column."""
     return Stored(("chain", "draw"), group, columns=columns)
-
-
-def command_words(what: str) -> str:
-    """What commands call a fit of this name."""
-    return {"friction-advance": "friction --axis advance"}.get(what, what)
 
 
 class Result:
@@ -384,6 +380,8 @@ class FitResult(Result):
     each part that the fit uses. ``inputs_hash`` identifies recordings, recipe and settings: equal
     hashes need no second fit.
     """
+
+    title = "friction or cut fit"
 
     what: Literal["friction", "friction-advance", "cut"]
     effort: Effort

@@ -32,15 +32,21 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.result import FitResult, Result, Stored, command_words
-from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.calibration.result import FitResult, Result, Stored
+from scissorcal.errors import InputError, OtherKindError, ScissorcalError
 from scissorcal.files import replacing
 from scissorcal.foreign import Format, parse_isolated, read_foreign, read_json
 from scissorcal.foreign.formats import FIT
+from scissorcal.foreign.kinds import FIT_SEAL, OF_SCISSORCAL, UNKNOWN, fit_name, is_unknown
 from scissorcal.identity import bytes_digest
+from scissorcal.recipe.requirements import command_words
 
 if TYPE_CHECKING:
     import h5netcdf
+
+    from scissorcal.calibration.camera.result import CameraFit
+    from scissorcal.calibration.edge.result import BladeResult
+    from scissorcal.calibration.plate.result import PlateFit
 
 R = TypeVar("R", bound=Result)
 
@@ -49,7 +55,11 @@ EARLIER = ("scissorcal-fit/1", "scissorcal-fit/2")
 """Formats of earlier versions, which are refused: the fit is made again."""
 COMPRESSED_BYTES = 4096
 """Size from which an array is compressed."""
-_SEAL = b"\nscissorcal sha256 "
+FITS = ("friction", "friction-advance", "cut", "camera", "blade", "plate")
+"""Names of the files that fits have in a workspace, without ".nc"."""
+_VERIFY = "scissorcal verify"
+_LOAD = "scissorcal.calibration.store_contents:load_contents"
+_SEAL = FIT_SEAL
 _SEAL_SIZE = len(_SEAL) + 64 + 1
 
 
@@ -94,7 +104,7 @@ def load(path: Path, kind: type[R]) -> R:
             return cast(R, _built(kind, read_json(path, _format_of(path, kind)), None))
         file = _opened(path, kind)
         if file.attributes["kind"] != kind.__name__:
-            raise ValueError(f"it holds a {file.attributes['kind']}")
+            raise OtherKindError(path, fit_name(_header(file).what), f"a {kind.title}")
         return cast(R, _built(kind, json.loads(file.attributes["scissorcal"]), file))
 
 
@@ -103,11 +113,24 @@ def load_fit(path: Path) -> FitResult:
     return load(path, FitResult)
 
 
+def load_any_fit(path: Path) -> "FitResult | CameraFit | BladeResult | PlateFit":
+    """Read a fit of any kind, as the one that it is; see :func:`load`."""
+    from scissorcal.calibration.camera.result import CameraFit
+    from scissorcal.calibration.edge.result import BladeResult
+    from scissorcal.calibration.plate.result import PlateFit
+
+    kinds = {"camera": CameraFit, "blade": BladeResult, "plate": PlateFit}
+    return load(path, kinds.get(read_header(path).what, FitResult))
+
+
 def read_header(path: Path) -> Header:
     """Read what a stored result is of; raises InputError as :func:`load` does."""
     with _reported(path, Result):
-        file = _opened(path, Result, with_variables=False)
-        return cast(Header, _built(Header, json.loads(file.attributes["header"]), None))
+        return _header(_opened(path, Result, with_variables=False))
+
+
+def _header(file: "_Contents") -> Header:
+    return cast(Header, _built(Header, json.loads(file.attributes["header"]), None))
 
 
 @contextmanager
@@ -126,8 +149,8 @@ def _reported(path: Path, kind: type[Result]) -> Iterator[None]:
 
 
 def _again(path: Path, kind: type[Result]) -> str:
-    """How to make a result again; the name of a fit's file is that of its command."""
-    if kind.command != Result.command or path.suffix != ".nc":
+    """How to make a result again; a fit's file in a workspace has the name of its command."""
+    if kind.command != Result.command or path.suffix != ".nc" or path.stem not in FITS:
         return f"remove it and run '{kind.command}' again"
     return f"run '{kind.command} {command_words(path.stem)} --force'"
 
@@ -135,7 +158,10 @@ def _again(path: Path, kind: type[Result]) -> str:
 def _format_of(path: Path, kind: type[Result]) -> Format:
     again = _again(path, kind)
     return replace(
-        FIT, name=f"a {kind.title} of scissorcal", remedy=f"{again[0].upper()}{again[1:]}."
+        FIT,
+        name=f"a {kind.title} of scissorcal",
+        remedy=f"{again[0].upper()}{again[1:]}.",
+        holds=("verify", "json", "text") if kind.command.startswith(_VERIFY) else FIT.holds,
     )
 
 
@@ -164,13 +190,25 @@ def _opened(path: Path, kind: type[Result], *, with_variables: bool = True) -> _
                     f"{path} was written by an earlier version of scissorcal ({version}), which "
                     f"this version does not read: remove it and run '{kind.command}' again."
                 )
+        if is_unknown(content):
+            raise OtherKindError(path, UNKNOWN, form.name)
+        if OF_SCISSORCAL not in content and _opens_as_hdf5(content, path, form):
+            raise OtherKindError(path, "an HDF5 file of another program", form.name)
         raise ValueError("its SHA-256 does not match its content")
-    load_contents = "scissorcal.calibration.store_contents:load_contents"
-    found = parse_isolated(load_contents, data, path, form, with_variables=with_variables)
+    found = parse_isolated(_LOAD, data, path, form, with_variables=with_variables)
     file = _Contents(found["attributes"], found["variables"])
     if file.attributes["format"] != FORMAT:
         raise ValueError(f"its format is {file.attributes['format']}, and this reads {FORMAT}")
     return file
+
+
+def _opens_as_hdf5(content: bytes, path: Path, form: Format) -> bool:
+    """Whether a file without a seal is whole, as one that was cut off is not."""
+    try:
+        parse_isolated(_LOAD, content, path, form, with_variables=False)
+    except InputError:
+        return False
+    return True
 
 
 def _seal(data: bytes) -> bytes:

@@ -35,4 +35,5 @@ def log_command(
 
 def _own(path: str, flags: int) -> int:
     """Open the log itself, and nothing that a symbolic link or a pipe of its name leads to."""
-    return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+    guards = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # Windows has neither
+    return os.open(path, flags | guards, 0o666)

@@ -1,6 +1,5 @@
 """``scissorcal recipe``"""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -47,15 +46,12 @@ def show(
       [fit.friction.priors.rotary]
       ...
     """
-    from scissorcal.recipe.library import recipe_path
+    from scissorcal.recipe.library import recipe_file
     from scissorcal.recipe.load import parse_recipe, read_text
     from scissorcal.recipe.show import as_toml, recipe_settings
     from scissorcal.workday.workspace import find_workspace
 
-    if name is None:
-        path = find_workspace(folder).recipe_path
-    else:
-        path = Path(name) if name.endswith(".toml") else recipe_path(name)
+    path = find_workspace(folder).recipe_path if name is None else recipe_file(name)
     text = read_text(path)
     found = parse_recipe(text, str(path))
     settings = recipe_settings(found, text, defaults=defaults)

@@ -89,7 +89,7 @@ def summarise(
     )
     from scissorcal.files import replacing
     from scissorcal.recording import Joint, import_table, read_recording
-    from scissorcal.recording.table import column_of
+    from scissorcal.recording.table import column_of, refuse_no_table
     from scissorcal.report.summary import Shown, summary_page, summary_panels
     from scissorcal.report.text import panels_text
 
@@ -102,6 +102,7 @@ def summarise(
             recording = replace(read_recording(path), source=path.name)
             effort: Effort = "motor_torque" if recording.samples["motor_torque"].any() else _HAND
             return recording, effort
+        refuse_no_table(path)
         if not {"motor_torque", "handle_force"} & set(chosen):
             raise InputError(
                 f"{path}: no column is given for the force or torque. Name it with "

@@ -23,7 +23,7 @@ from scissorcal.device.counts import (
     SummaryRow,
     motion_of,
 )
-from scissorcal.recipe.requirements import LITTLE, CaptureKind
+from scissorcal.recipe.requirements import LITTLE, CaptureKind, command_words
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.until import UntilMark
 
@@ -163,7 +163,7 @@ def _missing_tolerance(mark: UntilMark, recipe: Recipe, kind: CaptureKind) -> li
         f"the scene's tolerance: the capture ended within {100 * mark.tolerance:g} % at "
         f"{100 * mark.confidence:g} % confidence, and the recipe now asks for "
         f"{100 * tolerance:g} % at {100 * confidence:g} %: run 'scissorcal capture "
-        f"{kind} --until-tolerance' once more"
+        f"{command_words(kind)} --until-tolerance' once more"
     ]
 
 

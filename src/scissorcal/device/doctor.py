@@ -2,7 +2,6 @@
 
 import math
 import os
-import resource
 import select
 import time
 from collections.abc import Callable
@@ -149,6 +148,10 @@ def _lateness() -> Array:
 
 def _realtime_priority() -> int:
     """Highest real-time priority that this process may have; 0 where the system grants none."""
+    if not hasattr(os, "sched_setscheduler"):
+        return 0
+    import resource
+
     policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))

@@ -4,9 +4,10 @@ import errno
 import os
 import time
 from contextlib import suppress
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
-from scissorcal.errors import DeviceError
+from scissorcal.errors import DeviceError, needs_unix
 
 if TYPE_CHECKING:
     import serial
@@ -21,6 +22,8 @@ def open_port(port: str, baud: int) -> "serial.Serial":
     A busy port is retried for half a second, until a capture that was killed has released it.
     Raises DeviceError, with what to do next, where it is missing, busy, forbidden or no port.
     """
+    if find_spec("termios") is None:
+        raise needs_unix(f"A rig on {port}")
     import serial
 
     patient_until = time.monotonic() + BUSY_PATIENCE_S
@@ -40,8 +43,16 @@ def open_port(port: str, baud: int) -> "serial.Serial":
 
 
 def known_ports() -> tuple[str, ...]:
-    """Return the serial ports that this machine has now, sorted."""
-    from serial.tools import list_ports
+    """Return the serial ports that this machine has now, sorted.
+
+    Raises DeviceError where the system's ports cannot be listed.
+    """
+    try:
+        from serial.tools import list_ports
+    except ImportError as error:
+        raise DeviceError(
+            f"The ports of this system cannot be listed ({error}): name one with --device."
+        ) from None
 
     return tuple(sorted(info.device for info in list_ports.comports()))
 

@@ -65,10 +65,10 @@ def _words(error: Exception) -> str:
 
 def _bound_forever() -> None:
     """No core dumps, no files written."""
-    if sys.platform == "win32":
+    try:
+        import resource
+    except ImportError:
         return
-    import resource
-
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 
@@ -79,10 +79,10 @@ def _bound(limits: dict[str, int]) -> None:
     What parsers of earlier files reserved and keep (Parquet's 1.1 GB) is not this file's. On
     systems without these limits (Windows) only the parent's limit of time holds.
     """
-    if sys.platform == "win32":
+    try:
+        import resource
+    except ImportError:
         return
-    import resource
-
     # what is reserved and never written does not count against DATA, as it does against AS
     memory = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
     used = resource.getrusage(resource.RUSAGE_SELF)

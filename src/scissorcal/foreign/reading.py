@@ -10,6 +10,7 @@ from typing import IO, Any
 
 from scissorcal.errors import InputError, ScissorcalError, file_error
 from scissorcal.foreign.formats import Format
+from scissorcal.foreign.kinds import refuse_other_kind
 
 LONGEST_NUMBER = 300
 """Digits of a whole number in JSON; more would not be a float of any size."""
@@ -35,13 +36,15 @@ def open_foreign(path: Path, kind: Format) -> Iterator[IO[bytes]]:
     """Open a regular file of at most the format's size; it is closed at the end of the block.
 
     A pipe, device, socket or folder is refused without being opened, and again by what the open
-    file is, so that none can take the place of a file in between. Raises InputError, in one
-    sentence, also where there is no such file or it may not be read.
+    file is, so that none can take the place of a file in between. A file of another known kind is
+    refused by its name (OtherKindError). Raises InputError, in one sentence, also where there is no
+    such file or it may not be read.
     """
     file = _opened(path)
     try:
         facts = os.fstat(file.fileno())
-        _refuse_kind(path, facts)
+        _refuse_irregular(path, facts)
+        refuse_other_kind(file, path, kind.name, kind.holds)
         if facts.st_size > kind.most_bytes:
             raise InputError(too_large(path, kind))
         yield file
@@ -141,7 +144,7 @@ def too_large(path: Path | str, kind: Format) -> str:
 
 def _opened(path: Path) -> IO[bytes]:
     try:
-        _refuse_kind(path, path.stat())
+        _refuse_irregular(path, path.stat())
         return os.fdopen(os.open(path, _OPEN_FLAGS), "rb")
     except FileNotFoundError:
         raise InputError(f"{path} does not exist. Check the name and the folder.") from None
@@ -153,7 +156,7 @@ def _opened(path: Path) -> IO[bytes]:
         raise InputError(f"{str(path)!r} cannot be the name of a file. Check it.") from None
 
 
-def _refuse_kind(path: Path, facts: os.stat_result) -> None:
+def _refuse_irregular(path: Path, facts: os.stat_result) -> None:
     if not stat.S_ISREG(facts.st_mode):
         what = _KINDS.get(stat.S_IFMT(facts.st_mode), "no regular file")
         raise InputError(f"{path} cannot be read: it is {what}, not a file. Name a file.")

@@ -16,10 +16,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import InputError, MissingError, OtherKindError
 from scissorcal.files import replacing
 from scissorcal.foreign import open_foreign, parse_json, reading
 from scissorcal.foreign.formats import PACKAGE
+from scissorcal.foreign.kinds import UNKNOWN, is_unknown
 from scissorcal.identity import bytes_digest
 from scissorcal.kernel import Row16, Table, Table16
 from scissorcal.package.manifest import (
@@ -156,9 +157,11 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
     with (
         reading(path, PACKAGE),
         open_foreign(path, PACKAGE) as file,
-        zipfile.ZipFile(file) as archive,
     ):
-        yield archive
+        if is_unknown(file.read()):
+            raise OtherKindError(path, UNKNOWN, PACKAGE.name)
+        with zipfile.ZipFile(file) as archive:
+            yield archive
 
 
 def _entries(path: Path, archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
@@ -196,7 +199,7 @@ def _read_manifest(
 
     where = f"{path}, member {MANIFEST_FILE!r}"
     if MANIFEST_FILE not in infos:
-        raise InputError(f"{path} has no {MANIFEST_FILE}, so it is not a package. {REMEDY}")
+        raise OtherKindError(path, f"a zip archive without {MANIFEST_FILE}", PACKAGE.name)
     data = _read_bounded(where, archive, infos[MANIFEST_FILE], LARGEST_MANIFEST)
     facts = parse_json(data, where, REMEDY)
     try:

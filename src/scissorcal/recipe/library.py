@@ -45,6 +45,19 @@ def recipe_path(name: str) -> Path:
     return _named(recipes_dir(), name, "recipe")
 
 
+def recipe_file(given: str) -> Path:
+    """The file of a recipe that a person named: a built-in one, or a file of any name.
+
+    Raises InputError where it is neither.
+    """
+    path = Path(given)
+    if given in recipe_names() or not (path.suffix == ".toml" or path.exists()):
+        return recipe_path(given)
+    if path.is_dir():
+        raise InputError(f"{path} is a folder, not a recipe. Name the recipe.toml in it.")
+    return path
+
+
 def specimen_path(name: str) -> Path:
     """Return the file of the specimen called ``name``; InputError naming the others if none is."""
     return _named(specimens_dir(), name, "specimen")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from scissorcal.errors import InputError
 from scissorcal.foreign import read_foreign_text
-from scissorcal.foreign.formats import RECIPE
+from scissorcal.foreign.formats import RECIPE, Format
 from scissorcal.recipe.locate import broken_statement
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def load_recipe(path: Path | str) -> "Recipe":
     >>> load_recipe(recipe_path("paper-80gsm")).material.thickness_mm
     0.1
     """
-    return parse_recipe(read_text(Path(path)), str(path))
+    return parse_recipe(read_foreign_text(Path(path), RECIPE), str(path))
 
 
 def parse_recipe(text: str, source: str = "recipe", *, judged: bool = True) -> "Recipe":
@@ -48,9 +48,12 @@ def parse_recipe(text: str, source: str = "recipe", *, judged: bool = True) -> "
     return _checked(document, unlikely, text, Recipe, source)
 
 
-def load_toml(path: Path, model: "type[Model]") -> "Model":
-    """Read a TOML file into ``model``; mistakes raise InputError as in `load_recipe`."""
-    text = read_text(path)
+def load_toml(path: Path, model: "type[Model]", kind: Format = RECIPE) -> "Model":
+    """Read a TOML file into ``model``; mistakes raise InputError as in `load_recipe`.
+
+    A file of another known kind than ``kind`` is refused by its name.
+    """
+    text = read_foreign_text(path, kind)
     return _checked(_parse(text, str(path)), [], text, model, str(path))
 
 

@@ -176,3 +176,12 @@ def capture_facts(recipe: Recipe, kind: CaptureKind) -> Mapping[str, object]:
         facts["material.thickness_mm"] = recipe.material.thickness_mm
         facts["scene.cut"] = recipe.scene.cut
     return facts
+
+
+def command_words(what: str) -> str:
+    """What commands call a capture, a fit or a trust check of this name.
+
+    >>> command_words("friction-advance"), command_words("cut")
+    ('friction --axis advance', 'cut')
+    """
+    return {"friction-advance": "friction --axis advance"}.get(what, what)

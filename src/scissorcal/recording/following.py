@@ -16,7 +16,6 @@ from scissorcal.foreign import open_foreign
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording.chunks import LARGEST_CHUNK, DamageError
 from scissorcal.recording.header import HEAD, MAGIC
-from scissorcal.recording.partfile import try_lock
 from scissorcal.recording.scan import Telemetry, Walk, samples_among
 from scissorcal.recording.schema import RecordingMetadata
 from scissorcal.recording.telemetry import TelemetryChannel, rows_of
@@ -96,11 +95,16 @@ class RecordingFollower:
         The lock is tried and given back at once, so ask seldom, and only where the file does not
         grow.
         """
-        import fcntl
+        from scissorcal.locks import NO_LOCKS, try_lock, unlock
 
-        if not try_lock(self._stream):
-            return True
-        fcntl.flock(self._stream.fileno(), fcntl.LOCK_UN)
+        try:
+            if not try_lock(self._stream):
+                return True
+        except OSError as error:
+            if error.errno not in NO_LOCKS:
+                raise
+            return False
+        unlock(self._stream)
         return False
 
     def read(self) -> NDArray[np.void]:
@@ -161,4 +165,5 @@ class RecordingFollower:
                 continue  # the report on the finished recording says what is damaged
 
     def _bytes(self, offset: int, length: int) -> bytes:
-        return os.pread(self._stream.fileno(), length, offset)
+        self._stream.seek(offset)
+        return self._stream.read(length)

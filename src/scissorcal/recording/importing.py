@@ -18,7 +18,7 @@ from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
 from scissorcal.recording.resolution import GAP_FACTOR, StrokeThreshold, stroke_threshold
 from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_cost, gap_note
-from scissorcal.recording.table import Table, read_table
+from scissorcal.recording.table import Table, read_table, refuse_no_table
 from scissorcal.recording.wraps import continued
 
 WRAP = 2.0**32
@@ -136,6 +136,7 @@ def _check_request(
             raise InputError(
                 f"A unit or scale is given for {name}, but no column. Name its column."
             )
+    refuse_no_table(path)
     if "opening" not in columns:
         raise InputError(f"{path}: no column is given for opening. Name it with -c opening=COLUMN.")
     if wanted and not set(wanted) & set(columns):

@@ -1,21 +1,23 @@
 """Unfinished files: created under a lock, renamed when complete, and what a full disk means."""
 
 import contextlib
-import fcntl
 import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
 from scissorcal.errors import InputError, file_error
+from scissorcal.files import keep_name
 
 
 def create_locked(path: Path, part: Path) -> IO[bytes]:
     """Create ``part``, which will become ``path``, and hold its lock until it is closed.
 
-    The lock ends with the process. Raises InputError if either name is taken
-    or the folder cannot be written.
+    The lock ends with the process; where there are no locks, none is held. Raises InputError if
+    either name is taken or the folder cannot be written.
     """
+    from scissorcal.locks import NO_LOCKS, lock  # commands that write nothing need it not
+
     while True:
         if path.exists():
             raise InputError(f"{path} exists and is not overwritten. Choose another name.")
@@ -31,20 +33,15 @@ def create_locked(path: Path, part: Path) -> IO[bytes]:
                 f"{part} cannot be created: {error.strerror}. Make the folder {path.parent} "
                 "first, or choose one that you may write to."
             ) from error
-        fcntl.flock(stream.fileno(), fcntl.LOCK_EX)
+        try:
+            lock(stream)
+        except OSError as error:
+            if error.errno not in NO_LOCKS:
+                raise
         # A recovery may have renamed the empty file between its creation and the lock.
         if is_same_file(part, stream):
             return stream
         stream.close()
-
-
-def try_lock(stream: IO[bytes]) -> bool:
-    """Lock an open file as its writer does; False if a running process holds the lock."""
-    try:
-        fcntl.flock(stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
 
 
 def is_same_file(path: Path, stream: IO[bytes]) -> bool:
@@ -64,12 +61,10 @@ def seal(stream: IO[bytes], part: Path, path: Path) -> None:
         )
     stream.flush()
     os.fsync(stream.fileno())
+    if os.name == "nt":  # Windows renames no file that is open
+        stream.close()
     part.rename(path)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+    keep_name(path.parent)
     stream.close()
 
 

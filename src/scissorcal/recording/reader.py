@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.foreign import reading, refuse_unless_regular
-from scissorcal.foreign.formats import RECORDING
+from scissorcal.foreign.formats import ANY, RECORDING
 from scissorcal.identity import file_digest
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.recording.scan import Attachment, Scan, Sheet, scan_file
@@ -70,7 +70,7 @@ def content_hash(path: str | Path) -> str:
 
     Raises InputError if the file cannot be read.
     """
-    refuse_unless_regular(Path(path), RECORDING)
+    refuse_unless_regular(Path(path), ANY)
     return file_digest(Path(path))
 
 

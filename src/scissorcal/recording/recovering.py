@@ -10,7 +10,7 @@ from scissorcal.errors import InputError
 from scissorcal.foreign import open_foreign
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording import layout
-from scissorcal.recording.partfile import explained, is_same_file, seal, try_lock
+from scissorcal.recording.partfile import explained, is_same_file, seal
 from scissorcal.recording.samplefile import SampleFile
 from scissorcal.recording.scan import Attachment, Mark, Note, Scan, Sheet, Telemetry, scan_file
 
@@ -47,10 +47,23 @@ def recover(folder: str | Path) -> tuple[Recovered, ...]:
 
 
 def _recover_one(part: Path) -> Recovered | None:
+    from scissorcal.locks import NO_LOCKS, try_lock
+
     if not part.exists():
         return None
     with open_foreign(part, RECORDING) as stream, explained(part):
-        if not try_lock(stream):
+        try:
+            free = try_lock(stream)
+        except OSError as error:
+            if error.errno not in NO_LOCKS:
+                raise
+            sentence = (
+                f"{part.name} was not touched: there are no locks here, so that it is not known "
+                "whether it is still being written. Copy the folder to a disk of a computer that "
+                "has locks."
+            )
+            return Recovered("busy", part, None, 0, sentence)
+        if not free:
             sentence = f"{part.name} is still being written, so it was not touched."
             return Recovered("busy", part, None, 0, sentence)
         if not is_same_file(part, stream):

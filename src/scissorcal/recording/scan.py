@@ -21,7 +21,6 @@ from scissorcal.recording.chunks import (
     parse_record,
     run_end,
 )
-from scissorcal.recording.foreign import refuse_other_formats
 from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, from_entries
 from scissorcal.recording.telemetry import TelemetryChannel, rows_of
@@ -129,7 +128,7 @@ class Scan:
 def scan_file(path: Path) -> Scan:
     """Read a whole file, complete, cut off or damaged; InputError if it is no recording."""
     data = read_foreign(path, RECORDING)
-    refuse_other_formats(path, data)
+    _refuse_unknown(path, data)
     walk = Walk(room=LARGEST_CHUNK + LARGEST_RATIO * len(data))
     with reading(path, RECORDING):
         for offset, opcode, body in _records(data, walk):
@@ -155,6 +154,21 @@ def scan_file(path: Path) -> Scan:
         walk.events,
         walk.damage,
         walk.finished,
+    )
+
+
+def _refuse_unknown(path: Path, data: bytes) -> None:
+    """InputError where bytes do not begin as a recording; known kinds are refused before."""
+    if data.startswith(MAGIC):
+        return
+    if MAGIC.startswith(data):
+        raise InputError(
+            f"{path} is cut off within its first {len(MAGIC)} bytes: nothing can be recovered "
+            "from it. Capture again."
+        )
+    raise InputError(
+        f"{path} is not a recording: its first bytes are those of an unknown format. Name an .mcap "
+        "file that scissorcal wrote."
     )
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
-from scissorcal.foreign import reading
-from scissorcal.foreign.formats import LOG
+from scissorcal.foreign import reading, refuse_unless_regular
+from scissorcal.foreign.formats import LOG, MATLAB, PARQUET
 
 Array = NDArray[np.float64]
 Wanted = Mapping[str, str | int]
@@ -51,6 +51,16 @@ class Table:
         where = f"line {self.lines[row]}" if self.lines is not None else f"row {row + 1}"
         column = f", column {self.columns[channel].heading!r}" if channel else ""
         return f"{self.path}, {where}{column}"
+
+
+def refuse_no_table(path: Path) -> None:
+    """Raise InputError where a file is missing, or of another known kind than its extension says.
+
+    For a request that cannot be checked before: what a photograph has no columns for is no fault
+    of the request.
+    """
+    kinds = {".mat": MATLAB, ".parquet": PARQUET, ".pq": PARQUET}
+    refuse_unless_regular(path, kinds.get(path.suffix.lower(), LOG))
 
 
 def read_table(

@@ -11,7 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, OtherKindError
+from scissorcal.foreign.kinds import fit_name
 from scissorcal.identity import digest
 from scissorcal.recipe.plate_layers import drawings
 from scissorcal.recipe.requirements import CaptureKind, Requirements, requirements
@@ -28,7 +29,6 @@ from scissorcal.workday.recordings import (
     refuse_mixed_joints,
     why_unused,
 )
-from scissorcal.workday.remedies import remedy
 from scissorcal.workday.states import CHANGED, WAITING, State, StepState, counted
 from scissorcal.workday.steps import BY_NAME, EFFORTS, STEPS, Step
 from scissorcal.workday.workspace import Workspace
@@ -84,7 +84,7 @@ class Engine:
             waits = state.state in WAITING or (state.state == "failed" and not state.content)
             if waits and not item.endswith("?") and self._counts(step, item):
                 return self.leads_to(_plain(item))
-        return self.state(name).command or f"scissorcal {name}"  # a step that no scene requires
+        return self.state(name).command or step.command  # a step that no scene requires
 
     def refresh(self) -> None:
         """Forget what was worked out, after a result was written."""
@@ -262,6 +262,10 @@ class Engine:
         content = self.index.digest(path)
         try:
             facts = self.facts(step.name)
+            refuse_other_fit(step, path, facts.get("what", step.what))
+        except OtherKindError as error:  # what is there is nobody's damage: the result is missing
+            found = f"{name} is {error.found}: move it away before '{step.command}'"
+            return made("missing", found, notes=(str(error),))
         except InputError as error:
             why_not, again = (str(error),), step.command
             found = f"damaged: {_AGAIN.get(step.kind, 'make it again')} with '{again}'"
@@ -277,7 +281,7 @@ class Engine:
             return made("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
         notes = self._little_used(step)
         if failed:
-            command = remedy(step, failed, facts.get("effort", ""), self.state)
+            command = self._remedy(step, failed, facts.get("effort", ""))
             found = f"{facts['label']}; failed: {', '.join(failed)}"
             return made("failed", found, command, notes=notes, **kept)
         if facts.get("lacks"):
@@ -291,10 +295,15 @@ class Engine:
         if check and check.state == "failed":
             found = f"{facts['label']}; its trust check failed: {', '.join(check.failed)}"
             kept["failed"] = tuple(f"{check.name} {one}" for one in check.failed)
-            return made("failed", found, remedy(step, kept["failed"], "", self.state), **kept)
+            return made("failed", found, self._remedy(step, kept["failed"], ""), **kept)
         if check and check.state != "done":
             return made("unverified", facts["label"], check.command, notes=notes, **kept)
         return made("done", facts["label"], "", notes=notes, **kept)
+
+    def _remedy(self, step: Step, failed: tuple[str, ...], effort: str) -> str:
+        from scissorcal.workday.remedies import remedy  # a day on which all went well needs none
+
+        return remedy(step, failed, effort, self.state)
 
     def _failed_below(self, step: Step) -> StepState | None:
         """A fit that this fit builds on and that failed, if only by its trust check."""
@@ -369,6 +378,12 @@ class Engine:
         if self.state("package build").state in WAITING:
             return made("stale", f"package build is {self.state('package build').state}")
         return made("done", counted(len(recordings), "recording"), "")
+
+
+def refuse_other_fit(step: Step, path: Path, what: str) -> None:
+    """Raise OtherKindError where a step's file holds a fit of another quantity."""
+    if step.kind == "fit" and what != step.what:
+        raise OtherKindError(path, fit_name(what), fit_name(step.what))
 
 
 _AGAIN = {"fit": "fit again", "verify": "check again", "package": "build again"}

@@ -2,7 +2,6 @@
 
 import contextlib
 import errno
-import fcntl
 import json
 import os
 import stat
@@ -13,6 +12,8 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from scissorcal.errors import InputError
+from scissorcal.files import host_name
+from scissorcal.locks import NO_LOCKS, try_lock
 
 if TYPE_CHECKING:
     from scissorcal.workday.workspace import Workspace
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 LOCK_FILE = "lock"
 _LONGEST = 4096
 _READ_ONLY = (errno.EROFS, errno.EACCES, errno.EPERM)
-_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF)
-"""Answers of file systems without locks; NFS gives EBADF for a file that may only be read."""
 
 
 @contextlib.contextmanager
@@ -48,11 +47,9 @@ def writing(
         return
     with opened as file:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(_refusal(workspace, _holder(file))) from None
+            held = try_lock(file)
         except OSError as error:
-            if error.errno not in _NO_LOCKS:
+            if error.errno not in NO_LOCKS:
                 raise
             tell(
                 f"{path} cannot be locked on its file system: of two commands that write at once "
@@ -60,10 +57,12 @@ def writing(
             )
             yield
             return
+        if not held:
+            raise InputError(_refusal(workspace, _holder(file)))
         before = _holder(file)
-        if before is not None and before.host != os.uname().nodename:
+        if before is not None and before.host != host_name():
             tell(_not_seen(workspace, before))
-        holder = _Holder(command, os.uname().nodename, os.getpid(), time.time())
+        holder = _Holder(command, host_name(), os.getpid(), time.time())
         # A full disk, or a lock that another user made: the lock itself is held all the same.
         with contextlib.suppress(OSError):
             file.truncate(0)
@@ -83,7 +82,8 @@ def _open(path: Path) -> IO[bytes]:
                 f"{one} is a symbolic link, and what it leads to is not the workspace's: remove "
                 "the link."
             )
-    how = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    names = ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC")  # Windows has none of them
+    how = sum(getattr(os, name, 0) for name in names)
     try:
         handle, mode = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | how, 0o666), "ab+"
     except PermissionError:

@@ -248,9 +248,10 @@ def recover_photographs(folder: Path) -> tuple[str, ...]:
             continue
         part.rename(kept)
         kind = kept.name.split("-")[0]
+        words = "plate --stances FILE" if kind == "rig" else kind
         said.append(
             f"A capture of photographs was interrupted; those taken ({len(pictures)}) are kept in "
-            f"{kept}. Give the photographs to 'scissorcal capture {kind}' again."
+            f"{kept}. Give the photographs to 'scissorcal capture {words}' again."
         )
     return tuple(said)
 

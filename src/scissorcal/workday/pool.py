@@ -110,7 +110,7 @@ def open_pool(workers: int | None = None, cluster: str | None = None) -> Iterato
         with _cluster(cluster) as pool:
             yield pool
         return
-    count = workers or len(os.sched_getaffinity(0))
+    count = workers or usable_cores()
     if count == 1:
         with _left_alone():
             yield Pool(_Here(), 1, ahead=1)
@@ -125,6 +125,13 @@ def open_pool(workers: int | None = None, cluster: str | None = None) -> Iterato
         except BaseException:
             executor.shutdown(wait=True, cancel_futures=True)
             raise
+
+
+def usable_cores() -> int:
+    """Processor cores that this process may use; all of them where the system does not tell."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 @contextmanager

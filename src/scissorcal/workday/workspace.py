@@ -166,7 +166,7 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
     Raises InputError where the folder already has a recipe, or another file of a drawing's name,
     or where the recipe is unknown or wrong, or a drawing of it.
     """
-    from scissorcal.recipe.library import recipe_path
+    from scissorcal.recipe.library import recipe_file
     from scissorcal.recipe.load import parse_recipe, read_text
     from scissorcal.recipe.plate_layers import plate_pieces
 
@@ -176,8 +176,7 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
             f"{workspace.recipe_path} is there already, and was left as it is: choose another "
             "folder, or edit that recipe."
         )
-    given = Path(recipe_name)
-    source = given if given.suffix == ".toml" else recipe_path(recipe_name)
+    source = recipe_file(recipe_name)
     text = read_text(source)
     recipe = parse_recipe(text, str(source))
     plate_pieces(recipe, source.parent)

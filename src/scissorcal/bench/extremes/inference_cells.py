@@ -1,6 +1,5 @@
 """Cells of inference: posteriors known in closed form, at the extremes of scale and of data."""
 
-import resource
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -178,6 +177,8 @@ def _damaged(rng: np.random.Generator, value: float) -> Found:
 
 def _many(rng: np.random.Generator) -> Found:
     """Ten million samples; the exact posterior from sums, which fractions would take hours for."""
+    import resource
+
     model = line(rng, 10_000_000)
     begun = time.process_time()
     posterior = infer(model.problem(squares=True, independent=False), "draft", rng)

@@ -5,11 +5,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from select import select
 from typing import IO
 
-from scissorcal.errors import DeviceError, InputError
+from scissorcal.errors import DeviceError, InputError, needs_unix
 
 START_TIMEOUT_S = 30.0
 STOP_TIMEOUT_S = 5.0
@@ -31,6 +32,8 @@ class SimProcess:
 
         Raises InputError for a bad specimen or fault, DeviceError if nothing starts.
         """
+        if find_spec("termios") is None:
+            raise needs_unix("A virtual rig")
         command = [sys.executable, "-m", "scissorcal.device.sim.server", str(specimen)]
         command += [f"--seed={seed}", *(f"--fault={option}" for option in faults)]
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - closed in close()

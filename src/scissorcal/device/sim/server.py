@@ -17,9 +17,7 @@ import select
 import signal
 import stat
 import sys
-import termios
 import time
-import tty
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -32,7 +30,7 @@ from scissorcal.device.sim.faults import Faults, parse_faults
 from scissorcal.device.sim.protocol import RigProtocol
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
 from scissorcal.device.sim.specimen import Specimen, load_specimen
-from scissorcal.errors import ScissorcalError
+from scissorcal.errors import ScissorcalError, needs_unix
 
 CATCH_UP_TICKS = 5
 WAITING_FRAMES = 256
@@ -108,6 +106,10 @@ class _Port:
     """The master's side of a raw pseudo-terminal that never blocks."""
 
     def __init__(self) -> None:
+        try:
+            import tty
+        except ImportError:
+            raise needs_unix("A virtual rig") from None
         self._master, slave = os.openpty()
         tty.setraw(slave)
         self.path = os.ttyname(slave)
@@ -159,6 +161,8 @@ class _Port:
 
     def _forget_unread(self) -> None:
         """Drop what the last reader left unread, as a real port does when it is closed."""
+        import termios
+
         with suppress(OSError, termios.error):
             slave = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
             try:

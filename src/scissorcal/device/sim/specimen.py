@@ -14,6 +14,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from scissorcal.device.sim.wave import Wave
+from scissorcal.foreign.formats import SPECIMEN
 from scissorcal.recipe.library import specimen_path
 from scissorcal.recipe.load import load_toml
 
@@ -41,7 +42,7 @@ def load_specimen(name_or_path: str | Path) -> Specimen:
     """
     text = str(name_or_path)
     path = Path(text) if text.endswith(".toml") else specimen_path(text)
-    return load_toml(path, Specimen)
+    return load_toml(path, Specimen, SPECIMEN)
 
 
 class Section(BaseModel):

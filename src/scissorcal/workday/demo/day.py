@@ -1,6 +1,5 @@
 """The whole day on a virtual rig in virtual time, ending in truth against estimate."""
 
-import os
 from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from scissorcal.workday.demo.photographs import (
     photograph,
 )
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.pool import open_pool
+from scissorcal.workday.pool import open_pool, usable_cores
 from scissorcal.workday.runs.fit import FitOutcome, fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
 from scissorcal.workday.runs.probe import ensure_probed
@@ -157,7 +156,7 @@ def make_day(
     """
     tell = progress or (lambda done, sentence: None)
     recipe = workspace.recipe()
-    with open_pool(min(2, len(os.sched_getaffinity(0)))) as pool:
+    with open_pool(min(2, usable_cores())) as pool:
         tell(0.0, "capturing friction and cuts, beside the photographs where a second core is free")
         captured = pool.executor.submit(_capture, workspace.root, seed, capture)
         photograph(workspace, recipe, seed, _part(tell, 0.05, 0.3))

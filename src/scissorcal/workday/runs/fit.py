@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.verdicts import Verdict
-from scissorcal.workday.engine import Engine
+from scissorcal.workday.engine import Engine, refuse_other_fit
 from scissorcal.workday.states import WAITING, StepState
 from scissorcal.workday.steps import BY_NAME, Step, steps_of
 from scissorcal.workday.workspace import Workspace
@@ -194,7 +194,7 @@ def load_result(engine: Engine, what: str) -> Any:
     """
     step = BY_NAME[f"fit {what}"]
     state = engine.state(step.name)
-    if state.state == "missing" or not engine.file(step.name).exists():
+    if not engine.file(step.name).exists():
         raise MissingError(
             f"There is no fit of {what} yet: run '{engine.leads_to(step.name)}' first."
         )
@@ -297,4 +297,6 @@ def _load(step: Step, path: Path) -> Any:
     from scissorcal.calibration.store import load
 
     module, _, name = step.holds.partition(":")
-    return load(path, getattr(import_module(module), name))
+    found = load(path, getattr(import_module(module), name))
+    refuse_other_fit(step, path, found.what)
+    return found
