@@ -233,6 +233,13 @@ def test_requests_that_cannot_be_met(tmp_path: Path, options: dict[str, Any], wo
     assert words in message
 
 
+def test_a_length_is_no_time(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t_mm,angle_rad,torque_Nm\n0,0.1,1\n1,0.2,1\n2,0.3,1\n")
+    with pytest.raises(InputError, match="mm is not a unit of time"):
+        import_table(path, columns={"time": 0, "opening": 1, "motor_torque": 2})
+
+
 def test_repeated_headings(tmp_path: Path) -> None:
     path = written(tmp_path / "log.csv", rows(), head="t,angle,angle")
     assert "has 2 columns called 'angle'" in refusal(path)

@@ -110,6 +110,11 @@ def _conversion(table: Table, channel: str, stated: str, target: str, joint: Joi
             f"{channel} takes {target} and its parts and multiples (m, k, ...)."
         )
     factor = conversion(unit, si)
+    if factor is None and channel == "time":  # of every joint alike
+        raise InputError(
+            f"{table.path}, column {heading!r}: {stated} is not a unit of time. Give a unit such "
+            "as s, or name another column."
+        )
     if factor is None:
         other = Joint("linear" if joint.kind == "rotary" else "rotary")
         turned = parse_unit(_plain(unit_of(channel, other)))
