@@ -27,6 +27,8 @@ _BASE: dict[str, tuple[str, float]] = {
 }
 _PREFIX = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3}
 _PREFIXED = {"m", "g", "s", "Hz", "rad", "N", "Nm", "J", "V", "A"}
+LONGEST_POWER = 2
+"""Digits of a power; those of a longer one are no number that is a power of a unit."""
 _SPECIAL: dict[str, tuple[str, float]] = {"Ncm": ("N m", 1e-2), "Nmm": ("N m", 1e-3)}
 _DIMENSION = {
     "m": {"m": 1},
@@ -78,9 +80,10 @@ def parse_unit(text: str) -> Unit | None:
             return None
         for token in part.split("_") if part else ():
             symbol = token.rstrip("0123456789")
-            power = sign * int(token[len(symbol) :] or 1)
+            digits = token[len(symbol) :]
+            power = sign * int(digits[:LONGEST_POWER] or 1)
             known = _symbol(symbol)
-            if known is None or abs(power) > 9:
+            if known is None or abs(power) > 9 or len(digits) > LONGEST_POWER:
                 return None
             base, scale = known
             factor *= scale**power
