@@ -26,6 +26,8 @@ def test_cutting_air_is_refused(friction):
     with pytest.raises(InputError, match="hardly touched the material") as refused:
         fit_cut((air,), paper(fracture="smooth"), friction, effort="draft", rng=rng)
     assert "advance was zero at its near edge" in str(refused.value)
+    assert "s are sound, " in str(refused.value)
+    assert "s of these have a sheet in place, and in " in str(refused.value)
 
 
 @pytest.mark.slow
