@@ -336,10 +336,9 @@ def test_a_single_jump_is_no_wrap(tmp_path: Path, jump: float, unit: str) -> Non
     assert not any("begins again" in note for note in recording.notes)
 
 
-def test_a_position_that_jumps_otherwise_is_left_as_it_is(tmp_path: Path) -> None:
+def test_a_position_with_marks_of_loss_is_refused(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     angle = np.round(np.where(rng.random(400) < 0.02, 300.0, 30.0 + np.arange(400) / 10.0), 3)
     path = written(tmp_path / "log.csv", [[k * 0.01, a, 0.0] for k, a in enumerate(angle.tolist())])
-    recording = import_table(path, columns=COLUMNS, units={**UNITS, "opening": "deg"})
-    assert np.degrees(recording.samples["opening"]) == pytest.approx(angle)
-    assert not any("begins again" in note for note in recording.notes)
+    said = refusal(path, units={**UNITS, "opening": "deg"})
+    assert "300 stands in 9 rows where nothing leads from or to the other values" in said

@@ -284,17 +284,28 @@ class _Strokes:
             raise InputError(
                 f"{recording.source}: every closing stroke has a hole of {LEAST_PLATEAU:.0%} of "
                 "the range or more, in which nothing was measured: log at a higher rate, or "
-                "without losing samples."
+                f"without losing samples. {_counted(recording, usable, left_out, holed)}"
             )
         if closing is None:
             raise InputError(
                 f"{recording.source}: no closing stroke reaches over the range from "
                 f"{places[0]:.3g} to {places[-1]:.3g} {recording.joint.position_unit}: give a "
-                "smaller --min-travel, or another log."
+                "smaller --min-travel, or another log. "
+                f"{_counted(recording, usable, left_out, holed)}"
             )
         low, high = _ends_of(recording)
         left_out, holed = left_out + others[0], holed + others[1]
         return cls(closing, opening, left_out, holed, high - low)
+
+
+def _counted(recording: Recording, usable: NDArray[np.bool_], left_out: int, holed: int) -> str:
+    """What each filter left of a log of which no closing stroke remains."""
+    closing = sum(stroke.kind == "closing" for stroke in recording.strokes)
+    return (
+        f"Of {len(usable)} samples recorded, {np.count_nonzero(usable)} are sound; of "
+        f"{len(recording.strokes)} strokes, {closing} are closing; of these, {left_out} do not "
+        f"reach over the range, {holed} have a hole, and none is used."
+    )
 
 
 def _summary(recording: Recording, strokes: _Strokes, places: Array, signs: set[int]) -> LogSummary:

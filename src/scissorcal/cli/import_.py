@@ -9,12 +9,12 @@ import typer
 
 from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder
-from scissorcal.cli.output import Answer, command, table
+from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
+from scissorcal.cli.survey import survey_lines
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.signals.survey import Survey
     from scissorcal.recording import Recording
 
 _CAMERA_FILES = (".yaml", ".yml", ".xml", ".json", ".ini")
@@ -172,7 +172,7 @@ def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]"
             answer = _answer(one)
             first, *_ = answer.text.splitlines()
             lines.append(f"{file.name}: {first}")
-            lines += [f"  note: {said}" for said in one.recording.notes if "the last one" in said]
+            lines += [f"  note: {said}" for said in answer.result["notes"] if not _expected(said)]
             facts.append(answer.result)
             paths.append(one.path)
     if refused:
@@ -184,6 +184,13 @@ def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]"
         raise told
     lines.append(f"{len(paths)} logs imported; 'scissorcal recording list' shows them")
     return Answer({"imported": facts}, "\n".join(lines), files=paths)
+
+
+def _expected(note: str) -> bool:
+    """Whether a note tells how a log was read, alike for all, and not what is particular in it."""
+    return note.startswith(("Imported from", "Not in the file", "The recipe has")) or (
+        "strokes were found" in note
+    )
 
 
 def _answer(one: _Imported) -> Answer:
@@ -202,7 +209,7 @@ def _answer(one: _Imported) -> Answer:
     lines = [
         f"{one.shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
         f"{len(recording.strokes)} strokes, {joint.kind} joint",
-        *_survey_lines(found),
+        *survey_lines(found),
         *(f"note: {sentence}" for sentence in notes),
     ]
     result = {
@@ -218,27 +225,6 @@ def _answer(one: _Imported) -> Answer:
         "notes": notes,
     }
     return Answer(result, "\n".join(lines), files=[one.path])
-
-
-def _survey_lines(found: "Survey") -> list[str]:
-    """Rate and sensors, for people; angles in deg."""
-    import math
-
-    gaps = found.gaps
-    lost = f"{gaps.missing} samples missing in {gaps.places} gaps" if gaps.places else "no gap"
-    head = (
-        f"rate: {found.rate_Hz:.4g} Hz; {found.interval_low_ms:.4g} to "
-        f"{found.interval_high_ms:.4g} ms between samples (5 to 95 %), longest "
-        f"{found.longest_ms:.4g} ms; {lost}"
-    )
-    rows = [["sensor", "unit", "step", "lowest", "highest", "cut off low", "high", "dead band"]]
-    for one in found.sensors:
-        unit, factor = ("deg", 180.0 / math.pi) if one.unit == "rad" else (one.unit, 1.0)
-        values = [f"{factor * value:.4g}" for value in (one.low, one.high)]
-        step = "constant" if one.constant else f"{factor * one.step:.3g}" if one.step else "none"
-        shares = [f"{share:.1%}" for share in (one.at_low, one.at_high, one.dead)]
-        rows.append([one.channel, unit, step, *values, *shares])
-    return [head, table(rows, right=range(2, 8))]
 
 
 def _import_camera(file: Path, folder: Path | None) -> Answer:

@@ -17,6 +17,7 @@ from scissorcal.cli.import_ import (
     pairs,
 )
 from scissorcal.cli.output import Answer, command
+from scissorcal.cli.survey import survey_lines
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ def summarise(
     import numpy as np
 
     import scissorcal
+    from scissorcal.calibration.signals.survey import survey
     from scissorcal.calibration.summary import (
         common_places,
         difference,
@@ -144,8 +146,11 @@ def summarise(
     places = common_places([one for one, _ in logs])
     found, *rest = sum_up(logs, places)
     other = rest[0] if rest else None
+    surveys = [survey(one, ("opening", used)) for one, used in logs]
     notes = tuple(
-        f"{one.source}: {said}" for one, used in logs for said in (*_said(one), *_survey(one, used))
+        f"{one.source}: {said}"
+        for (one, _), seen in zip(logs, surveys, strict=True)
+        for said in (*_said(one), *seen.notes)
     )
     rng = np.random.default_rng(0)  # one log gives one page
     shown = Shown(
@@ -167,21 +172,23 @@ def summarise(
     page = summary_page(shown)
     with replacing(output) as part:
         part.write_text(page, encoding="utf-8")
-    text = "\n".join([panels_text(panels), str(output)])
-    return Answer({"panels": panels, "notes": notes}, text, files=[output])
+    seen = [
+        line
+        for (one, _), look in zip(logs, surveys, strict=True)
+        for line in (f"Sensors in {one.source}", *survey_lines(look), "")
+    ]
+    text = "\n".join([panels_text(panels), "", *seen])
+    looks = [
+        {"log": one.source, "survey": look} for (one, _), look in zip(logs, surveys, strict=True)
+    ]
+    result = {"panels": panels, "notes": notes, "surveys": looks}
+    return Answer(result, f"{text}{output}", files=[output])
 
 
 def _said(recording: "Recording") -> tuple[str, ...]:
     """What reading a log told, without the sentence that an import begins with: which column."""
     imported = not recording.source.endswith(".mcap")
     return recording.notes[1:] if imported else recording.notes
-
-
-def _survey(recording: "Recording", effort: "Effort") -> tuple[str, ...]:
-    """What in the channels is no measurement, in sentences."""
-    from scissorcal.calibration.signals.survey import survey
-
-    return survey(recording, ("opening", effort)).notes
 
 
 def _refuse(

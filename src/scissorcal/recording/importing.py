@@ -12,19 +12,22 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.recording.layout import MEASURED, empty_samples
+from scissorcal.recording.marks import lone_excursion, marks_in
 from scissorcal.recording.quantities import Quantity, describe, quantity
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
 from scissorcal.recording.resolution import GAP_FACTOR, StrokeThreshold, stroke_threshold
 from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_cost, gap_note
-from scissorcal.recording.table import Table, read_table, refuse_no_table
-from scissorcal.recording.wraps import continued
+from scissorcal.recording.table import Table, read_table, refuse_no_table, shortened
+from scissorcal.recording.wraps import (
+    COUNTERS,
+    continued,
+    continued_clock,
+    jumps_in,
+    overflows,
+)
 
-WRAP = 2.0**32
-"""Where the counter of a logger's clock begins at 0 again: 32 bits of us last 71.6 min."""
-NEAR_WRAP = 0.01
-"""Before and after that its time is within this share of the counter's range of either end."""
 MOST_PLACES = 3
 """Places that a note lists."""
 SHORT_SHARE, MANY = 0.25, 20
@@ -63,8 +66,9 @@ def import_table(
     A stroke travels at least ``min_travel`` [rad, or m]; where that is not given, so far that
     neither noise nor steps of the sensor make a stroke (`stroke_threshold`), which a note states.
     The last line of a text file is left out where it has no end, unless ``drop_last_line`` is
-    false. A clock of 32 bits that begins at 0 again is continued, with a note; so is an angle that
-    begins again after a full turn, or a counter after its last number.
+    false. A clock that begins again after a counter's last number, a second, minute, hour or day is
+    continued, with a note; so is an angle that begins again after a full turn, or a counter after
+    its last number. Other jumps of the opening, and forces that pass a counter's end, are noted.
 
     A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
     it and notes it. Both clocks begin at 0 and are rounded to 1 us.
@@ -93,13 +97,14 @@ def import_table(
     for channel in set(columns) - {"time"}:
         samples[channel] = table.columns[channel].values * quantities[channel].factor
     said = list(table.notes)
-    said += _go_on(samples, table, joint)
+    said += _opening_goes_on(samples, table, joint)
     if rate_Hz is not None:
         _set_regular_clock(samples, rate_Hz)
     else:
-        table, wrapped = _continued(table)
+        table, wrapped = _clock_goes_on(table, quantities["time"].factor)
         said += wrapped
         _set_clock(samples, table, quantities["time"].factor, allow_gaps=allow_gaps)
+    said += _told_of_jumps(samples, table, joint)
     strokes, found = _label(samples, joint, min_travel)
     said += found
     digest = content_hash(path)
@@ -167,9 +172,9 @@ def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_
     values = table.columns["time"].values
     seconds = (values - values[0]) * factor
     if not np.abs(seconds).max() < 1e9:
+        heading = shortened(table.columns["time"].heading)
         raise InputError(
-            f"{table.path}, column {table.columns['time'].heading!r} spans more than 30 years. "
-            "Check the unit of time."
+            f"{table.path}, column {heading!r} spans more than 30 years. Check the unit of time."
         )
     microseconds = np.rint(seconds * 1e6).astype(np.int64)
     steps = np.diff(microseconds)
@@ -210,33 +215,93 @@ def _set_times(samples: NDArray[np.void], microseconds: NDArray[np.int64]) -> No
     samples["host_time_ns"] = microseconds * 1000
 
 
-def _continued(table: Table) -> tuple[Table, list[str]]:
-    """The table with a clock that goes on where its counter of 32 bits begins at 0 again."""
+def _clock_goes_on(table: Table, factor: float) -> tuple[Table, list[str]]:
+    """The table with a clock that goes on where its counter begins again, and a sentence on it."""
     clock = table.columns["time"]
-    falls = np.flatnonzero(np.diff(clock.values) < 0)
-    before, after = clock.values[falls], clock.values[falls + 1]
-    near = NEAR_WRAP * WRAP
-    if not len(falls) or not np.all((before > WRAP - near) & (before < WRAP) & (after < near)):
+    values, places, period = continued_clock(clock.values, factor)
+    if not len(places):
         return table, []
-    turns = np.zeros(len(clock.values))
-    turns[falls + 1] = WRAP
-    columns = {**table.columns, "time": replace(clock, values=clock.values + np.cumsum(turns))}
-    places = ", ".join(table.place(int(row) + 1).rpartition(", ")[2] for row in falls)
-    note = f"The clock begins at 0 again at {places}, after 2^32: it was continued."
-    return replace(table, columns=columns), [note]
+    begins = "0" if clock.values.min() >= 0.0 else f"{-0.5 * period:.10g}"
+    bits = math.log2(period)
+    length = f"2^{bits:.0f}" if bits in COUNTERS else f"{period * factor:.10g} s"
+    said = (
+        f"The clock begins at {begins} again at {_listed(table, places)}, after {length}: it was "
+        "continued."
+    )
+    return replace(table, columns={**table.columns, "time": replace(clock, values=values)}), [said]
 
 
-def _go_on(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
-    """Continue a position that begins again; give a sentence on it."""
+def _opening_goes_on(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
+    """Continue a position that begins again; give a sentence on it. InputError for marks in it."""
     turn = 2.0 * math.pi if joint.kind == "rotary" else None
     position = np.asarray(samples["opening"], dtype=np.float64)
-    found, places = continued(position, table.columns["opening"].values, turn)
+    counts = table.columns["opening"].values
+    found, places = continued(position, counts, turn)
     if not len(places):
+        _refuse_marks(counts, table)
         return []
     samples["opening"] = found
+    where = _listed(table, places)
+    return [f"The opening begins again at {where}, after its period: it was continued."]
+
+
+def _refuse_marks(counts: NDArray[np.float64], table: Table) -> None:
+    """Refuse a position with marks of loss: each would be a stroke there and back."""
+    marks = marks_in(counts)
+    if marks:
+        marked = np.flatnonzero(np.isin(counts, marks))
+        listed = " or ".join(f"{value:.9g}" for value in marks)
+        rows = "1 row" if len(marked) == 1 else f"{len(marked)} rows"
+        raise InputError(
+            f"{table.place(int(marked[0]), 'opening')}: {listed} stands in {rows} "
+            "where nothing leads from or to the other values: a mark of overflow or loss, not a "
+            "position. Remove those rows and allow gaps (--allow-gaps), or export the log again."
+        )
+
+
+def _told_of_jumps(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
+    """Sentences on a position that jumps, and on forces and torques that pass a counter's end."""
+    position = np.asarray(samples["opening"], dtype=np.float64)
+    step_us = np.diff(samples["device_time_us"])
+    whole = step_us <= GAP_FACTOR * float(np.median(step_us))
+    unit = "deg" if joint.kind == "rotary" else "m"
+    factor = math.degrees(1.0) if joint.kind == "rotary" else 1.0
+    said = []
+    jumps = jumps_in(position)
+    jumps = jumps[whole[jumps - 1]]
+    lone = lone_excursion(position) if len(jumps) == 0 else None
+    if len(jumps):
+        size = factor * float(np.median(np.abs(np.diff(position)[jumps - 1])))
+        others = factor * float(np.delete(np.abs(np.diff(position)), jumps - 1).max())
+        said.append(
+            f"The opening jumps by {size:.4g} {unit} from one sample to the next at "
+            f"{_listed(table, jumps)}, and by {others:.3g} {unit} at most elsewhere. If this is no "
+            "motion (a sensor of an unknown period, or one that lost its place), correct or remove "
+            "those rows: strokes are found from it."
+        )
+    elif lone is not None and np.all(whole[max(lone - 1, 0) : lone + 1]):
+        said.append(
+            f"The opening is {factor * position[lone]:.6g} {unit} at {_listed(table, [lone])} "
+            "alone, farther from the samples before and after than it goes anywhere else. If this "
+            "is no motion, remove that row: strokes are found from it."
+        )
+    for channel in ("motor_torque", "handle_force"):
+        if channel in table.columns:
+            bits, places = overflows(table.columns[channel].values)
+            if bits:
+                said.append(
+                    f"{channel} jumps between the ends of a counter of {bits} bits at "
+                    f"{_listed(table, places)}: negative numbers read without their sign, or "
+                    "numbers too large for it. Export them as signed numbers, or of more bits."
+                )
+    return said
+
+
+def _listed(table: Table, places: Sequence[int] | NDArray[np.int64]) -> str:
+    """The first rows of some, and how many more there are."""
     listed = ", ".join(table.place(int(row)).rpartition(", ")[2] for row in places[:MOST_PLACES])
     more = f" and {len(places) - MOST_PLACES} more" if len(places) > MOST_PLACES else ""
-    return [f"The opening begins again at {listed}{more}, after its period: it was continued."]
+    return listed + more
 
 
 def _label(

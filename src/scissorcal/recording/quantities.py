@@ -9,13 +9,15 @@ from scissorcal.errors import InputError
 from scissorcal.recipe.units import conversion, parse_unit, split_unit
 from scissorcal.recording.layout import unit_of
 from scissorcal.recording.recording import Joint
-from scissorcal.recording.table import Table
+from scissorcal.recording.table import Table, in_brackets, shortened
 
 G_N_PER_KG = 9.80665
 """Standard gravity: load cells and servos state grams and kilograms of force."""
 _GRAMS = re.compile(r"^(?P<prefix>[km]?)g(?:f)?(?P<length>[cm]?m)?$")
 _POUNDS_N = {"lbf": 4.4482216152605, "ozf": 0.27801385095378125}
 
+LONGEST_UNIT = 60
+"""Characters of a unit in a heading, where kg_m2_per_s2 has 12."""
 COUNTS = ("count", "counts", "tick", "ticks", "lsb", "raw")
 
 
@@ -43,18 +45,19 @@ def quantity(
     factor = 1.0 if scale is None else scale_factor(table, channel, scale)
     heading_unit = _unit_in(column.heading)
     stated = heading_unit if unit is None else unit
-    by = repr(column.heading)
+    heading = shortened(column.heading)
+    by = repr(heading)
     if scale is not None:
         by += f" times {factor:.9g}" if _is_number(scale) else f" times {scale} = {factor:.9g}"
     if stated is None and scale is None:
         raise InputError(
-            f"{table.path}, column {column.heading!r}: its unit is not known. State it, for "
+            f"{table.path}, column {heading!r}: its unit is not known. State it, for "
             f"example {channel}={_plain(target)}."
         )
     if stated is None or _is_raw(stated):
         if scale is None:
             raise InputError(
-                f"{table.path}, column {column.heading!r} is in {stated}, and {channel} is in "
+                f"{table.path}, column {heading!r} is in {stated}, and {channel} is in "
                 f"{target}. Give a scale for {channel}, in {target} per {stated}."
             )
         return Quantity(factor, f"{channel} [{target}] is {by}")
@@ -103,7 +106,7 @@ def _factor(table: Table, channel: str, part: str) -> float:
 def _conversion(table: Table, channel: str, stated: str, target: str, joint: Joint) -> float:
     name, force = _of_force(_plain(stated)) if "N" in target else (_plain(stated), 1.0)
     unit, si = parse_unit(name), parse_unit(_plain(target))
-    heading = table.columns[channel].heading
+    heading = shortened(table.columns[channel].heading)
     if unit is None or si is None:
         raise InputError(
             f"{table.path}, column {heading!r}: {stated!r} is not a known unit. "
@@ -149,32 +152,24 @@ def _contradiction(table: Table, channel: str, heading: str | None, stated: str 
     if parse_unit(_plain(heading)) == parse_unit(_plain(stated)):
         return ""
     return (
-        f"Column {table.columns[channel].heading!r} was read in {stated}, as stated, although "
-        f"its heading has {heading}."
+        f"Column {shortened(table.columns[channel].heading)!r} was read in {stated}, as stated, "
+        f"although its heading has {heading}."
     )
-
-
-def _in_last_brackets(heading: str) -> str | None:
-    """What stands in the brackets that end a heading, None where none do."""
-    if not heading.endswith(("]", ")")):
-        return None
-    body = heading[:-1]
-    inside = body[max(body.rfind("]"), body.rfind(")")) + 1 :]
-    opened = [place for place in (inside.find("["), inside.find("(")) if place >= 0]
-    return inside[min(opened) + 1 :].strip() if opened else None
 
 
 def _unit_in(heading: str) -> str | None:
     """Return the unit that a heading names, in brackets or after its last words."""
-    text = _in_last_brackets(heading.rstrip())
-    if text is not None:
+    parts = in_brackets(heading)
+    if parts:
+        text = parts[1].strip()[: LONGEST_UNIT + 1]
         known = _is_raw(text) or parse_unit(_of_force(_plain(text))[0])
         return text if known else None
-    _, unit = split_unit(heading.strip())
+    heading = heading.strip()[-LONGEST_UNIT:]
+    _, unit = split_unit(heading)
     if unit:
         return unit.name
-    last = heading.strip().rpartition("_")[2]
-    is_force = last != heading.strip() and _of_force(last)[0] != last
+    last = heading.rpartition("_")[2]
+    is_force = last != heading and _of_force(last)[0] != last
     return last if is_force else None
 
 

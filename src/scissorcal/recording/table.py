@@ -1,6 +1,5 @@
 """Tables of numbers: text, Parquet or MATLAB by the file's extension, and their columns by name."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +17,10 @@ Wanted = Mapping[str, str | int]
 
 LONGEST_COLUMN_NUMBER = 9
 """Digits of a column's number; a longer one is a heading."""
+
+
+SHOWN = 60
+"""Characters of a heading or a line that a sentence shows."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Table:
     def place(self, row: int, channel: str | None = None) -> str:
         """Name a row (from 0), and a channel's column, as they are found in the file."""
         where = f"line {self.lines[row]}" if self.lines is not None else f"row {row + 1}"
-        column = f", column {self.columns[channel].heading!r}" if channel else ""
+        column = f", column {shortened(self.columns[channel].heading)!r}" if channel else ""
         return f"{self.path}, {where}{column}"
 
 
@@ -94,7 +97,9 @@ def read_table(
 def _check_lengths(table: Table) -> None:
     lengths = {column.heading: len(column.values) for column in table.columns.values()}
     if len(set(lengths.values())) > 1:
-        listed = ", ".join(f"{heading!r} has {length}" for heading, length in lengths.items())
+        listed = ", ".join(
+            f"{shortened(heading)!r} has {length}" for heading, length in lengths.items()
+        )
         raise InputError(
             f"{table.path}: its columns differ in length ({listed}). Name columns that were "
             "recorded together."
@@ -122,6 +127,11 @@ def _check_finite(table: Table) -> None:
         )
 
 
+def shortened(text: str) -> str:
+    """A text of a file as a sentence shows it, without what is beyond ``SHOWN`` characters."""
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+
+
 def find_column(path: Path, headings: Sequence[str], column: str | int, channel: str) -> int:
     """Return the number of a column given by heading, heading without unit, or number.
 
@@ -147,7 +157,7 @@ def find_column(path: Path, headings: Sequence[str], column: str | int, channel:
             f"{path} has no column {column} for {channel}: its columns are numbered 0 to "
             f"{len(headings) - 1}."
         )
-    listed = ", ".join(repr(heading) for heading in headings[:30])
+    listed = ", ".join(repr(shortened(heading)) for heading in headings[:30])
     raise InputError(
         f"{path} has no column {column!r} for {channel}. Name one of these, or its number from 0: "
         f"{listed}."
@@ -168,5 +178,21 @@ def _plain(heading: str) -> str:
     return " ".join(heading.split()).casefold()
 
 
+def in_brackets(heading: str) -> tuple[str, str] | None:
+    """A heading that ends in brackets, without them, and what stands in them; None for others.
+
+    >>> in_brackets("angle (front) [deg] "), in_brackets("angle")
+    (('angle (front) ', 'deg'), None)
+    """
+    text = heading.rstrip()
+    if not text.endswith(("]", ")")):
+        return None
+    body = text[:-1]
+    first = max(body.rfind("]"), body.rfind(")")) + 1
+    opening = [at for mark in "[(" if (at := body.find(mark, first)) >= 0]
+    return (body[: min(opening)], body[min(opening) + 1 :]) if opening else None
+
+
 def _without_unit(heading: str) -> str:
-    return _plain(re.sub(r"[\[(][^\])]*[\])]\s*$", "", heading))
+    parts = in_brackets(heading)
+    return _plain(parts[0] if parts else heading)

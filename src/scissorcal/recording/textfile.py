@@ -11,15 +11,19 @@ import numpy as np
 from scissorcal.errors import InputError
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import LOG
-from scissorcal.recording.table import Column, Table, Wanted, find_column
+from scissorcal.recording.grouping import (
+    MOST_LOOKED_AT,
+    grouped_column,
+    is_grouped,
+    two_marks,
+)
+from scissorcal.recording.table import Column, Table, Wanted, find_column, shortened
 
 COMMENT_MARKS = ("%", "#")
 DELIMITERS = (",", ";", "\t", "|", None)
 """Tried in this order, the first of equals wins; None is white space."""
 MOST_LINES = 10_000_000
 """2.8 hours at 1 kHz; each takes some 150 bytes of memory beside its text."""
-SHOWN = 60
-"""Characters of a dropped line that its note shows."""
 
 
 class Line(NamedTuple):
@@ -58,6 +62,7 @@ def read_text(
     if drop_last_line and why and len(rows) > 1:
         rows, notes = rows[:-1], (_dropped(rows[-1], why),)
     _check_width(path, rows, delimiter, width)
+    _refuse_torn(path, lines[:start], rows[0], delimiter, width)
     commented = [line for line in comments if line.number < rows[0].number]
     headings = _headings(lines[:start], commented, delimiter, width)
     chosen = {c: find_column(path, headings, column, c) for c, column in wanted.items()}
@@ -68,6 +73,23 @@ def read_text(
     }
     numbers = np.array([line.number for line in rows], dtype=np.int64)
     return Table(path, columns, lines=numbers, notes=notes)
+
+
+def _refuse_torn(
+    path: Path, before: list[Line], row: Line, delimiter: str | None, width: int
+) -> None:
+    """Refuse rows of more cells than headings, if commas in numbers can have made them.
+
+    Commas separate the cells, no number has a dot, and the line before has words only.
+    """
+    heading = _cells(before[-1].text, delimiter) if before else []
+    torn = delimiter == "," and 1 < len(heading) < width and "." not in row.text
+    if torn and all(_cells(row.text, delimiter)) and not any(map(_is_number, heading)):
+        raise InputError(
+            f"{path}, line {row.number} has {width} cells, and line {before[-1].number} has "
+            f"{len(heading)} headings: commas within numbers, as for decimals or thousands, cannot "
+            "be told from those between cells. Export the log with dots, or with semicolons."
+        )
 
 
 def _why_incomplete(line: Line, cut: Line | None, delimiter: str | None, width: int) -> str:
@@ -81,7 +103,7 @@ def _why_incomplete(line: Line, cut: Line | None, delimiter: str | None, width: 
 
 
 def _dropped(line: Line, why: str) -> str:
-    text = line.text if len(line.text) <= SHOWN else f"{line.text[:SHOWN]}..."
+    text = shortened(line.text)
     return (
         f"Line {line.number}, the last one, {why}: it was left out ({text!r}). --keep-last-line "
         "reads it."
@@ -149,7 +171,10 @@ def _find_delimiter(rows: Sequence[str]) -> str | None:
         numbers = [[_is_number(cell) for cell in _cells(row, delimiter)] for row in rows]
         return sum(all(row) for row in numbers), sum(sum(row) for row in numbers)
 
-    return max(DELIMITERS, key=score)
+    found = max(DELIMITERS, key=score)
+    if found is None and score("\t")[1] > score("\t")[0] == len(rows):
+        return "\t"  # cells with spaces in them, as between thousands
+    return found
 
 
 def _cells(text: str, delimiter: str | None) -> list[str]:
@@ -164,7 +189,7 @@ def _is_number(cell: str) -> bool:
     try:
         float(cell.replace(",", ".", 1))
     except ValueError:
-        return False
+        return is_grouped(cell)
     return True
 
 
@@ -206,6 +231,7 @@ def _numbers(
     """Return the chosen columns, shape (N, len(chosen)), by NumPy's parser."""
     texts = [line.text for line in rows]
     if delimiter != "," and any("," in text for text in texts):
+        _refuse_two_marks(path, rows, delimiter, chosen, headings)
         texts = [text.replace(",", ".") for text in texts]
     try:
         values: np.ndarray[tuple[int, int], np.dtype[np.float64]] = np.loadtxt(
@@ -218,7 +244,42 @@ def _numbers(
         )
     except ValueError as error:
         raise InputError(_first_fault(path, rows, texts, delimiter, chosen, headings)) from error
+    for place, number in enumerate(chosen.values()):
+
+        def cell(row: int, number: int = number) -> str:
+            return _cells(rows[row].text, delimiter)[number]
+
+        at = grouped_column(values[:, place], cell)
+        if at is not None:
+            raise InputError(_grouped(path, rows[at], headings[number], cell(at)))
     return values
+
+
+def _refuse_two_marks(
+    path: Path,
+    rows: list[Line],
+    delimiter: str | None,
+    chosen: dict[str, int],
+    headings: list[str],
+) -> None:
+    """Refuse rows that have both dots and commas in their numbers, of which one parts thousands."""
+    looked_at = [*rows[:MOST_LOOKED_AT], *rows[MOST_LOOKED_AT:][-MOST_LOOKED_AT:]]
+    if not any("." in line.text for line in looked_at):
+        return
+    split = [_cells(line.text, delimiter) for line in looked_at]
+    found = two_marks([[cells[number] for number in chosen.values()] for cells in split])
+    if found:
+        row, place = found
+        number = list(chosen.values())[place]
+        raise InputError(_grouped(path, looked_at[row], headings[number], split[row][number]))
+
+
+def _grouped(path: Path, line: Line, heading: str, cell: str) -> str:
+    return (
+        f"{path}, line {line.number}, column {shortened(heading)!r}: {shortened(cell)!r} stands "
+        "where digits are in groups of three, and thousands separators are not read. Export the "
+        "log without them, and with one decimal mark."
+    )
 
 
 def _first_fault(
@@ -233,12 +294,15 @@ def _first_fault(
     for line, text in zip(rows, texts, strict=True):
         cells = _cells(text, delimiter)
         for number in chosen.values():
+            written = _cells(line.text, delimiter)[number]
+            if is_grouped(written) or (delimiter == "," and "," in written):
+                return _grouped(path, line, headings[number], written)
             try:
                 float(cells[number])
             except ValueError:
-                what = f"{cells[number]!r} is not a number" if cells[number] else "it is empty"
+                what = f"{shortened(written)!r} is not a number" if written else "it is empty"
                 return (
-                    f"{path}, line {line.number}, column {headings[number]!r}: {what}. Correct "
-                    "or remove that line."
+                    f"{path}, line {line.number}, column {shortened(headings[number])!r}: {what}. "
+                    "Correct or remove that line."
                 )
     return f"{path} cannot be read as numbers. Save it as plain CSV with a decimal point."

@@ -1,7 +1,9 @@
-"""Positions that begin again: an angle after a full turn, a counter after its last number."""
+"""Numbers that begin again: an angle after a full turn, a counter after its last number."""
 
 import numpy as np
 from numpy.typing import NDArray
+
+from scissorcal.recording.resolution import GAP_FACTOR, resolution_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -14,37 +16,154 @@ FASTER = 2.0
 step: a joint that gains all of its speed within one sample goes as far in the next."""
 COUNTERS = range(8, 33)
 """Bits of a counter."""
+WHOLE = 1e-3
+"""Of a count: what a number of a few digits may be off the multiple of a counter's step."""
+JUMP = 0.25
+"""Share of the range that a jump covers at least: a stroke of four steps shows no motion."""
+TICKS_S = (1e-3, 1e-6, 1e-9)
+"""What counters of clocks count."""
+OF_DAY_S = (1.0, 60.0, 3600.0, 43200.0, 86400.0)
+"""A clock that shows the time of day without its larger parts begins again after these."""
+WRAP = 2.0**32
+"""Counter of a logger's us: 71.6 min."""
+NEAR_END = 0.01
+"""Share of ``WRAP`` within which its time lies before and after: samples may be missing there."""
+HELD = 4
+"""Samples in a row at the last number of a counter that say that it stands there: a value that goes
+on through its end has no reason to stay."""
 
 
 def continued(position: Array, counts: Array, turn: float | None) -> tuple[Array, Integers]:
     """A position (n,) that goes on where it jumps by its period, and the places after the jumps.
 
     ``counts`` (n,) are the numbers as they stand in the table, ``turn`` the length of a full turn
-    in the unit of ``position`` (None for a linear joint). The period is a turn, or the counter's
-    2^k where all numbers are whole; a counter begins again between its ends, 0 and 2^k or half of
-    it to either side. A position that does not stay within one period, or that jumps farther than
-    it moves once it is continued, is left as it is: then no place comes back.
+    in the unit of ``position`` (None for a linear joint). The period is a turn, or a counter's 2^k
+    where all numbers are whole, or multiples of one step; a counter begins again between its ends,
+    0 and 2^k or half of it to either side. A position that does not stay within one period, or that
+    jumps farther than it moves once it is continued, is left as it is: then no place comes back.
 
     >>> angle = np.radians(np.array([350.0, 356.0, 2.0, 8.0]))
     >>> found, places = continued(angle, np.degrees(angle), 2.0 * np.pi)
     >>> np.degrees(found).round(6).tolist(), places.tolist()
     ([350.0, 356.0, 362.0, 368.0], [2])
     """
-    span = float(np.ptp(counts))
     if turn is not None:
         found, places = _gone_on(position, turn)
         if len(places):
             return found, places
-    if span > 0.0 and np.all(counts == np.rint(counts)):
-        bits = next((k for k in COUNTERS if 2.0**k > span), None)
-        if bits is not None:
-            found, places = _gone_on(counts, 2.0**bits)
-            if not _at_ends(counts, places, 2.0**bits):
-                places = places[:0]
-            scale = float(np.ptp(position)) / span
-            if len(places):
-                return position[0] + (found - found[0]) * _sense(position, counts) * scale, places
+    if not len(jumps_in(counts)):
+        return position, np.zeros(0, dtype=np.int64)
+    whole, bits = _whole(counts)
+    if bits is not None:
+        found, places = _gone_on(whole, 2.0**bits)
+        if len(places) and _at_ends(whole, places, 2.0**bits):
+            scale = float(np.ptp(position)) / float(np.ptp(whole))
+            return position[0] + (found - found[0]) * _sense(position, whole) * scale, places
     return position, np.zeros(0, dtype=np.int64)
+
+
+def overflows(counts: Array) -> tuple[int, Integers]:
+    """Bits of the counter between whose ends a force or torque (n,) jumps, and the places after.
+
+    A negative number that is read without its sign is near 2^k, and one that is too large for its
+    bits begins again at the other end. Numbers that stand at an end are cut off there instead. 0
+    bits where nothing jumps so.
+
+    >>> overflows(np.array([3.0, 2.0, 0.0, 65534.0, 65533.0, 65535.0, 1.0, 2.0]))
+    (16, array([3, 6]))
+    """
+    none = 0, np.zeros(0, dtype=np.int64)
+    if not len(jumps_in(counts)):
+        return none
+    whole, bits = _whole(counts)
+    if bits is None:
+        return none
+    _, places = _gone_on(whole, 2.0**bits)
+    ends = (float(whole.min()), float(whole.max()))
+    if not len(places) or not _at_ends(whole, places, 2.0**bits) or _stands(whole, ends):
+        return none
+    return bits, places
+
+
+def continued_clock(time: Array, unit_s: float) -> tuple[Array, Integers, float]:
+    """A clock (n,) that goes on where it begins again, the places after, and its period.
+
+    ``time`` is in units of ``unit_s`` seconds. The period is 2^k of its unit, of ms, us or ns, or a
+    second, minute, hour, half a day or day; the clock begins at 0, or at half of the period below.
+    It is the one with which each step across is as the usual one; with 2^32, which loggers of us
+    have, an end may also be missing (``NEAR_END``), which then is a gap. A clock whose usual step
+    is more than ``MOST_LEFT`` of the period may have begun again unseen, and is left as it is, as
+    is one that goes back otherwise: then no place comes back.
+
+    >>> time, places, period = continued_clock(np.array([65520.0, 65530.0, 4.0, 14.0]), 1e-3)
+    >>> time.tolist(), places.tolist(), period
+    ([65520.0, 65530.0, 65540.0, 65550.0], [2], 65536.0)
+    """
+    step = np.diff(time)
+    falls = np.flatnonzero(step < 0.0)
+    rises = step[step > 0.0]
+    if not len(falls) or not len(rises):
+        return time, falls[:0], 0.0
+    usual = float(np.median(rises))
+    low, high = float(time.min()), float(time.max())
+    fitting = {}
+    for period in _clock_periods(unit_s):
+        begins = 0.0 if low >= 0.0 else -0.5 * period
+        across = step[falls] + period
+        inside = low >= begins and high < begins + period and usual <= MOST_LEFT * period
+        if not inside:
+            continue
+        if across.min() > 0.0 and across.max() < GAP_FACTOR * usual:
+            fitting[period] = abs(float(across.mean()) - usual)
+        elif period == WRAP:
+            near = NEAR_END * WRAP
+            if np.all(time[falls] > begins + WRAP - near) and np.all(
+                time[falls + 1] < begins + near
+            ):
+                fitting[period] = np.inf
+    if not fitting:
+        return time, falls[:0], 0.0
+    period = min(fitting, key=lambda one: fitting[one])
+    turns = np.zeros(len(time))
+    turns[falls + 1] = period
+    return time + np.cumsum(turns), falls + 1, period
+
+
+def _clock_periods(unit_s: float) -> list[float]:
+    """Periods of clocks, in units of ``unit_s`` seconds, without repetitions."""
+    counted = [2.0**k * one for k in COUNTERS for one in (1.0, *(x / unit_s for x in TICKS_S))]
+    told = [seconds / unit_s for seconds in OF_DAY_S]
+    return sorted({float(f"{period:.12g}") for period in (*counted, *told)})
+
+
+def jumps_in(values: Array) -> Integers:
+    """Places (k,) after steps of more than ``JUMP`` of the range, where all others are far smaller.
+
+    Empty where some step lies between: then the log shows fast motion. The others are at most half
+    as large as the jumps, by ``FASTER``.
+
+    >>> jumps_in(np.array([88.0, 89.0, 90.0, 1.0, 2.0, 3.0]))
+    array([3])
+    """
+    halves = 0.5 * values  # of the largest numbers, which have no difference
+    step = np.abs(np.diff(halves))
+    jumps = step > JUMP * float(np.ptp(halves))
+    others = float(step[~jumps].max(initial=0.0))
+    if not np.any(jumps) or others == 0.0 or step[jumps].min() <= FASTER * others:
+        return np.zeros(0, dtype=np.int64)
+    return np.flatnonzero(jumps) + 1
+
+
+def _whole(counts: Array) -> tuple[Array, int | None]:
+    """The numbers in steps of their sensor, and the bits of a counter that they would fill."""
+    if not np.all(counts == np.rint(counts)):
+        step = resolution_of(counts)
+        scaled = counts / step
+        if not np.isfinite(step) or np.abs(scaled - np.rint(scaled)).max() > WHOLE:
+            return counts, None
+        counts = np.rint(scaled)
+    span = float(np.ptp(counts))
+    return counts, next((k for k in COUNTERS if 2.0**k > span), None) if span > 0.0 else None
 
 
 def _gone_on(values: Array, period: float) -> tuple[Array, Integers]:
@@ -69,6 +188,14 @@ def _at_ends(counts: Array, places: Integers, period: float) -> bool:
     return any(
         bool(np.all((below - low <= most) & (low + period - above <= most)))
         for low in (0.0, -0.5 * period)
+    )
+
+
+def _stands(counts: Array, ends: tuple[float, float]) -> bool:
+    """Whether the numbers stand at an end of their range for ``HELD`` samples in a row."""
+    window = np.ones(HELD)
+    return any(
+        bool(np.any(np.convolve(counts == end, window, "valid") > HELD - 0.5)) for end in ends
     )
 
 

@@ -26,10 +26,12 @@ def test_cutting_air_is_refused(friction):
     with pytest.raises(InputError, match="hardly touched the material") as refused:
         fit_cut((air,), paper(fracture="smooth"), friction, effort="draft", rng=rng)
     assert "advance was zero at its near edge" in str(refused.value)
+    assert "s are sound, " in str(refused.value)
+    assert "s of these have a sheet in place, and in " in str(refused.value)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damage", ["one sample 1e6 sds off", "in mN m"])
+@pytest.mark.parametrize("damage", ["one sample far off", "in mN m"])
 def test_torques_far_from_every_law_are_refused_with_the_farthest_sample(
     friction, damage, monkeypatch
 ):
@@ -41,7 +43,7 @@ def test_torques_far_from_every_law_are_refused_with_the_farthest_sample(
     if damage == "in mN m":
         samples["motor_torque"] *= 1e3
     else:
-        samples["motor_torque"][3000] = 1e3
+        samples["motor_torque"][3000] = 20.0
     with pytest.raises(InputError, match="no law comes near") as refused:
         fit_cut(
             (replace(made, samples=samples),),

@@ -246,7 +246,8 @@ def test_marks_of_overflow_are_told_from_measurements(mark: float) -> None:
     for values, marked in (
         (torque, 0),
         (_marked(torque, mark, 2), 2),
-        (_marked(torque, mark, 1), 0),
+        (_marked(torque, mark, 1), 1),
+        (_marked(torque, 3.0, 1), 0),
     ):
         samples = np.zeros(6000, SAMPLE_DTYPE)
         samples["device_time_us"] = np.arange(6000) * 1000
@@ -257,7 +258,8 @@ def test_marks_of_overflow_are_told_from_measurements(mark: float) -> None:
         assert channel.saturated.sum() == marked
         found = inspect_sensors((one,))
         assert found.verdict.status == "pass"
-        told = [said for said in found.notes if f"exactly {mark:g} N m in 2 samples" in said]
+        counted = f"exactly {mark:g} N m in {marked} sample"
+        told = [said for said in found.notes if counted in said]
         assert len(told) == (1 if marked else 0)
 
 

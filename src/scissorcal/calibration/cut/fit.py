@@ -41,7 +41,7 @@ from scissorcal.calibration.cut.scout import (
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.cut.toughness import with_toughness
 from scissorcal.calibration.cut.unknowns import with_unknowns
-from scissorcal.calibration.cut.usage import usage_of_segments, usage_sentence
+from scissorcal.calibration.cut.usage import counted, usage_of_segments, usage_sentence
 from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.result import Effort, FitResult
@@ -100,6 +100,11 @@ class _Data:
     def names(self) -> str:
         """The recordings' files, for messages."""
         return ", ".join(recording.source or "the recording" for recording in self.recordings)
+
+    @property
+    def counted(self) -> str:
+        """What each filter leaves of the recordings."""
+        return counted(self.recordings, self.sensors.usable, self.motions)
 
     @property
     def cause(self) -> str:
@@ -232,7 +237,7 @@ def _scouted(data: _Data, laws: Sequence[CutLaw]) -> Scouted:
         raise InputError(
             f"{data.names}: {data.cause}no stroke shows the blades unloading the material, so its "
             "response cannot be separated from friction. Check rig.edge and the sheet's place, and "
-            "open the blades wide in every stroke."
+            f"open the blades wide in every stroke. {data.counted}"
         ) from error
     except CoarseEncoderError as error:
         raise InputError(f"{data.names}: {data.cause}{error}") from error
@@ -386,7 +391,7 @@ def _refuse_no_contact(data: _Data) -> None:
     if not any(np.any(motion.sheet >= 0) for motion in data.motions):
         raise InputError(
             f"{data.names}: no stroke through material is marked. Capture cuts with "
-            "'scissorcal capture cut', or mark strokes and sheets when importing."
+            f"'scissorcal capture cut', or mark strokes and sheets when importing. {data.counted}"
         )
     least = FELT_SDS * float(np.hypot(data.known.noise.white_Nm, data.known.noise.slow_Nm))
     felt = 0.0
@@ -401,5 +406,6 @@ def _refuse_no_contact(data: _Data) -> None:
         raise InputError(
             f"{data.names}: {data.cause}the blades hardly touched the material (torque beyond "
             f"friction over {felt:.2g} rad of closing). Check that the sheet lay between the "
-            "blades and that advance was zero at its near edge, then capture again."
+            "blades and that advance was zero at its near edge, then capture again. "
+            f"{data.counted}"
         )

@@ -1,8 +1,11 @@
 """Which samples of a cut's recordings the fit uses, by stroke and speed, and why not the others."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.cut.path.motion import PathMotion
 from scissorcal.calibration.cut.segments import Segments
 from scissorcal.calibration.signals.usage import GAP, INVALID, Usage, count_usage
 from scissorcal.recording.recording import Recording
@@ -60,3 +63,24 @@ def usage_sentence(recordings: tuple[Recording, ...], usage: Usage) -> str:
 def _mark(masks: tuple[Mask, ...], segments: Segments, index: int, low: int, high: int) -> None:
     motion = segments.motions[index]
     masks[motion.recording][motion.source[low : high + 1]] = True
+
+
+def counted(
+    recordings: tuple[Recording, ...], usable: tuple[Mask, ...], motions: Sequence[PathMotion]
+) -> str:
+    """What is left of the recordings after each filter of a fit of cuts, in seconds."""
+    ticks = [one.duration_s / max(len(one.samples) - 1, 1) for one in recordings]
+    recorded = sum(tick * len(good) for tick, good in zip(ticks, usable, strict=True))
+    sound = sum(tick * np.count_nonzero(good) for tick, good in zip(ticks, usable, strict=True))
+    kept = under = moving = 0.0
+    for motion in motions:
+        own = motion.usable & (np.diff(motion.source, prepend=-1) > 0)
+        below = own & (motion.sheet >= 0)
+        kept += motion.tick_s * np.count_nonzero(own)
+        under += motion.tick_s * np.count_nonzero(below)
+        moving += motion.tick_s * np.count_nonzero(below & ~motion.standing)
+    return (
+        f"Of {recorded:.3g} s recorded, {sound:.3g} s are sound, {kept:.3g} s of these lie in "
+        f"stretches long enough, {under:.3g} s of these have a sheet in place, and in {moving:.3g} "
+        "s of these the blades move."
+    )

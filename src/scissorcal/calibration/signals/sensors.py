@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.segments import still_clock, stretches
+from scissorcal.recording.marks import marks_in
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of
 from scissorcal.verdicts import Verdict, judge
@@ -30,11 +31,6 @@ EQUAL_HALF_STEPS = 0.55
 """Half a step, and a tenth more for what the noise's own estimate may be off."""
 BLOCK = 50
 """Second differences whose mean square is one estimate of the noise: known to 20 %."""
-FAR = 100.0
-"""Ranges of a channel's other values: a sensor that resolves a hundredth of what it measures would
-have a range of 10,000 steps to reach so far."""
-FEWEST_LEVELS = 4
-"""Different values without which none lies apart: two ends, and a range within them."""
 FEWEST_INVALID_S = 0.02
 NEAR_S = 0.05
 """The joint moves where its position changes more than twice within this time before and after."""
@@ -67,9 +63,9 @@ class Channel:
 
     ``step`` is its resolution (NaN: none to be seen), ``saturated`` and ``dead`` (m,) mark
     samples at an end of its range and within a dead band; ``low`` and ``high`` are those ends.
-    ``marks`` are values so far from all others that they are no measurement (see
-    :func:`_marks_in`); their samples count as saturated. ``at_ends`` is the share of samples at
-    ``low`` or ``high``, whether or not the sensor is cut off there.
+    ``marks`` are values in the place of a measurement (see
+    :func:`~scissorcal.recording.marks.marks_in`); their samples count as saturated. ``at_ends`` is
+    the share of samples at ``low`` or ``high``, whether or not the sensor is cut off there.
     """
 
     name: str
@@ -150,7 +146,7 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
     at_ends = float(np.mean((values == low) | (values == high)))
     if constant or name == "opening":
         return Channel(name, constant, step, none, none, low, high, at_ends=at_ends)
-    marks = _marks_in(values)
+    marks = marks_in(values)
     if marks:
         marked = np.isin(values, marks)
         rest = _inspect(name, np.where(marked, values[~marked][0], values), moves, tick_s)
@@ -170,30 +166,6 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
         ends = _held_ends(values, moves, step, long_run, fewest)
     cut = np.isin(values, ends)
     return Channel(name, constant, step, cut, dead, low, high, at_ends=at_ends)
-
-
-def _marks_in(values: Array) -> tuple[float, ...]:
-    """Values that mark an overflow or a loss: 9999, -32768 and the like.
-
-    An end of the range counts that comes at least twice to the last digit, and lies farther from
-    the next value than all values within the ends are apart. What is sampled while it moves has
-    values on its way, so that no measurement lies so far off; a single spike never repeats. A value
-    that is held for more of the time than ``INVALID_LIMIT`` may be a level, unless it lies ``FAR``
-    times farther off. Zero is what a sensor shows without a load, and a mark only where it never
-    stands for two samples in a row: no load goes and returns between two samples, time and again.
-    """
-    levels, counts = np.unique(values, return_counts=True)
-    if len(levels) < FEWEST_LEVELS:
-        return ()
-    inside = float(levels[-2] - levels[1])
-    apart = (float(levels[1] - levels[0]), float(levels[-1] - levels[-2]))
-    return tuple(
-        float(levels[end])
-        for end, away in zip((0, -1), apart, strict=True)
-        if counts[end] > 1
-        and not (levels[end] == 0.0 and np.any((values[1:] == 0.0) & (values[:-1] == 0.0)))
-        and away > inside * (1.0 if counts[end] <= INVALID_LIMIT * len(values) else FAR)
-    )
 
 
 def _longest_by_chance(values: Array, step: float) -> int:
@@ -308,10 +280,11 @@ def _flagged(recording: Recording) -> Mask:
 
 def mark_sentence(channel: Channel, count: int, unit: str) -> str:
     """That samples hold a mark in the place of a measurement."""
-    listed = " or ".join(f"{value:g}" for value in channel.marks)
+    listed = " or ".join(f"{value:.9g}" for value in channel.marks)
+    samples = "1 sample" if count == 1 else f"{count} samples"
     return (
-        f"{channel.name} is exactly {listed} {unit} in {count} samples, farther from all others "
-        "than those are from each other: a mark of overflow or loss, which is left out."
+        f"{channel.name} is exactly {listed} {unit} in {samples}, where nothing leads from or to "
+        "the other values: a mark of overflow or loss, which is left out."
     )
 
 

@@ -13,6 +13,7 @@ from scissorcal.calibration.signals.sensors import (
     mark_sentence,
 )
 from scissorcal.recording.layout import unit_of
+from scissorcal.recording.marks import lone_excursion
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.summarising import Gaps, find_gaps
 
@@ -25,7 +26,8 @@ class SensorSurvey:
     """One channel in SI: its resolution, range, and shares of samples that do not measure.
 
     ``step`` is None where none shows. ``at_low`` and ``at_high`` are the shares at the ends of the
-    range where the channel looks cut off there, ``dead`` that at exactly 0 while the joint moves.
+    range where the channel looks cut off there, or stands at its ends for most of the time;
+    ``dead`` is the share at exactly 0 while the joint moves.
     """
 
     channel: str
@@ -94,11 +96,22 @@ def _told(recording: Recording, channel: Channel) -> list[str]:
         )
     if channel.mostly_at_ends:
         said.append(ends_sentence(channel, unit))
+    values = np.asarray(recording.samples[channel.name], dtype=np.float64)
+    measured = np.flatnonzero(~np.isin(values, channel.marks))
+    lone = None if channel.name == "opening" else lone_excursion(values[measured])
+    if lone is not None:
+        at = int(measured[lone])
+        said.append(
+            f"{channel.name} is {values[at]:.6g} {unit} at {recording.device_time_s[at]:.6g} s "
+            "alone, farther from the samples before and after than it goes anywhere else. If this "
+            "is no measurement, remove that row from the log."
+        )
     return said
 
 
 def _sensor(recording: Recording, channel: Channel) -> SensorSurvey:
     values = recording.samples[channel.name]
+    cut = channel.saturated | channel.mostly_at_ends
     return SensorSurvey(
         channel=channel.name,
         unit=unit_of(channel.name, recording.joint),
@@ -106,7 +119,7 @@ def _sensor(recording: Recording, channel: Channel) -> SensorSurvey:
         step=channel.step if np.isfinite(channel.step) else None,
         low=channel.low,
         high=channel.high,
-        at_low=float(np.mean(channel.saturated & (values == channel.low))),
-        at_high=float(np.mean(channel.saturated & (values == channel.high))),
+        at_low=float(np.mean(cut & (values == channel.low))),
+        at_high=float(np.mean(cut & (values == channel.high))),
         dead=float(channel.dead.mean()),
     )
