@@ -138,7 +138,8 @@ def test_a_contour_within_another_is_a_hole(tmp_path: Path) -> None:
         (f'{HEAD}<svg x="9"><rect width="9" height="9"/></svg></svg>', "within the drawing"),
         (f"{HEAD}</svg>", "no closed shape"),
         (f'{HEAD}<rect width="1"', "well-formed"),
-        ("<html/>", "not <svg>"),
+        ("<html/>", "a web page, not a drawing"),
+        ("<plan/>", "not <svg>"),
         ("", "empty"),
     ],
 )

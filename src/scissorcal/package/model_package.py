@@ -291,6 +291,7 @@ def open_package(path: Path | str, *, warn: bool = True) -> ModelPackage:
             )
     try:
         _ = package.tables, package.exact, package.average, package.kernel(), package.pieces
+        _ = package._drawn
     except Exception as error:
         raise InputError(
             f"{path}: its tables and parameters do not form a model ({error}). {REMEDY}"
