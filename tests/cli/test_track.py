@@ -282,8 +282,8 @@ def test_tracks_of_lines_stay_readable(cli: Cli, workspace: Path) -> None:
     assert said.code == 0
     assert "old.csv: 2 rows" in said.out
     first, second, third = (workspace / "old.csv").read_text().splitlines()
-    assert first.endswith("translation_x_m,translation_y_m,translation_z_m")
-    assert second == "0,0.0,seen,24,9.0,1.0,0.0,0.0,0.0,0.1,0.2,0.3"
+    assert first.endswith("translation_y_m,translation_z_m,yaw_deg,pitch_deg,roll_deg")
+    assert second == "0,0.0,seen,24,9.0,1.0,0.0,0.0,0.0,0.1,0.2,0.3,0.0,0.0,0.0"
     assert third.startswith("1,0.1,blank,0,,")
     assert cli("export", path, "old.csv").code == 2
     assert cli("export", path, "old.parquet").code == 2

@@ -149,7 +149,7 @@ def test_rows_are_exported_with_their_units(tmp_path: Path, suffix: str) -> None
     np.testing.assert_array_equal(found["covariance_1_6"], rows["covariance"][:, 5])
     np.testing.assert_array_equal(found["contact_force_N"], rows["contact_force"])
     np.testing.assert_array_equal(found["compliance_m_per_N"], rows["compliance"])
-    assert len(found.columns) == 5 + 2 + 4 + 3 + 36 + 6 + 1 + 3 + 3 + 1
+    assert len(found.columns) == 5 + 2 + 4 + 3 + 36 + 6 + 1 + 3 + 3 + 1 + 4
     with pytest.raises(InputError, match="exists"):
         export_channel(path, "pose", table)
 
