@@ -192,8 +192,8 @@ def one_rotation(
     if quaternion is None or tuple(quaternion) == NO_QUATERNION:
         if angles is None:
             raise RotationError(
-                f"{whose[0].upper()}{whose[1:]} has no rotation: give the quaternion (w, x, y, z), or yaw, pitch and "
-                "roll in degrees."
+                f"{whose[0].upper()}{whose[1:]} has no rotation: give the quaternion "
+                "(w, x, y, z), or yaw, pitch and roll in degrees."
             )
         return angles.quaternion
     length = math.hypot(*quaternion)

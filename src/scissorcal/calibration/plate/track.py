@@ -93,10 +93,10 @@ def read_track_lines(path: Path) -> tuple[TrackHead, tuple[TrackRow, ...]]:
         try:
             rows.append(TrackRow.model_validate_json(line))
         except ValidationError as error:
-            first = error.errors()[0]
-            if number == len(lines) + 1 and first["type"] == "json_invalid":
+            mistake = error.errors()[0]
+            if number == len(lines) + 1 and mistake["type"] == "json_invalid":
                 break
-            why = f" ({first['msg']})" if first["type"] == "value_error" else ""
+            why = f" ({mistake['msg']})" if mistake["type"] == "value_error" else ""
             raise InputError(f"{path}, line {number}: this is no row of a track{why}.") from None
     return head, tuple(rows)
 

@@ -70,8 +70,8 @@ def _pose(fit: PlateFit) -> Panel:
             "FILE` with photographs of the card on the rig, then `scissorcal fit plate`."
         )
     caption = (
-        "Position of the plate's frame, its Euler angles and its rotation vector; ± is the standard "
-        "deviation, for a turn about an axis that of a small one."
+        "Position of the plate's frame, its Euler angles and its rotation vector; ± is the "
+        "standard deviation, for a turn about an axis that of a small one."
     )
     return Panel(
         f"{PART}-pose", PART, "Pose of the plate", _sentence(fit), rows,

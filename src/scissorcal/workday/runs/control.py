@@ -81,8 +81,9 @@ def control_workspace(
 
     ``force_N`` and ``speed_mm_per_s`` hold where the file does not state them. The plate stands
     where ``source`` says, or ``pose`` (text; `workday.tracking.stated_pose` reads it), or where
-    ``camera`` (a camera's number, or "sim" with the device "sim") and contacts have it while the path is followed, or where the fit of its photographs
-    found it. A person is asked for the plate before a source or camera looks for it, else once the
+    ``camera`` (a camera's number, or "sim" with the device "sim") and contacts have it while the
+    path is followed, or where the fit of its photographs found it. A person is asked for the plate
+    before a source or camera looks for it, else once the
     blades are over its place. Mass, inertia and friction are those of the fits of both axes; the
     surface and what it is made of are the recipe's (plate.surface, plate.touch). Samples and
     telemetry go to captures/control-<stamp>.mcap unless ``record`` is False; with them the rows of

@@ -55,7 +55,9 @@ def _by_keys(text: str) -> Pose:
                 f"{', '.join(keys)} together."
             )
     quaternion = [given[key] for key in _QUATERNION] if "qw" in given else None
-    angles = EulerAngles(*(given[key] for key in _ANGLES)) if "yaw" in given else None
+    angles = None
+    if "yaw" in given:
+        angles = EulerAngles(given["yaw"], given["pitch"], given["roll"])
     turn = one_rotation(quaternion, angles, "the stated pose")
     x, y, z = (1e-3 * given.get(key, 0.0) for key in _PLACE)
     return Pose(turn, (x, y, z))
