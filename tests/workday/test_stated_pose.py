@@ -1,7 +1,10 @@
 """A plate's pose as it is typed, in both notations."""
 
+import numpy as np
 import pytest
 
+from scissorcal.device.sim.plate import plate_pose
+from scissorcal.device.sim.specimen import TouchedPlate
 from scissorcal.errors import InputError
 from scissorcal.tracking.plate_pose import level_plate
 from scissorcal.workday.tracking.stated_pose import stated_pose
@@ -22,6 +25,14 @@ def test_one_pose_in_every_notation(text: str) -> None:
     found = stated_pose(text)
     assert found.translation_m == pytest.approx(tuple(place))
     assert found.matrix == pytest.approx(turn, abs=2e-4)
+
+
+def test_a_specimens_angles_are_those_of_the_conventions_table() -> None:
+    """yaw = pitch_deg, pitch = yaw_deg, roll = roll_deg - 90."""
+    plate = TouchedPlate(place_mm=(20.0, 10.0, 1.0), pitch_deg=12.0, yaw_deg=-20.0, roll_deg=30.0)
+    axes, _ = plate_pose(plate, 0.0)
+    found = stated_pose("x=20,y=10,z=1,yaw=12,pitch=-20,roll=-60")
+    assert pytest.approx(np.array(axes), abs=1e-9) == found.matrix.T
 
 
 @pytest.mark.parametrize(

@@ -272,7 +272,7 @@ class PlateRecord(Section):
 
     @model_validator(mode="after")
     def _is_a_pose(self) -> PlateRecord:
-        one_rotation(self.quaternion, self.euler_angles, "the plate's pose")
+        one_rotation(self.quaternion, self.euler_angles, "a plate's pose")
         if abs(sum(part**2 for part in self.quaternion) - 1.0) > 1e-6:
             raise ValueError("a plate's quaternion has length one")
         rows = self.covariance

@@ -56,16 +56,10 @@ class RotationError(InputError, ValueError):
 
 @dataclass(frozen=True)
 class EulerAngles:
-    """Yaw, pitch and roll of a rotation in degrees; `CONVENTION` has their order.
+    """Yaw, pitch and roll of a rotation in degrees; ``convention`` states their order.
 
     ``sd_deg`` are their standard deviations where a covariance is known and they are determined.
     ``note`` is empty, or a sentence on what is determined near a pitch of 90 or -90 degrees.
-
-    >>> angles = EulerAngles.of((0.5**0.5, -(0.5**0.5), 0.0, 0.0))  # a level plate on the rig
-    >>> round(angles.yaw_deg, 6), round(angles.pitch_deg, 6), round(angles.roll_deg, 6)
-    (0.0, 0.0, -90.0)
-    >>> angles.words
-    'yaw 0.00, pitch 0.00, roll -90.00 deg'
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -91,6 +85,9 @@ class EulerAngles:
         """The angles of a unit quaternion (w, x, y, z).
 
         ``covariance`` (3, 3) or (6, 6) is that of a rotation vector in the outer axes (rad) first.
+
+        >>> EulerAngles.of((0.5**0.5, -(0.5**0.5), 0.0, 0.0)).words  # a level plate on the rig
+        'yaw 0.00, pitch 0.00, roll -90.00 deg'
         """
         yaw, pitch, roll = (float(value) for value in euler_deg(quaternion))
         turn = None if covariance is None else np.asarray(covariance, dtype=np.float64)[:3, :3]
