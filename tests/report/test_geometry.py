@@ -26,6 +26,7 @@ from tests.report.geometry_fits import (
     geometry,
     imported_camera,
     noise,
+    plate_fit,
 )
 from tests.report.pages import panel_of, read_page, read_twin, values_of
 
