@@ -21,6 +21,7 @@ from scissorcal.calibration.store import EARLIER
 from scissorcal.calibration.verify.result import FORMAT, VerifyResult
 from scissorcal.errors import InputError
 from scissorcal.verdicts import Verdict
+from scissorcal.vision.geometry.pose import Pose
 from tests.calibration.results import difference, results
 
 RESULTS = results()
@@ -86,6 +87,27 @@ def test_h5py_alone_reads_a_file(tmp_path: Path) -> None:
         assert facts["rung"] == fit.rung
         assert facts["draws"]["variables"][0] == "/posterior/" + fit.parameters[0].name
         assert json.loads(file.attrs["header"])["inputs_hash"] == fit.inputs_hash
+
+
+def test_a_plates_file_has_euler_angles_and_is_read_without_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = RESULTS["plate"]
+    assert isinstance(fit, PlateFit)
+    path = tmp_path / "plate.nc"
+    save(fit, path)
+    with h5py.File(path) as file:
+        written = json.loads(file.attrs["scissorcal"])
+    for name in ("camera_plate", "rig_plate"):
+        angles = written[name]["euler_angles"]
+        assert angles["pitch_deg"] == getattr(fit, name).euler_angles.pitch_deg
+        assert angles["convention"].startswith("intrinsic z-y'-x''")
+    monkeypatch.setattr(Pose, "also_written", ())
+    save(fit, path)
+    with h5py.File(path) as file:
+        assert "euler_angles" not in json.loads(file.attrs["scissorcal"])["rig_plate"]
+    monkeypatch.undo()
+    assert difference(load(path, PlateFit), fit) == ""
 
 
 def test_xarray_reads_the_groups_of_a_blade_with_their_coordinates(tmp_path: Path) -> None:

@@ -54,7 +54,14 @@ def test_a_plate_is_captured_fitted_and_known_in_the_rigs_frame(
     assert envelope["result"]["rig_plate"] is None
     assert len(envelope["result"]["pictures"]) == 3
     assert all(Path(path).is_file() for path in envelope["files"])
-    assert cli("fit", "plate").out.startswith("plate: nothing changed")
+    angles = envelope["result"]["camera_plate"]["euler_angles"]
+    turn = [angles[f"{name}_deg"] for name in ("yaw", "pitch", "roll")]
+    printed = cli("fit", "plate").out
+    assert printed.startswith("plate: nothing changed")
+    camera = next(line for line in printed.splitlines() if line.startswith("camera"))
+    assert camera.split()[4:7] == [f"{value:.2f}" for value in turn]
+    assert "quaternion, camera: w 0." in printed
+    assert "yaw, pitch, roll: intrinsic z-y'-x''" in printed
 
     said = cli("capture", "plate", "-i", *cards(album), "--stances", album / "stances.csv")
     assert said.code == 0

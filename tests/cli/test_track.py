@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -75,6 +76,10 @@ def test_a_video_is_tracked_and_its_drop_outs_named(
     assert result["longest_gap_s"] == pytest.approx(0.2)
     assert result["travel_mm"] == pytest.approx(2.7, abs=0.15)
     assert (result["frame"], result["state"]) == ("camera", "pictures")
+    pose = Found(tuple(result["quaternion"]), tuple(result["translation_m"]))
+    angles, same = result["euler_angles"], pose.euler_angles
+    assert angles["roll_deg"] == pytest.approx(same.roll_deg)
+    assert min(angles["sd_deg"]) > 0.0
 
     (path,) = (Path(name) for name in said.envelope["files"])
     recording = read_recording(path)
@@ -99,6 +104,8 @@ def test_a_video_is_tracked_and_its_drop_outs_named(
     assert said.code == 0
     assert "3 poses in 4 pictures (1 no target)" in said.out
     assert "pose by pictures alone, in the camera's frame" in said.out
+    assert ") mm, yaw " in said.out
+    assert "quaternion, camera: w " in said.out
 
 
 def test_a_plate_that_moves_faster_than_stated_is_told(
@@ -282,8 +289,8 @@ def test_tracks_of_lines_stay_readable(cli: Cli, workspace: Path) -> None:
     assert said.code == 0
     assert "old.csv: 2 rows" in said.out
     first, second, third = (workspace / "old.csv").read_text().splitlines()
-    assert first.endswith("translation_x_m,translation_y_m,translation_z_m")
-    assert second == "0,0.0,seen,24,9.0,1.0,0.0,0.0,0.0,0.1,0.2,0.3"
+    assert first.endswith("translation_y_m,translation_z_m,yaw_deg,pitch_deg,roll_deg")
+    assert second == "0,0.0,seen,24,9.0,1.0,0.0,0.0,0.0,0.1,0.2,0.3,0.0,0.0,0.0"
     assert third.startswith("1,0.1,blank,0,,")
     assert cli("export", path, "old.csv").code == 2
     assert cli("export", path, "old.parquet").code == 2
@@ -291,6 +298,17 @@ def test_tracks_of_lines_stay_readable(cli: Cli, workspace: Path) -> None:
     said = cli("export", path, "new.csv")
     assert said.code == 2
     assert "line 2: this is no row of a track" in said.err
+    turned = lines[1].replace('"quaternion":[1.0', '"quaternion":[-1.0')
+    stated = '"euler_angles":{"yaw_deg":%s,"pitch_deg":0.0,"roll_deg":0.0}'
+    alone = re.sub(r'"quaternion":\[[^]]*\],?', "", lines[1])
+    assert '"euler_angles":null' in alone
+    for line, yaw, code in ((turned, 0.01, 0), (turned, 12.5, 2), (alone, 12.5, 0)):
+        both = line.replace('"euler_angles":null', stated % yaw)
+        path.write_text("\n".join([lines[0], both]))
+        said = cli("export", path, f"both-{code}-{yaw}.csv" if line is turned else "alone.csv")
+        assert said.code == code, said.err
+        assert code == 0 or "differ by 12.50 deg" in said.err
+    assert ",12.5,0.0,0.0" in (workspace / "alone.csv").read_text()
     path.write_text("nothing")
     assert "is no track" in cli("export", path, "new.csv").err
     assert math.isfinite(rows[0].time_s)

@@ -119,6 +119,7 @@ def test_a_package_keeps_the_plates_covariance_and_failed_checks(tmp_path: Path)
     assert record is not None
     assert plate.rig_plate is not None
     assert (record.frame, record.quaternion) == ("rig", plate.rig_plate.quaternion)
+    assert record.euler_angles == plate.rig_plate.euler_angles
     assert "fit.plate, ambiguity: Two poses." in " ".join(package.warnings)
     for broken in ({"quaternion": (2.0, 0.0, 0.0, 0.0)}, {"covariance": ((0.0,),)}):
         with pytest.raises(ValueError, match="a plate's"):
@@ -128,6 +129,28 @@ def test_a_package_keeps_the_plates_covariance_and_failed_checks(tmp_path: Path)
         build_package(
             chosen, friction_fit(), cut_fit(chosen), path, rng(), plate=unsure, allow_failed=True
         )
+
+
+def test_a_manifests_pose_is_read_in_either_notation() -> None:
+    written = {
+        "frame": "rig", "translation_m": [0.0, 0.0, 0.1], "covariance": [[0.0] * 6] * 6,
+        "target": "plate board", "inputs_hash": "",
+    }  # fmt: skip
+    turn = {"quaternion": [0.5**0.5, -(0.5**0.5), 0.0, 0.0]}
+    angles = {"euler_angles": {"yaw_deg": 0.0, "pitch_deg": 0.0, "roll_deg": -90.0}}
+
+    def read(*parts: dict[str, Any]) -> PlateRecord:
+        facts = {name: value for part in (written, *parts) for name, value in part.items()}
+        return PlateRecord.model_validate_json(json.dumps(facts))
+
+    for given in ((turn,), (angles,), (turn, angles)):
+        assert read(*given).quaternion == pytest.approx(turn["quaternion"])
+    assert read(turn).euler_angles is None, "as in older packages"
+    angles["euler_angles"]["yaw_deg"] = 2.5
+    with pytest.raises(ValueError, match=r"a plate's pose differ by 2\.50 deg"):
+        read(turn, angles)
+    with pytest.raises(ValueError, match="A plate's pose has no rotation"):
+        read()
 
 
 def test_a_linear_joint_has_no_package(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from mcap.reader import make_reader
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.recipe.euler_angles import EulerAngles
 from scissorcal.recording import (
     RecordingWriter,
     export_channel,
@@ -19,6 +20,7 @@ from scissorcal.recording import (
     summary,
 )
 from scissorcal.recording.channels import CHANNELS
+from scissorcal.recording.exporting import channel_columns
 from scissorcal.recording.plate_channels import FRAME, PICTURE, POSE, frame_rows
 from scissorcal.recording.telemetry import TelemetryChannel
 from tests.recording.made import EPOCH_NS, made_samples
@@ -149,9 +151,25 @@ def test_rows_are_exported_with_their_units(tmp_path: Path, suffix: str) -> None
     np.testing.assert_array_equal(found["covariance_1_6"], rows["covariance"][:, 5])
     np.testing.assert_array_equal(found["contact_force_N"], rows["contact_force"])
     np.testing.assert_array_equal(found["compliance_m_per_N"], rows["compliance"])
-    assert len(found.columns) == 5 + 2 + 4 + 3 + 36 + 6 + 1 + 3 + 3 + 1
+    assert len(found.columns) == 5 + 2 + 4 + 3 + 36 + 6 + 1 + 3 + 3 + 1 + 4
     with pytest.raises(InputError, match="exists"):
         export_channel(path, "pose", table)
+
+
+def test_exported_poses_have_euler_angles_and_tell_where_they_are_singular() -> None:
+    rows = np.zeros(4, dtype=[*POSE.dtype.descr, ("host_time_ns", "<i8")])
+    rows["quaternion"] = [EulerAngles(30.0, p, 20.0).quaternion for p in (0.0, 89.0, 89.999, 90.0)]
+    rows["covariance"] = (np.diag([1e-4] * 6) ** 2).ravel()
+    rows["covariance"][1] = (np.diag([1e-2] * 6) ** 2).ravel()
+    found = channel_columns(POSE, rows)
+    assert found["yaw_and_roll_determined"].tolist() == [1, 0, 0, 0]
+    assert found["pitch_deg"] == pytest.approx([0.0, 89.0, 89.999, 90.0])
+    assert found["yaw_deg"][:3] == pytest.approx([30.0] * 3)
+    pictures = np.zeros(1, dtype=[*PICTURE.dtype.descr, ("host_time_ns", "<i8")])
+    pictures["quaternion"], pictures["other_quaternion"] = np.nan, (1.0, 0.0, 0.0, 0.0)
+    seen = channel_columns(PICTURE, pictures)
+    assert np.isnan(seen["roll_deg"]).all()
+    assert (seen["other_roll_deg"], seen["other_yaw_and_roll_determined"]) == (0.0, 1)
 
 
 def test_a_channel_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from tests.report.geometry_fits import (
     geometry,
     imported_camera,
     noise,
+    plate_fit,
 )
 from tests.report.pages import panel_of, read_page, read_twin, values_of
 
@@ -105,6 +106,13 @@ def test_the_twin_follows_its_schema_and_has_the_numbers(shown: Shown) -> None:
     turned = pose["turn about z"]["in the rig's frame"]
     assert turned["number"] == pytest.approx(np.degrees(0.1))
     assert turned["unit"] == "°"
+    angles = plate_fit().camera_plate.euler_angles
+    yaw = pose["yaw"]["before the camera"]
+    assert (yaw["number"], yaw["unit"]) == (pytest.approx(angles.yaw_deg), "°")
+    assert yaw["sd"] == pytest.approx(angles.sd_deg[0])
+    notes = " ".join(panel_of(twin, "plate-pose")["notes"])
+    assert "Quaternion (w, x, y, z) before the camera: " in notes
+    assert "intrinsic z-y'-x''" in notes
     origins = {row["fit"]: row for row in twin["provenance"]["geometry"]}
     assert origins["blade"] == {
         "fit": "blade",

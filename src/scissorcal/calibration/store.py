@@ -294,6 +294,8 @@ class _Writer:
                 tree[name] = self._array(item, f"{path}/{name}", here, value)
             else:
                 tree[name] = self.tree(item, f"{path}/{name}", here)
+        for name in getattr(kind, "also_written", ()):
+            tree[name] = self.tree(getattr(value, name), f"{path}/{name}", stored)
         return tree
 
     def _array(
@@ -390,7 +392,7 @@ def _object_of(
     kind: Any, value: dict[str, Any], file: _Contents | None, stored: Stored | None
 ) -> Any:
     known = _fields(kind)
-    every = {one.name for one in fields(kind)}
+    every = {one.name for one in fields(kind)} | set(getattr(kind, "also_written", ()))
     if unknown := value.keys() - every:
         raise ValueError(f"{kind.__name__} has the unknown {', '.join(sorted(unknown))}")
     given = {

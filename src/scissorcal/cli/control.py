@@ -44,8 +44,9 @@ def control(
     pose: Annotated[
         str | None,
         typer.Option(
-            metavar="X_MM,Y_MM,PITCH_DEG",
-            help="Where the plate stands in the rig's plane; as it was fitted if not given.",
+            metavar="X_MM,Y_MM,RISE_DEG|x=MM,y=MM,z=MM,yaw=DEG,pitch=DEG,roll=DEG",
+            help="Where the plate stands in the rig's frame (a rotation also as qw=,qx=,qy=,qz=); "
+            "as it was fitted if not given.",
         ),
     ] = None,
     camera: PlateCamera = "none",

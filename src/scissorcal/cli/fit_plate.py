@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from scissorcal.cli.output import table
+from scissorcal.cli.pose_lines import pose_lines
 
 if TYPE_CHECKING:
     from scissorcal.calibration.plate.result import PlateFit
@@ -16,21 +17,20 @@ def text(outcome: "FitOutcome") -> str:
     head = f"plate: {len(fit.views)} photographs of the {fit.target}, rms {fit.rms_px:.2f} px"
     if outcome.cached:
         head = "plate: nothing changed since the last fit"
-    rows = [["frame", "x mm", "y mm", "z mm", "turn deg", "about x", "y", "z", "sd mm", "sd deg"]]
-    rows.append(_row("camera", fit.camera_plate))
+    poses = {"camera": fit.camera_plate}
     if fit.rig_plate:
-        rows.append(_row("rig", fit.rig_plate))
-    return f"{head}\n{table(rows, right=range(1, 10))}"
+        poses["rig"] = fit.rig_plate
+    rows = [["frame", "x mm", "y mm", "z mm", "yaw deg", "pitch", "roll", "sd mm", "sd deg"]]
+    rows += [_row(name, pose) for name, pose in poses.items()]
+    lines = [head, table(rows, right=range(1, 9)), *pose_lines(poses)]
+    return "\n".join(lines)
 
 
 def _row(name: str, pose: "Pose") -> list[str]:
     import numpy as np
 
-    vector = pose.rotation_vector
-    angle = float(np.linalg.norm(vector))
-    axis = vector / angle if angle > 0 else vector
     cells = [name, *(f"{1e3 * value:.2f}" for value in pose.translation_m)]
-    cells += [f"{np.degrees(angle):.2f}", *(f"{value:.3f}" for value in axis)]
+    cells += pose.euler_angles.printed
     if pose.covariance is None:
         return [*cells, "", ""]
     sd = np.sqrt(np.diag(pose.covariance))

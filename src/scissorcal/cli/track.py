@@ -9,6 +9,7 @@ import typer
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import Baud, Folder, Seed, positive
 from scissorcal.cli.output import Answer, command
+from scissorcal.cli.pose_lines import pose_lines
 
 if TYPE_CHECKING:
     from scissorcal.workday.runs.track import TrackResult
@@ -87,7 +88,8 @@ def track(
             baud=baud,
             tell=view.show,
         )
-    result = {**asdict(done), "drop_outs": done.drop_outs}
+    angles = done.pose.euler_angles
+    result = {**asdict(done), "euler_angles": angles, "drop_outs": done.drop_outs}
     del result["verdicts"]
     name = workspace.relative(done.path) if done.path else Path(camera).name
     files = (done.path,) if done.path else ()
@@ -114,6 +116,9 @@ def _text(done: "TrackResult") -> str:
             f"{figures.contacts.used} contacts used, {figures.contacts.refused} refused; "
             f"{figures.restarts} restarts"
         )
+    x, y, z = (1e3 * value for value in done.translation_m)
+    lines.append(f"at the end ({x:.2f}, {y:.2f}, {z:.2f}) mm, {done.pose.euler_angles.words}")
+    lines += pose_lines({done.frame: done.pose})
     lines.append(
         f"the plate went {done.travel_mm:.2f} mm away from where it was first; it is known to "
         f"{done.sd_mm:.2g} mm and {done.sd_deg:.2g} deg"

@@ -67,17 +67,17 @@ def track_line(mark: "TrackMark", seconds: float | None) -> str:
 
 
 def _pose(mark: "TrackMark") -> str:
-    from scissorcal.tracking.rotation import rotation_vector
+    from scissorcal.vision.geometry.pose import Pose
 
     found = mark.estimate
     assert found is not None
     x, y, z = (1e3 * found.place_m).tolist()
-    turns = [math.degrees(angle) for angle in rotation_vector(found.rotation).tolist()]
+    angles = Pose.from_matrix(found.rotation, found.place_m, found.covariance).euler_angles
     sds = [math.sqrt(variance) for variance in found.covariance.diagonal().tolist()]
+    near = f" (pitch near {math.copysign(90.0, angles.pitch_deg):g})" if angles.note else ""
     return (
-        f"({x:.2f}, {y:.2f}, {z:.2f}) +- {1e3 * max(sds[3:]):.2g} mm, "
-        f"({turns[0]:.2f}, {turns[1]:.2f}, {turns[2]:.2f}) +- "
-        f"{math.degrees(max(sds[:3])):.2g} deg"
+        f"({x:.2f}, {y:.2f}, {z:.2f}) +- {1e3 * max(sds[3:]):.2g} mm, {angles.words}{near} "
+        f"+- {math.degrees(max(sds[:3])):.2g} deg"
     )
 
 

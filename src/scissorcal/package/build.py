@@ -267,6 +267,7 @@ def _plate_record(plate: PlateFit) -> PlateRecord:
     return PlateRecord(
         frame="rig" if plate.rig_plate else "camera",
         quaternion=pose.quaternion,
+        euler_angles=pose.euler_angles,
         translation_m=pose.translation_m,
         covariance=tuple(tuple(float(value) for value in row) for row in pose.covariance),
         target=plate.target,

@@ -23,6 +23,7 @@ from scissorcal.package.table_record import (
     StoredRow,
     Text,
 )
+from scissorcal.recipe.euler_angles import EulerAngles, Quaternion, angles_alone, one_rotation
 from scissorcal.recipe.schema import FrictionRung, FrictionTerm
 
 FORMAT = "scissorcal-package/1"
@@ -256,11 +257,14 @@ class PlateRecord(Section):
     """Where the plate stands, where the scene asks for it: T_rig_plate, or T_camera_plate.
 
     ``quaternion`` is (w, x, y, z), ``covariance`` (6, 6) over a rotation vector in the outer frame
-    (rad), then the translation (m). ``warnings`` are the verdicts that its fit failed.
+    (rad), then the translation (m). ``euler_angles`` are the same rotation in degrees, null in
+    older packages; either may stand alone, and the quaternion counts. ``warnings`` are the verdicts
+    that its fit failed.
     """
 
     frame: Literal["rig", "camera"]
-    quaternion: tuple[float, float, float, float]
+    euler_angles: EulerAngles | None = None
+    quaternion: Quaternion = Field(default_factory=angles_alone)
     translation_m: tuple[float, float, float]
     covariance: tuple[tuple[float, ...], ...]
     target: Text
@@ -269,6 +273,7 @@ class PlateRecord(Section):
 
     @model_validator(mode="after")
     def _is_a_pose(self) -> PlateRecord:
+        one_rotation(self.quaternion, self.euler_angles, "a plate's pose")
         if abs(sum(part**2 for part in self.quaternion) - 1.0) > 1e-6:
             raise ValueError("a plate's quaternion has length one")
         rows = self.covariance

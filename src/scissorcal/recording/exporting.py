@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError, file_error
 from scissorcal.files import replacing
+from scissorcal.recipe.euler_angles import euler_deg, singular_within_deg
 from scissorcal.recording import layout
 from scissorcal.recording.channels import CHANNELS
 from scissorcal.recording.header import METADATA_NAME
@@ -83,7 +84,29 @@ def channel_columns(channel: TelemetryChannel, rows: NDArray[np.void]) -> dict[s
             found[f"{name}_{part}{end}"] = np.ascontiguousarray(values[:, index])
         if not parts:
             found[f"{name}{end}"] = np.ascontiguousarray(values)
+        if name.endswith("quaternion"):
+            found |= _angles(rows, name)
     return found
+
+
+def _angles(rows: NDArray[np.void], name: str) -> dict[str, NDArray[Any]]:
+    """The Euler angles of a channel's quaternion, and whether yaw and roll alone are determined.
+
+    Where a pose has a covariance in the same row, it counts for that: a pose's, not a picture's
+    noise, which lacks the errors that all pictures share.
+    """
+    before = name.removesuffix("quaternion")
+    degrees = euler_deg(rows[name])
+    known = rows.dtype.names or ()
+    turns = None
+    if "covariance" in known and not before:
+        turns = rows["covariance"].reshape(-1, 6, 6)[:, :3, :3]
+    free = 90.0 - np.abs(degrees[:, 1]) > singular_within_deg(turns)
+    found: dict[str, NDArray[Any]] = {
+        f"{before}{part}_deg": np.ascontiguousarray(degrees[:, index])
+        for index, part in enumerate(("yaw", "pitch", "roll"))
+    }
+    return found | {f"{before}yaw_and_roll_determined": free.astype(np.int8)}
 
 
 _PARTS = {

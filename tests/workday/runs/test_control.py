@@ -20,9 +20,10 @@ from scissorcal.verdicts import failed
 from scissorcal.workday.rigs import open_rig
 from scissorcal.workday.runs import control as runs_control
 from scissorcal.workday.runs.capture import capture_advance_into, capture_into
-from scissorcal.workday.runs.control import control_workspace, stated_pose
+from scissorcal.workday.runs.control import control_workspace
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.probe import ensure_probed
+from scissorcal.workday.tracking.stated_pose import stated_pose
 from scissorcal.workday.workspace import Workspace, create_workspace
 
 LONG = """speeds_rad_per_s = [0.05, 0.12, 0.3, 0.7, 1.5]
@@ -172,7 +173,7 @@ def test_a_person_puts_the_plate_in_before_a_camera_looks_for_it(
 
 @pytest.mark.parametrize("text", ["", "1", "1,2,3,4", "a,b", "1,nan", "1;2"])
 def test_a_pose_that_is_none_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match="X_MM,Y_MM,PITCH_DEG"):
+    with pytest.raises(InputError, match="X_MM,Y_MM,RISE_DEG"):
         stated_pose(text)
 
 

@@ -7,12 +7,19 @@ import csv
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
 from scissorcal.foreign import read_foreign_text
 from scissorcal.foreign.formats import TRACK_LINES
+from scissorcal.recipe.euler_angles import (
+    EulerAngles,
+    Quaternion,
+    angles_alone,
+    euler_deg,
+    one_rotation,
+)
 from scissorcal.vision.track import State
 
 
@@ -21,9 +28,15 @@ class PoseRecord(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    quaternion: tuple[float, float, float, float] = Field(description="w, x, y, z; w >= 0")
+    euler_angles: EulerAngles | None = Field(default=None, description="may stand alone")
+    quaternion: Quaternion = Field(default_factory=angles_alone, description="w, x, y, z; w >= 0")
     translation_m: tuple[float, float, float]
     covariance: tuple[tuple[float, ...], ...] | None = None
+
+    @model_validator(mode="after")
+    def _is_one_rotation(self) -> "PoseRecord":
+        one_rotation(self.quaternion, self.euler_angles, "the pose")
+        return self
 
 
 class TrackHead(BaseModel):
@@ -79,10 +92,12 @@ def read_track_lines(path: Path) -> tuple[TrackHead, tuple[TrackRow, ...]]:
     for number, line in enumerate(lines, start=2):
         try:
             rows.append(TrackRow.model_validate_json(line))
-        except ValidationError:
-            if number == len(lines) + 1:
+        except ValidationError as error:
+            mistake = error.errors()[0]
+            if number == len(lines) + 1 and mistake["type"] == "json_invalid":
                 break
-            raise InputError(f"{path}, line {number}: this is no row of a track.") from None
+            why = f" ({mistake['msg']})" if mistake["type"] == "value_error" else ""
+            raise InputError(f"{path}, line {number}: this is no row of a track{why}.") from None
     return head, tuple(rows)
 
 
@@ -101,7 +116,10 @@ def export_track_lines(path: Path, table: Path, *, overwrite: bool = False) -> i
         writer.writerow(_COLUMNS)
         for row in rows:
             pose = row.pose
-            numbers = (*pose.quaternion, *pose.translation_m) if pose else ("",) * 7
+            numbers: tuple[float | str, ...] = ("",) * 10
+            if pose:
+                angles = euler_deg(pose.quaternion).tolist()
+                numbers = (*pose.quaternion, *pose.translation_m, *angles)
             odds = "" if row.odds is None else row.odds
             writer.writerow([row.number, row.time_s, row.state, row.corners, odds, *numbers])
     return len(rows)
@@ -111,4 +129,5 @@ _COLUMNS = (
     *("number", "time_s", "state", "corners", "odds"),
     *(f"quaternion_{part}" for part in "wxyz"),
     *(f"translation_{part}_m" for part in "xyz"),
+    *(f"{part}_deg" for part in ("yaw", "pitch", "roll")),
 )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from scissorcal.calibration.plate.result import PlateFit
+from scissorcal.recipe.euler_angles import CONVENTION
 from scissorcal.report.numbers import finite, percent, short, significant, with_decimals
 from scissorcal.report.panel import (
     Panel,
@@ -34,11 +36,11 @@ def _pose(fit: PlateFit) -> Panel:
     known = [("before the camera", fit.camera_plate)]
     if fit.rig_plate is not None:
         known.append(("in the rig's frame", fit.rig_plate))
-    shown = [(name, _components(pose, name, spread=True)) for name, pose in known]
+    shown = [(name, _components(pose, name)) for name, pose in known]
     if fit.other is not None:
         name = "second pose, before the camera"
-        shown.append((name, _components(fit.other, name, spread=False)))
-    labels = [*(axis for axis in "xyz"), *(f"turn about {axis}" for axis in "xyz")]
+        shown.append((name, _components(replace(fit.other, covariance=None), name)))
+    labels = [*"xyz", "yaw", "pitch", "roll", *(f"turn about {axis}" for axis in "xyz")]
     rows = tuple(
         Row(label, tuple(values[place] for _, values in shown))
         for place, label in enumerate(labels)
@@ -50,8 +52,17 @@ def _pose(fit: PlateFit) -> Panel:
     ]
     notes += [
         f"Quaternion (w, x, y, z) {name}: "
-        f"{', '.join(with_decimals(finite(v), 5) for v in pose.quaternion)}."
+        f"{', '.join(with_decimals(finite(v), 6) for v in pose.quaternion)}."
         for name, pose in known
+    ]
+    notes.append(
+        f"Yaw, pitch and roll are Euler angles, {CONVENTION}. Where they and the quaternion differ "
+        "by rounding, the quaternion counts."
+    )
+    notes += [
+        f"{name[0].upper()}{name[1:]}: {pose.euler_angles.note}"
+        for name, pose in known
+        if pose.euler_angles.note
     ]
     if fit.rig_plate is None:
         notes.append(
@@ -59,8 +70,8 @@ def _pose(fit: PlateFit) -> Panel:
             "FILE` with photographs of the card on the rig, then `scissorcal fit plate`."
         )
     caption = (
-        "Position of the plate's frame and its rotation vector; ± is the standard deviation, for a "
-        "turn that of a small one about the axis."
+        "Position of the plate's frame, its Euler angles and its rotation vector; ± is the "
+        "standard deviation, for a turn about an axis that of a small one."
     )
     return Panel(
         f"{PART}-pose", PART, "Pose of the plate", _sentence(fit), rows,
@@ -68,15 +79,18 @@ def _pose(fit: PlateFit) -> Panel:
     )  # fmt: skip
 
 
-def _components(pose: Pose, name: str, *, spread: bool) -> list[Value]:
+def _components(pose: Pose, name: str) -> list[Value]:
     sd = np.full(6, np.nan)
-    if spread and pose.covariance is not None:
+    if pose.covariance is not None:
         sd = np.sqrt(np.maximum(np.diag(pose.covariance), 0.0))
     degrees = float(np.degrees(1.0))
+    angles = pose.euler_angles
+    euler = (angles.yaw_deg, angles.pitch_deg, angles.roll_deg)
     return [
         number(name, scale * value, unit, sd=scale * own, digits=4)
         for values, sds, scale, unit in (
             (pose.translation_m, sd[3:], 1e3, "mm"),
+            (euler, angles.sd_deg or (np.nan,) * 3, 1.0, "°"),
             (pose.rotation_vector, sd[:3], degrees, "°"),
         )
         for value, own in zip(values, sds, strict=True)

@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.recipe.euler_angles import EulerAngles
 
 Array = NDArray[np.float64]
 
@@ -32,6 +34,9 @@ class Pose:
     >>> turned.apply([[1.0, 0.0, 0.0]]).round(6)
     array([[0.1, 1. , 0. ]])
     """
+
+    also_written: ClassVar[tuple[str, ...]] = ("euler_angles",)
+    """Properties that stand in JSON beside the fields."""
 
     quaternion: tuple[float, float, float, float]
     translation_m: tuple[float, float, float]
@@ -96,6 +101,11 @@ class Pose:
         """The rotation vector (3,) in rad, of length pi at most."""
         w, *axis = self.quaternion
         return _turn(w, np.array(axis))
+
+    @property
+    def euler_angles(self) -> EulerAngles:
+        """The rotation as yaw, pitch and roll in degrees; the quaternion counts."""
+        return EulerAngles.of(self.quaternion, self.covariance)
 
     def apply(self, points: ArrayLike) -> Array:
         """Points (n, 3) of frame b, in frame a."""

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import PATH
+from scissorcal.recipe.euler_angles import quaternion_words
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.runs.cut import edge_of_photographs
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.runs.probe import Say, ensure_probed
+from scissorcal.workday.tracking.stated_pose import stated_pose
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -78,10 +80,10 @@ def control_workspace(
     """Press on the plate and follow the path in ``path_file`` (CSV) with the rig on ``device``.
 
     ``force_N`` and ``speed_mm_per_s`` hold where the file does not state them. The plate stands
-    where ``source`` says, or ``pose`` ("X_MM,Y_MM,PITCH_DEG": its origin in the rig's plane and its
-    turn about the pivot's axis), or where ``camera`` (a camera's number, or "sim" with the device
-    "sim") and contacts have it while the path is followed, or where the fit of its photographs
-    found it. A person is asked for the plate before a source or camera looks for it, else once the
+    where ``source`` says, or ``pose`` (text; `workday.tracking.stated_pose` reads it), or where
+    ``camera`` (a camera's number, or "sim" with the device "sim") and contacts have it while the
+    path is followed, or where the fit of its photographs found it. A person is asked for the plate
+    before a source or camera looks for it, else once the
     blades are over its place. Mass, inertia and friction are those of the fits of both axes; the
     surface and what it is made of are the recipe's (plate.surface, plate.touch). Samples and
     telemetry go to captures/control-<stamp>.mcap unless ``record`` is False; with them the rows of
@@ -167,34 +169,14 @@ def _camera(
     return PlateCamera(engine, engine.recipe, camera, device, seed=seed, realtime=realtime)
 
 
-def stated_pose(text: str) -> "PoseSource":
-    """A pose as it is typed: the plate's origin in the rig's plane (mm), and its pitch (deg).
-
-    >>> stated_pose("20,10,4")(0.0, None).translation.tolist()
-    [0.02, 0.01, 0.0]
-    """
-    from scissorcal.tracking.plate_pose import fixed_pose, level_plate
-
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
-        raise InputError(
-            f"The pose '{text[:60]}' is none: give X_MM,Y_MM,PITCH_DEG, such as 20,10,4, the place "
-            "of the plate's origin in the rig's plane and its turn about the pivot's axis."
-        )
-    x, y, pitch = (*numbers, 0.0)[:3]
-    return fixed_pose(*level_plate((x, y, 0.0), pitch))
-
-
 def _pose_source(engine: Engine, pose: str | None) -> "PoseSource":
     import numpy as np
 
     from scissorcal.tracking.plate_pose import fixed_pose
 
     if pose is not None:
-        return stated_pose(pose)
+        stated = stated_pose(pose)
+        return fixed_pose(stated.matrix, np.asarray(stated.translation_m))
     try:
         fit = load_result(engine, "plate")
     except MissingError as error:
@@ -302,7 +284,10 @@ def _open_writer(
 def _told(pose: str | None, camera: str, source: "PoseSource | None") -> str:
     """Where the plate's pose was from, as an end of a sentence."""
     if pose is not None:
-        return "as it was stated"
+        stated = stated_pose(pose)
+        place = ", ".join(f"{1e3 * value:.2f}" for value in stated.translation_m)
+        turn = f"{stated.euler_angles.words}; {quaternion_words(stated.quaternion)}"
+        return f"as it was stated, ({place}) mm, {turn}"
     return "where it was tracked" if source or camera != NONE else "as it was fitted"
 
 

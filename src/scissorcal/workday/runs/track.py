@@ -70,6 +70,11 @@ class TrackResult:
     notes: tuple[str, ...]
 
     @property
+    def pose(self) -> Pose:
+        """The pose at the last row, with its covariance."""
+        return Pose(self.quaternion, self.translation_m, np.array(self.covariance))
+
+    @property
     def drop_outs(self) -> int:
         """Pictures without a pose."""
         return self.pictures - self.poses

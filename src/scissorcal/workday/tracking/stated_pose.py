@@ -1,0 +1,78 @@
+"""A plate's pose in the rig's frame, as it is typed."""
+
+import math
+
+from scissorcal.errors import InputError
+from scissorcal.recipe.euler_angles import EulerAngles, one_rotation
+from scissorcal.tracking.plate_pose import level_plate
+from scissorcal.vision.geometry.pose import Pose
+
+_PLACE, _ANGLES, _QUATERNION = "xyz", ("yaw", "pitch", "roll"), ("qw", "qx", "qy", "qz")
+_KEYS = (*_PLACE, *_ANGLES, *_QUATERNION)
+
+
+def stated_pose(text: str) -> Pose:
+    """A pose by its place (mm) and its rotation, by Euler angles (degrees) or a quaternion.
+
+    "x=20,y=10,z=0,yaw=4,pitch=0,roll=-90" and "x=20,y=10,z=0,qw=1,qx=0,qy=0,qz=0" are poses in
+    space; z is 0 where it is not given. "20,10,4" is short for a plate that lies level on the rig's
+    plane and rises by 4 degrees along the cut: that turn about the rig's z is its yaw.
+
+    Raises InputError where the text is no pose, or both rotations are given and differ.
+
+    >>> stated_pose("20,10,4").euler_angles.words
+    'yaw 4.00, pitch 0.00, roll -90.00 deg'
+    """
+    return _by_keys(text) if "=" in text else _short(text)
+
+
+def _short(text: str) -> Pose:
+    numbers = [_number(part) for part in text.split(",")]
+    if len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
+        raise _no_pose(text)
+    x, y, rise = (*numbers, 0.0)[:3]
+    return Pose.from_matrix(*level_plate((x, y, 0.0), rise))
+
+
+def _by_keys(text: str) -> Pose:
+    given: dict[str, float] = {}
+    for part in text.split(","):
+        key, _, value = part.partition("=")
+        key, number = key.strip(), _number(value)
+        if key not in _KEYS:
+            raise InputError(
+                f"The pose '{text[:100]}' has the unknown '{key[:20]}'. Its keys are x, y, z (mm), "
+                "yaw, pitch, roll (degrees) or qw, qx, qy, qz."
+            )
+        if key in given or not math.isfinite(number):
+            raise _no_pose(text)
+        given[key] = number
+    for keys in (("x", "y"), _ANGLES, _QUATERNION):
+        lacking = [key for key in keys if key not in given]
+        if lacking and (len(lacking) < len(keys) or keys == ("x", "y")):
+            raise InputError(
+                f"The pose '{text[:100]}' lacks {' and '.join(lacking)}: give "
+                f"{', '.join(keys)} together."
+            )
+    quaternion = [given[key] for key in _QUATERNION] if "qw" in given else None
+    angles = None
+    if "yaw" in given:
+        angles = EulerAngles(given["yaw"], given["pitch"], given["roll"])
+    turn = one_rotation(quaternion, angles, "the stated pose")
+    x, y, z = (1e-3 * given.get(key, 0.0) for key in _PLACE)
+    return Pose(turn, (x, y, z))
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _no_pose(text: str) -> InputError:
+    return InputError(
+        f"The pose '{text[:100]}' is none: give X_MM,Y_MM,RISE_DEG, such as 20,10,4, the place of "
+        "the plate's origin in the rig's plane and its turn about the pivot's axis; or each number "
+        "by its name, such as x=20,y=10,z=0,yaw=4,pitch=0,roll=-90."
+    )
