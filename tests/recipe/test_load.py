@@ -286,8 +286,12 @@ def test_a_share_is_at_most_all_of_it() -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["a_" * 200_000 + "b = 1\n" + PAPER, "a_m" + "1" * 5000 + " = 1\n" + PAPER]
-    + [".".join(["a"] * 3000) + " = 1\n" + PAPER, 'x = "' + "y" * 100_000 + '"\n' + PAPER],
+    [
+        "a_" * 200_000 + "b = 1\n" + PAPER,
+        "a_m" + "1" * 5000 + " = 1\n" + PAPER,
+        ".".join(["a"] * 3000) + " = 1\n" + PAPER,
+        'x = "' + "y" * 100_000 + '"\n' + PAPER,
+    ],
     ids=["long key", "power of 5000 digits", "deep table", "long value"],
 )
 def test_long_names_give_short_messages(text: str) -> None:
