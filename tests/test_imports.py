@@ -159,7 +159,7 @@ LOADS = {
     "package": (
         "import scissorcal.package.build, scissorcal.workday.runs.package\n",
         {"scipy", "cv2", "h5py", "mcap", "scissorcal.inference", "scissorcal.vision.blade"},
-        440,
+        442,
     ),
     "report": (
         "import scissorcal.report, scissorcal.workday.runs.report\n"

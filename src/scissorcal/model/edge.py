@@ -40,8 +40,8 @@ class Edge:
 
     Parameters may be arrays of one shape that broadcasts with the stations, such as (draws, 1);
     the weights then have one axis more. ModelError for an unknown family, for a number that is not
-    finite, a taper beyond a right angle, a length that is not above 0, weights that are fewer than
-    4, and a bend of a family that has none.
+    finite, a taper beyond a right angle, a length that is not above 0, fewer than 4 weights of
+    a spline, and weights of another family.
 
     >>> float(Edge("line", offset_m=-0.008, taper_rad=0.0, length_m=0.07).offset_at(0.03))
     -0.008
@@ -76,10 +76,6 @@ class Edge:
                 )
         elif np.shape(self.spline_m)[-1]:
             raise ModelError(f'An edge with weights is a "spline", not a "{self.family}".')
-        if self.family == "line" and _any(self.curvature_per_m):
-            raise ModelError('An edge with a curvature is an "arc" or a "cubic", not a "line".')
-        if self.family in ("line", "arc") and _any(self.bend_per_m2):
-            raise ModelError(f'An edge with a bend is a "cubic", not a "{self.family}".')
 
     @property
     def straight(self) -> bool:
@@ -383,10 +379,6 @@ def _turning_stations(edge: Edge, tilt: Array) -> Array:
     turns = ends[:-1] + shares * np.diff(ends)
     borders = np.broadcast_to(ends, (len(tilt), len(ends)))
     return np.sort(np.concatenate([borders, *turns], axis=1), axis=1)
-
-
-def _any(value: float | Array) -> bool:
-    return value != 0.0 if isinstance(value, float) else bool(np.any(value))
 
 
 def _plain(value: Array) -> float | Array:

@@ -13,7 +13,7 @@ from tests.calibration.cut.path.made import record
 from tests.calibration.truth import sweep
 from tests.package.fits import friction_fit
 
-RATE, LEVEL = 0.1, 0.015
+RATE, LEVEL = 0.1, 0.05
 NOISE = {"noise_white_Nm": 1e-3, "noise_slow_Nm": 5e-4, "noise_slow_time_s": 0.01}
 
 
@@ -24,6 +24,8 @@ def bent(spread: float):
     rng = np.random.default_rng(4)
     stribeck = 0.003 * np.exp(spread * rng.standard_normal(2000))
     scale = 0.1 * np.sqrt(stribeck / 0.003)
+    most = (LEVEL - 1e-4) / np.exp(-((RATE / scale) ** 2))  # Coulomb friction stays above 0
+    stribeck = np.minimum(stribeck, most)
     coulomb = LEVEL - stribeck * np.exp(-((RATE / scale) ** 2))
     draws = fit.draws.copy()
     point = fit.map_point.copy()
