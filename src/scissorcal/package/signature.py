@@ -61,5 +61,5 @@ def unasked_words(manifest: Manifest) -> str:
         )
     return (
         "Its hashes show that it is whole, not who made it: anyone who can write the file can "
-        "write them. 'scissorcal package build --key FILE' signs it, and --trusted-key asks for that."
+        "write them. 'scissorcal package build --key FILE' signs it, --trusted-key asks for that."
     )
