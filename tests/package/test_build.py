@@ -267,7 +267,7 @@ def test_a_package_from_a_failed_fit_says_so_on_every_use(tmp_path: Path) -> Non
     judged = {verdict.check: verdict for verdict in summary.verdicts}
     assert (judged["failed fits"].status, judged["failed fits"].why) == ("fail", sentence)
     assert sentence in summary.warnings
-    assert check_package(summary.path) == summary.verdicts
+    assert check_package(summary.path)[:-1] == summary.verdicts, "all but the signature"
     with pytest.warns(FailedFitsWarning, match="failed 1 check") as caught:
         package = open_package(summary.path)
     assert caught[0].filename == __file__

@@ -26,6 +26,7 @@ def read(tmp_path: Path, text: str) -> object:
         'remark,file,advance_mm,opening_deg\n"a, b",a/rig-01.jpg,30,25\n'
         ",C:\\b\\rig-02.jpg,40.5,-1\n",
         "file,advance_mm,opening_deg\nrig-01.jpg,30,25\nrig-02.jpg,40.5,-1\nrig-01.jpg,30,25\n",
+        'file, advance_mm, opening_deg\n"rig-01.jpg", "30", 25\n"rig-02.jpg", "40.5", -1\n',
     ],
 )
 def test_columns_stand_in_any_order(tmp_path: Path, text: str) -> None:

@@ -60,6 +60,6 @@ def unasked_words(manifest: Manifest) -> str:
             "package: --trusted-key asks for a key that you know."
         )
     return (
-        "Its hashes show that it is whole, not who made it: anyone who writes the file can write "
-        "them. 'scissorcal package build --key FILE' signs it, and --trusted-key asks for that."
+        "Its hashes show that it is whole, not who made it: anyone who can write the file can "
+        "write them. 'scissorcal package build --key FILE' signs it, --trusted-key asks for that."
     )

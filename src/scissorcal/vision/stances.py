@@ -28,7 +28,8 @@ def read_stances(path: Path) -> Stances:
     the file and line that is wrong: a column that is missing or there twice, a line with more or
     fewer cells than the first, what is no number, and a photograph with two stances.
     """
-    rows = csv.reader(io.StringIO(read_foreign_text(path, STANCES), newline=""), strict=True)
+    text = io.StringIO(read_foreign_text(path, STANCES), newline="")
+    rows = csv.reader(text, strict=True, skipinitialspace=True)
     try:
         head = [name.strip() for name in next(rows, [])]
         if any(head.count(name) != 1 for name in COLUMNS):

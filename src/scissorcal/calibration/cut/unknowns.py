@@ -1,7 +1,6 @@
 """Bounds on the scene's torque from quantities that were not measured: zeros, edge, load."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,11 +82,8 @@ class SceneMean:
 
     def torque(self, away_rad: float = 0.0, **edge: float) -> float:
         """Mean torque (N m), with openings or fields of the edge larger by so much."""
-        shape = self.cutting.edge
-        moved: dict[str, Any] = {field: getattr(shape, field) + by for field, by in edge.items()}
-        if "curvature_per_m" in edge and shape.family == "line":
-            moved["family"] = "arc"
-        cutting = replace(self.cutting, edge=replace(shape, **moved))
+        moved = {field: getattr(self.cutting.edge, field) + by for field, by in edge.items()}
+        cutting = replace(self.cutting, edge=replace(self.cutting.edge, **moved))
         opening = self.opening + away_rad
         place = self.contact
         if cutting.fracture_energy is not None:
