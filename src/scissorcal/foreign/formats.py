@@ -123,6 +123,9 @@ REPORT = Format(
     "a report's data (report.json)", 50 * _MB, "Run 'scissorcal report' again.", ("report", "json")
 )
 """A page with its pictures has 5 MB, its twin less."""
+PAGE = Format(
+    "a report (report.html)", 50 * _MB, "Run 'scissorcal report' again.", ("html", "text")
+)
 
 SIGNATURE = Format(
     "a signature",

@@ -15,7 +15,7 @@ from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError, file_error
 from scissorcal.files import replacing
 from scissorcal.foreign import read_foreign, read_foreign_text
-from scissorcal.foreign.formats import REPORT, SIGNATURE
+from scissorcal.foreign.formats import PAGE, REPORT, SIGNATURE
 from scissorcal.identity import bytes_digest
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN, Review
 from scissorcal.recipe.schema import Recipe
@@ -151,7 +151,7 @@ def sign_page(html: Path, review: Review) -> None:
     from scissorcal.report.signature_block import with_signature
 
     try:
-        page = with_signature(read_foreign_text(html, REPORT), review)
+        page = with_signature(read_foreign_text(html, PAGE), review)
         with replacing(html) as part:
             part.write_text(page, encoding="utf-8")
     except OSError as error:

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scissorcal.foreign import read_foreign
-from scissorcal.foreign.formats import REPORT
+from scissorcal.foreign.formats import PAGE
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN
 from scissorcal.recipe.plate_layers import drawings
 from scissorcal.report.signature_block import unsigned_digest, with_signature
@@ -88,4 +88,4 @@ def _shows(page: Path, review: "Review") -> bool:
 
 def _page_text(page: Path) -> str:
     """A page whatever its bytes: it is compared, not shown."""
-    return read_foreign(page, REPORT).decode("utf-8", errors="surrogateescape")
+    return read_foreign(page, PAGE).decode("utf-8", errors="surrogateescape")

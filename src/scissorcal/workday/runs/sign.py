@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from scissorcal.errors import InputError, MissingError
 from scissorcal.files import replacing
 from scissorcal.foreign import read_foreign
-from scissorcal.foreign.formats import REPORT
+from scissorcal.foreign.formats import PAGE
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.fit import available
 
@@ -83,7 +83,7 @@ def _write(path: Path, html: Path, review: "Review") -> None:
     """Sign the page and write the signature, or leave both as they were."""
     from scissorcal.report import sign_page
 
-    before = read_foreign(html, REPORT)
+    before = read_foreign(html, PAGE)
     try:
         with replacing(path) as part:
             part.write_text(review.model_dump_json(indent=2) + "\n", encoding="utf-8")
