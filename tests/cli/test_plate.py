@@ -176,7 +176,7 @@ def test_no_such_camera_or_video(
     assert "gone.mp4 does not exist" in said.err
     said = cli(*words, "--camera", album / "stances.csv")
     assert said.code == 2
-    assert "is not a readable video" in said.err
+    assert "stances.csv is text, not a video" in said.err
     assert captured(workspace) == []
 
 

@@ -188,10 +188,11 @@ def test_the_surface_and_its_material_are_the_recipes(fitted: Workspace, tmp_pat
     late["delay_s"] = {"mean": 4e-3, "sd": 1e-4}
     other.probe_path.write_text(json.dumps(late))
     recipe = other.recipe_path
-    recipe.write_text(recipe.read_text() + "\n[plate.touch]\nstiffness_N_per_mm = 900\n")
+    meant = 'unusual = ["plate.touch.stiffness_N_per_mm"]\n' + recipe.read_text()
+    recipe.write_text(meant + "\n[plate.touch]\nstiffness_N_per_mm = 900\n")
     with pytest.raises(InputError, match="No gains hold a force against 900 N/mm"):
         control_workspace(other, "sim", path_of(other), pose="20,10,3")
-    text = re.sub(r"stiffness.*", "peak_N = 1.0", recipe.read_text())
+    text = re.sub(r"(?m)^stiffness.*", "peak_N = 1.0", recipe.read_text())
     recipe.write_text(text + '[plate.surface]\nkind = "sphere"\nradius_mm = 20.0\n')
     with pytest.raises(InputError, match="line 3: x = 30 mm leaves the surface"):
         control_workspace(other, "sim", path_of(other), pose="20,10,3")
