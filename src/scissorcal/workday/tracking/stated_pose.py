@@ -71,7 +71,8 @@ def _refuse_radians(angles: EulerAngles, text: str) -> None:
     numbers = (angles.yaw_deg, angles.pitch_deg, angles.roll_deg)
     if any(abs(value) > 2.0 * math.pi for value in numbers):
         return
-    faces = [_face_deg(angles), _face_deg(EulerAngles(*map(math.degrees, numbers)))]
+    yaw, pitch, roll = (math.degrees(value) for value in numbers)
+    faces = _face_deg(angles), _face_deg(EulerAngles(yaw, pitch, roll))
     if faces[0] > PRESSED_WITHIN_DEG >= faces[1]:
         raise InputError(
             f"The pose '{text[:100]}' turns the plate's face {faces[0]:.0f} deg away from the "
