@@ -47,6 +47,7 @@ def test_a_specimens_angles_are_those_of_the_conventions_table() -> None:
         ("x=1,y=2,yaw=0,pitch=nan,roll=0", "is none"),
         ("x=1,y=2,yaw=,pitch=1,roll=0", "is none"),
         ("x=1,y=2,yaw=400,pitch=0,roll=0", "400 degrees is none"),
+        ("x=1,y=2,yaw=0.05,pitch=0,roll=-1.5708", r"88 deg away.* radians .* by 3 deg"),
         ("x=1,y=2,qw=1,qx=1,qy=0,qz=0", r"length 1\.41421"),
         ("x=1,y=2,qw=1,qx=0,qy=0,qz=0,yaw=0,pitch=0,roll=-90", r"differ by 90\.00 deg"),
     ],

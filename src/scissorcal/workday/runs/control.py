@@ -108,6 +108,8 @@ def control_workspace(
         )
     eye = _camera(engine, camera, device, pose, seed=seed, realtime=realtime)
     known = None if eye else source or _pose_source(engine, pose)
+    if pose is not None and say:
+        say(f"The plate stands {_told(pose, camera, source)}.")
     touch = recipe.plate.touch
     fits = _fits(engine)
     edge = blade_edge(engine, recipe)

@@ -8,6 +8,8 @@ from scissorcal.tracking.plate_pose import level_plate
 from scissorcal.vision.geometry.pose import Pose
 
 _PLACE, _ANGLES, _QUATERNION = "xyz", ("yaw", "pitch", "roll"), ("qw", "qx", "qy", "qz")
+PRESSED_WITHIN_DEG = 60.0
+"""Of a normal to the rig's plane on which a tip presses (`control.contours.LEAST_SHARE`)."""
 _KEYS = (*_PLACE, *_ANGLES, *_QUATERNION)
 
 
@@ -58,9 +60,30 @@ def _by_keys(text: str) -> Pose:
     angles = None
     if "yaw" in given:
         angles = EulerAngles(given["yaw"], given["pitch"], given["roll"])
+        _refuse_radians(angles, text)
     turn = one_rotation(quaternion, angles, "the stated pose")
     x, y, z = (1e-3 * given.get(key, 0.0) for key in _PLACE)
     return Pose(turn, (x, y, z))
+
+
+def _refuse_radians(angles: EulerAngles, text: str) -> None:
+    """Refuse angles by which the face looks past the blades, but not if they are radians."""
+    numbers = (angles.yaw_deg, angles.pitch_deg, angles.roll_deg)
+    if any(abs(value) > 2.0 * math.pi for value in numbers):
+        return
+    yaw, pitch, roll = (math.degrees(value) for value in numbers)
+    faces = _face_deg(angles), _face_deg(EulerAngles(yaw, pitch, roll))
+    if faces[0] > PRESSED_WITHIN_DEG >= faces[1]:
+        raise InputError(
+            f"The pose '{text[:100]}' turns the plate's face {faces[0]:.0f} deg away from the "
+            f"blades; in radians its angles would turn it by {faces[1]:.0f} deg. Give degrees."
+        )
+
+
+def _face_deg(angles: EulerAngles) -> float:
+    """Angle between the plate's z, out of its face, and the rig's y, towards the blades."""
+    up = Pose(angles.quaternion, (0.0, 0.0, 0.0)).matrix[1, 2]
+    return math.degrees(math.acos(min(1.0, max(-1.0, up))))
 
 
 def _number(text: str) -> float:
