@@ -87,8 +87,8 @@ def _refuse_torn(
     if torn and all(_cells(row.text, delimiter)) and not any(map(_is_number, heading)):
         raise InputError(
             f"{path}, line {row.number} has {width} cells, and line {before[-1].number} has "
-            f"{len(heading)} headings: commas within numbers, as for decimals or thousands, cannot "
-            "be told from those between cells. Export the log with dots, or with semicolons."
+            f"{len(heading)} headings: commas within numbers, as for decimals or thousands, look "
+            "like those between cells. Export the log with dots, or with semicolons."
         )
 
 
