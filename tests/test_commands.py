@@ -218,6 +218,7 @@ def test_no_command_is_made_from_the_name_of_a_step() -> None:
 
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
 OF_OTHERS = {
+    "--once",  # ros2 topic echo
     *("--force-reinstall", "--no-deps", "--nthreads"),  # of pip, and of dask
     *("--check", "--write"),  # of this project's own scripts
     "--picture",  # a name in a style sheet

@@ -63,7 +63,7 @@ WRONG: list[tuple[Any, str, tuple[Any, ...]]] = [
     (CUTTING, "moving_blades", (0, 3, 1.5, math.nan, "both")),
     (CUTTING, "upper_face_m", (*NEVER, -1e-4)),
     (CUTTING, "fracture_energy", (*NEVER, 0.0, -1.0)),
-    (CUTTING, "kappa", (*NEVER, 0.0, -0.5, 1.7)),
+    (CUTTING, "kappa", (*NEVER, -0.5, 1.7)),
     (CUTTING, "rate_damping", (*NEVER, -1.0)),
     (LAW, "values", tuple({"coulomb_pos": one} for one in (*NEVER, -0.01))),
     (LAW, "values", ({"presliding_share": 1.2}, {"presliding_share": -0.1})),

@@ -49,7 +49,7 @@ class Cutting:
     the torque's law: ``work`` derives from the stored energy, ``eq4`` is tau = x_c g cos(alpha).
     ``rate_damping`` c (s/m) makes the force at the edge g (1 + c d(delta)/dt), never below 0.
     ModelError for other blades or closures, for a fracture energy that is not above 0, a kappa
-    that is not above 0 and at most 1, a negative upper face or damping, and what is not finite.
+    below 0 or above 1, a negative upper face or damping, and what is not finite.
     """
 
     edge: Edge
@@ -66,7 +66,7 @@ class Cutting:
         check_numbers("the height of the plate's upper face (m)", self.upper_face_m, 0.0)
         if self.fracture_energy is not None:
             check_numbers("the fracture energy of a cut (J/m)", self.fracture_energy, SMALLEST)
-        check_numbers("kappa, the share at which a crack stops,", self.kappa, SMALLEST, 1.0)
+        check_numbers("kappa, the share at which a crack stops,", self.kappa, 0.0, 1.0)
         check_name("closure of a cut", self.closure, _CLOSURES)
         check_numbers("the rate damping of a cut (s/m)", self.rate_damping, 0.0)
 
