@@ -41,7 +41,7 @@ def grouped_column(values: Array, cell: Callable[[int], str]) -> int | None:
     ``values`` (n,) are the numbers as read, ``cell`` gives the text of a row. In 995, 1.000, 1.005
     the dot parts thousands: all cells with a mark have three digits behind it, those without are
     below 1,000, and both join only if the mark is none of a decimal. A column in which all cells
-    have three decimals is read as it stands.
+    have three decimals is read as decimals.
 
     >>> cells = ["990", "995", "1.000", "1.005"]
     >>> grouped_column(np.array([float(text) for text in cells]), cells.__getitem__)
