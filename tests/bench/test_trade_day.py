@@ -3,7 +3,9 @@
 import pytest
 
 from scissorcal.bench.trade.knob import make_knob, scene_knobs
+from scissorcal.bench.trade.result import Trade
 from scissorcal.bench.trade.study import tasks_of
+from scissorcal.errors import InputError
 from scissorcal.workday.demo.day import make_day
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.bench import TradeSettings, trade_workspace
@@ -32,10 +34,10 @@ def test_every_knob_of_a_scene_has_one_present_setting(day: Workspace) -> None:
 
 @pytest.mark.slow
 def test_a_day_is_measured_within_a_budget_and_goes_on(day: Workspace) -> None:
-    chosen = TradeSettings(knobs=("effort", "tables"), budget_s=30.0)
-    first = trade_workspace(day, chosen, workers=2).trade
+    knobs = ("effort", "tables")
+    first, budget_s = measured_in_part(day, knobs)
     case = load_case(Engine.of(day))
-    planned = tasks_of(case, chosen.knobs)
+    planned = tasks_of(case, knobs)
     assert 0 < first.measured == first.measured_now < len(planned)
     for curve in first.curves:
         named = [*(point.setting.label for point in curve.points), *curve.unmeasured]
@@ -46,5 +48,20 @@ def test_a_day_is_measured_within_a_budget_and_goes_on(day: Workspace) -> None:
     for point in tables.points:
         assert point.errors[tables.error].value > 0.0
         assert point.costs[tables.cost].median > 0.0
-    second = trade_workspace(day, chosen, workers=2).trade
+    second = trade_workspace(day, TradeSettings(knobs, budget_s=budget_s), workers=2).trade
     assert second.measured == first.measured + second.measured_now
+
+
+def measured_in_part(day: Workspace, knobs: tuple[str, ...]) -> tuple[Trade, float]:
+    """A run whose budget is enough for some of the measurements, on a computer of any speed.
+
+    The budget is doubled until it is no longer refused as too small for any measurement, so that
+    it is at most about twice what the first few measurements take.
+    """
+    for doubling in range(8):
+        chosen = TradeSettings(knobs=knobs, budget_s=3.0 * 2.0**doubling)
+        try:
+            return trade_workspace(day, chosen, workers=2).trade, 3.0 * 2.0**doubling
+        except InputError as refused:
+            assert "too small for any measurement" in str(refused)
+    raise AssertionError("no budget up to 384 s was enough for one measurement")
