@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
+from benchmarks.extremes.cells import Cell, Found, judged
 from numpy.typing import NDArray
 
-from scissorcal.bench.extremes.cells import Cell, Found, judged
 from scissorcal.inference import Posterior, Problem, infer
 
 Array = NDArray[np.float64]

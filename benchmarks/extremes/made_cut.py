@@ -7,9 +7,9 @@ fitted.
 from dataclasses import dataclass
 
 import numpy as np
+from benchmarks.extremes.made_friction import MadeFriction, Motion, record, sweeps
 from numpy.typing import NDArray
 
-from scissorcal.bench.extremes.made_friction import MadeFriction, Motion, record, sweeps
 from scissorcal.recording import Recording, Stroke
 
 Array = NDArray[np.float64]
