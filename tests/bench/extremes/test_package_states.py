@@ -75,25 +75,18 @@ def test_friction_of_the_tables_is_that_of_the_kernel(packages):
     assert float(table_friction(packages[1].tables, 0.4, 0.5)) == 0.0
 
 
-def test_tables_off_by_more_than_the_bound_are_wrong_in_the_scene_alone(packages):
+def test_an_edge_off_by_more_than_the_bound_is_wrong_in_the_scene_alone(packages):
     package = packages[0]
     state = scene_states(package, 1)[0]
     assert compare_package(state, package).outcome == "right"
-    edge = package.arrays["tables/response.npy"].copy()
-    edge[1:] *= 2.0
-    kink = package.arrays["tables/edge.npy"].copy()
-    kink[1] += 1e-3
-    damaged = replace(
-        package,
-        arrays={**package.arrays, "tables/response.npy": edge, "tables/edge.npy": kink},
-    )
-    assert compare_package(state, damaged).outcome == "wrong"
+    edge = package.arrays["tables/edge.npy"].copy()
+    edge[1] += 2e-3
+    arrays = {**package.arrays, "tables/edge.npy": edge}
+    assert compare_package(state, replace(package, arrays=arrays)).outcome == "wrong"
     outside = replace(state, contact=0.9 * package.manifest.ranges.contact_m[0])
     answer = compare_package(outside, package)
-    assert (answer.outcome, "outside what the package covers" in answer.sentence) == (
-        "flagged",
-        True,
-    )
+    assert answer.outcome == "flagged"
+    assert "outside what the package covers" in answer.sentence
 
 
 def test_an_error_of_friction_in_a_step_is_found(packages, monkeypatch):

@@ -73,7 +73,10 @@ def package_states(package: ModelPackage, size: float, seed: int) -> list[State]
         moved += [dict(zip(pair, place, strict=True)) for place in itertools.product(*axes)]
     states = [
         _state(
-            "beyond" if values else "scene", tuple(values), _drawn(ranges, rng) | values, cutting
+            "beyond" if values else "scene",
+            tuple(values),
+            _drawn(ranges, cutting, rng) | values,
+            cutting,
         )
         for values in moved
     ]
@@ -92,7 +95,7 @@ def extreme(name: str, cutting: Cutting, count: int) -> Array:
         return np.linspace(0.0, BEYOND_TIP * cutting.edge.length_m, count)
     if name == "indentation":
         return np.geomspace(1e-12, 0.1, count)
-    half = np.geomspace(1e-6, 1e3, max((count - 1) // 2, 1))
+    half = np.geomspace(1e-6, 1e3, max((count - 1) // 2, 2))
     return np.concatenate([-half[::-1], [0.0], half])
 
 
@@ -134,13 +137,23 @@ def _exact(*numbers: Any) -> tuple[Any, ...]:
     return tuple(mp.mpf(float(number)) for number in numbers)
 
 
-def _drawn(ranges: Ranges, rng: np.random.Generator) -> dict[str, float]:
-    """A place of the scene, both directions of motion alike."""
+def _drawn(ranges: Ranges, cutting: Cutting, rng: np.random.Generator) -> dict[str, float]:
+    """A place of the scene at which the edge touches, where it does; both directions alike."""
+    opening = rng.uniform(*ranges.opening_rad)
+    low, high = ranges.contact_m
+    touched = _contact(cutting, opening, 0.0)
     return {
-        "opening": rng.uniform(*ranges.opening_rad),
+        "opening": opening,
         "opening_rate": rng.choice([-1.0, 1.0]) * rng.uniform(*ranges.opening_rate_rad_per_s),
-        "contact": rng.uniform(*ranges.contact_m),
+        "contact": rng.uniform(low, min(high, touched) if touched > low else high),
     }
+
+
+def _contact(cutting: Cutting, opening: float, indentation: float) -> float:
+    """Where the edge is so deep in the material; NaN where it is nowhere."""
+    edge, beta = cutting.edge, opening / cutting.moving_blades
+    station = edge.station_at_height(cutting.upper_face_m - indentation, beta)
+    return float(station * np.cos(beta) - edge.offset_at(station) * np.sin(beta))
 
 
 def _state(
@@ -150,8 +163,6 @@ def _state(
     opening = min(float(np.float32(values["opening"])), LARGEST_OPENING_rad)
     contact = values.get("contact", math.nan)
     if "indentation" in values:
-        edge, beta = cutting.edge, opening / cutting.moving_blades
-        station = edge.station_at_height(cutting.upper_face_m - values["indentation"], beta)
-        contact = float(station * np.cos(beta) - edge.offset_at(station) * np.sin(beta))
+        contact = _contact(cutting, opening, values["indentation"])
     rate = float(np.float32(values["opening_rate"]))
     return State(band, swept, values, opening, rate, float(np.float32(contact)), cutting)
