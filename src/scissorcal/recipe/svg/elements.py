@@ -132,7 +132,7 @@ class _Shapes:
         """Take an element that nothing around it hides."""
         if tag in names.REFUSED_WHERE_SHOWN and not is_root:
             raise ValueError(names.REFUSED_WHERE_SHOWN[tag])
-        style = names.style_properties(attributes.get("style", ""))
+        style = names.style_properties(attributes.get("style", ""), is_root=is_root)
         if names.hides(style, attributes, "display") == "none":
             self._hidden[-1] = True
             return
