@@ -161,6 +161,8 @@ def _wrong_value(item: Any, fields: Sequence[str]) -> str:
         bound = context.get("max_length", context.get("min_length"))
         words = "at most" if kind == "too_long" else "at least"
         return f"{given} has {context['actual_length']} items, but {words} {bound} are allowed."
+    if kind == "tuple_type" and isinstance(item["input"], str):
+        return f"{given} is text, but this must be a list: [{given}]."
     expected = _EXPECTED.get(kind)
     if kind == "model_type" and fields:
         expected = f"a table with the keys {', '.join(fields)}"

@@ -2,8 +2,9 @@
 
 A number is refused where it lies within a factor of 1.5 of an everyday value that is written in
 another unit, or farther out: then a wrong unit explains it better than an uncommon rig. Of the
-other units only those count whose everyday values stay clear of the everyday range by that factor
-on both sides, so that no number within a factor of 1.5 of the everyday range is ever refused.
+other units only those count whose everyday values lie outside the everyday range (where that holds
+0, clear of it by 1.5 on both sides), and no number within a factor of 1.5 of the everyday range is
+ever refused.
 """
 
 import difflib
@@ -134,15 +135,16 @@ def bounds(key: str) -> tuple[float, float]:
     """
     unit = _unit(key)
     low, high = _everyday(key, unit)
+    apart = MARGIN**2 if EVERYDAY[QUANTITY_OF[key]].least else 1.0  # a range with 0 has no low end
     least, most = 0.0, math.inf
     for other in _others(unit):
         slip = other.factor / unit.factor
-        if low <= 0.0 or max(slip, 1.0 / slip) < MARGIN**2 * high / low:
+        if low <= 0.0 or max(slip, 1.0 / slip) < apart * high / low:
             continue
         if slip > 1.0:
-            least = max(least, MARGIN * high / slip)
+            least = max(least, min(MARGIN * high / slip, low / MARGIN))
         else:
-            most = min(most, low / slip / MARGIN)
+            most = min(most, max(low / slip / MARGIN, MARGIN * high))
     return least, most
 
 
