@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from scissorcal.recipe.locate import key_lines
-from scissorcal.recipe.units import conversion, split_unit
+from scissorcal.recipe.units import conversion, converted, split_unit
 from scissorcal.recipe.unlikely import Unlikely
 
 Path = tuple[str | int, ...]
@@ -242,23 +242,8 @@ def _conversion_hint(key: str, meant: str, value: Any) -> str:
     if factor is None or factor == 1.0:
         return ""
     hint = f" 1 {source.label} = {factor:.6g} {target.label}"
-    converted = _converted(value, factor)
-    return hint + (f", so write {meant} = {converted}." if converted else ".")
-
-
-def _converted(value: Any, factor: float) -> str | None:
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
-        return f"{value * factor:.6g}"
-    if isinstance(value, list) and value:
-        parts = [_converted(item, factor) for item in value]
-        return None if None in parts else f"[{', '.join(str(part) for part in parts)}]"
-    if isinstance(value, Mapping) and "median" in value:
-        parts = [
-            _converted(item, factor if key == "median" else 1.0) for key, item in value.items()
-        ]
-        pairs = ", ".join(f"{key} = {part}" for key, part in zip(value, parts, strict=True))
-        return None if None in parts else f"{{ {pairs} }}"
-    return None
+    number = converted(value, factor)
+    return hint + (f", so write {meant} = {number}." if number else ".")
 
 
 def _fields(model: type[BaseModel], table: Path) -> list[str]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from scissorcal.recipe.everyday import EVERYDAY, Everyday
-from scissorcal.recipe.units import Unit, parse_unit, split_unit
+from scissorcal.recipe.units import Unit, converted, parse_unit, split_unit
 
 Path = tuple[str | int, ...]
 
@@ -179,8 +179,9 @@ def _judged(key: str, path: Path, value: Any) -> list[Unlikely]:
         factor = float(f"{other.factor / unit.factor:.15g}")
         given = "" if other is _SHARE else f" {_label(other)}"
         asked = "a share of 1" if other is _SHARE else f"in{given}"
-        written = f"{path[-1]} = {_written(value, factor)}"
-        so = f", so write {written}" if len(written) <= 100 else ""
+        number = converted(value, factor)
+        written = f"{path[-1]} = {number}"
+        so = f", so write {written}" if number and len(written) <= 100 else ""
         slip = f"Was it {asked}? {size:g}{given} = {size * factor:.4g} {_label(unit)}{so}."
     kept_by = f'If it is meant, add unusual = ["{key}"] above the first [table].'
     return [Unlikely(path, sentence, slip, kept_by)]
@@ -241,14 +242,3 @@ def _largest(value: Any) -> float | None:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         return None
     return abs(float(value))
-
-
-def _written(value: Any, factor: float) -> str:
-    """A value of TOML with its numbers times ``factor``; of a prior only the median."""
-    if isinstance(value, Mapping):
-        pairs = ((k, _written(v, factor if k == "median" else 1.0)) for k, v in value.items())
-        return "{ " + ", ".join(f"{k} = {v}" for k, v in pairs) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(_written(one, factor) for one in value) + "]"
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return f"{value * factor:.6g}" if number else str(value)

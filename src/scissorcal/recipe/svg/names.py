@@ -84,7 +84,7 @@ def refuse_style_sheet(text: str) -> None:
         _refuse_property(key, value, "in a <style>")
 
 
-def hides(properties: dict[str, str], attributes: dict[str, str], key: str) -> str:
+def hiding_value(properties: dict[str, str], attributes: dict[str, str], key: str) -> str:
     """The value of display or visibility of an element; "" where it is inherited."""
     value = properties.get(key, attributes.get(key, "")).strip().lower()
     return "" if value == "inherit" else value

@@ -1,6 +1,5 @@
 """Numbers, vectors, matrices and picture sizes as camera files write them."""
 
-import math
 import re
 from typing import Any
 
@@ -77,14 +76,14 @@ def _with_rows(entry: Entry) -> NDArray[np.float64]:
     rows, columns = number_of(facts.get("rows")), number_of(facts.get("cols", facts.get("columns")))
     if rows is None or columns is None or numbers.ndim > 1:
         return numbers
-    sides = (int(rows), int(columns)) if math.isfinite(rows + columns) else (0, 0)
-    if sides != (rows, columns) or min(sides) < 0 or rows * columns != numbers.size:
+    whole = rows >= 0.0 and rows.is_integer() and columns.is_integer()
+    if not whole or rows * columns != numbers.size:
         raise RefusedError(
             f"it is a matrix of {rows:g} x {columns:g} with {numbers.size} numbers. "
             "Save the file again.",
             entry.place,
         )
-    return numbers.reshape(sides)
+    return numbers.reshape(int(rows), int(columns))
 
 
 def _flat(value: list[Any], place: str) -> tuple[list[float], tuple[int, ...]]:
