@@ -47,6 +47,7 @@ SLIPS = [
     ("offset_mm = -8.0", "offset_mm = -0.008", "offset_mm = -8."),
     ("torque_Nm = 1.0", "torque_Nm = 1000.0", "torque_Nm = 1."),
     ("force_N = 30.0", "force_N = 30000.0", "force_N = 30."),
+    ("force_N = 30.0", "force_slew_N_per_s = 5.0\nforce_N = 30.0", "force_slew_N_per_s = 5000."),
     ("= [0.05, 0.12, 0.3, 0.7, 1.5]", "= [3, 7, 17, 40, 86]", "0.698132, 1.50098]."),
     ("{ median = 5000.0, factor_90 = 10.0 }", "{ median = 5.0, factor_90 = 10.0 }",
      "toughness_J_per_m2 = { median = 5000, factor_90 = 10 }."),
