@@ -172,25 +172,19 @@ def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]"
             answer = _answer(one)
             first, *_ = answer.text.splitlines()
             lines.append(f"{file.name}: {first}")
-            lines += [f"  note: {said}" for said in answer.result["notes"] if not _expected(said)]
+            told = (*one.recording.particular, *answer.result["survey"].notes)
+            lines += [f"  note: {said}" for said in told]
             facts.append(answer.result)
             paths.append(one.path)
     if refused:
-        told = InputError(
+        error = InputError(
             f"{len(refused)} of {len(files)} logs were not imported; the other {len(paths)} were:"
             + "".join(f"\n  {sentence}" for sentence in refused)
         )
-        told.kept = tuple(paths)
-        raise told
+        error.kept = tuple(paths)
+        raise error
     lines.append(f"{len(paths)} logs imported; 'scissorcal recording list' shows them")
     return Answer({"imported": facts}, "\n".join(lines), files=paths)
-
-
-def _expected(note: str) -> bool:
-    """Whether a note tells how a log was read, alike for all, and not what is particular in it."""
-    return note.startswith(("Imported from", "Not in the file", "The recipe has")) or (
-        "strokes were found" in note
-    )
 
 
 def _answer(one: _Imported) -> Answer:
