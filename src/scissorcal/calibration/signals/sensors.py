@@ -157,7 +157,8 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
     long_run = max(FEWEST_IN_RUN, round(LONG_RUN_S / tick_s))
     fewest = max(2 * FEWEST_IN_RUN, round(FEWEST_INVALID_S / tick_s))
     hold, alike = _repetition(values)
-    dead, ends, held = none, tuple[float, ...](), None
+    dead, ends = none, tuple[float, ...]()
+    held = _held_within(values, moves, step, fewest)
     if alike < NOISY:
         by_chance = _longest_by_chance(values[::hold], step)
         long_run = max(long_run, hold * max(FEWEST_IN_RUN, by_chance))
@@ -165,21 +166,30 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
         silent = (values == 0.0) & moves
         if low < 0.0 < high and _long_runs(silent, long_run) >= fewest:
             dead = silent
-        held = _held_within(values, moves, max(fewest, round(UNUSUAL * long_run)))
     else:
         ends = _held_ends(values, moves, step, long_run, fewest)
     cut = np.isin(values, ends)
     return Channel(name, constant, step, cut, dead, low, high, at_ends=at_ends, held=held)
 
 
-def _held_within(values: Array, moves: Mask, fewest: int) -> tuple[int, int] | None:
-    """The longest run of a value (m,) that is no end and not 0, of ``fewest`` moving samples."""
+def _held_within(values: Array, moves: Mask, step: float, fewest: int) -> tuple[int, int] | None:
+    """The longest run of a value (m,) that is no end and not 0, where noise cannot have made it.
+
+    It has ``fewest`` samples while the joint moves, and what lies outside it has noise that repeats
+    a value ``UNUSUAL`` times less often.
+    """
     first, after = _runs(values)
     moving = np.concatenate([[0], np.cumsum(moves)])
     count = moving[after] - moving[first]
     count[np.isin(values[first], (0.0, values.min(), values.max()))] = 0
     longest = int(np.argmax(count))
-    return (int(first[longest]), int(after[longest])) if count[longest] >= fewest else None
+    run = int(first[longest]), int(after[longest])
+    rest = np.delete(values, slice(*run))
+    if count[longest] < fewest or len(rest) < BLOCK:
+        return None
+    hold, alike = _repetition(rest)
+    by_chance = max(FEWEST_IN_RUN, _longest_by_chance(rest[::hold], step))
+    return run if alike < NOISY and count[longest] >= UNUSUAL * hold * by_chance else None
 
 
 def _longest_by_chance(values: Array, step: float) -> int:
