@@ -172,17 +172,17 @@ def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]"
             answer = _answer(one)
             first, *_ = answer.text.splitlines()
             lines.append(f"{file.name}: {first}")
-            told = (*one.recording.particular, *answer.result["survey"].notes)
-            lines += [f"  note: {said}" for said in told]
+            particular = (*one.recording.particular, *answer.result["survey"].notes)
+            lines += [f"  note: {said}" for said in particular]
             facts.append(answer.result)
             paths.append(one.path)
     if refused:
-        error = InputError(
+        told = InputError(
             f"{len(refused)} of {len(files)} logs were not imported; the other {len(paths)} were:"
             + "".join(f"\n  {sentence}" for sentence in refused)
         )
-        error.kept = tuple(paths)
-        raise error
+        told.kept = tuple(paths)
+        raise told
     lines.append(f"{len(paths)} logs imported; 'scissorcal recording list' shows them")
     return Answer({"imported": facts}, "\n".join(lines), files=paths)
 
