@@ -57,7 +57,7 @@ def check_numbers(what: str, value: Any, low: float = -LARGEST, high: float = LA
     raise ModelError(said[0].upper() + said[1:])
 
 
-def check_moving_blades(count: object) -> None:
+def check_moving_blades(count: Any) -> None:
     """ModelError unless one blade moves, or both."""
     if np.ndim(count) or count not in (1, 2):
         raise ModelError(f"1 or 2 blades move, not {str(count)[:60]}.")

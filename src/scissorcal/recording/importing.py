@@ -27,7 +27,8 @@ from scissorcal.recording.resolution import (
 )
 from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_cost, gap_note
-from scissorcal.recording.table import Table, read_table, refuse_no_table, shortened
+from scissorcal.recording.table import Table, shortened
+from scissorcal.recording.table_file import read_table, refuse_no_table
 from scissorcal.recording.wraps import (
     COUNTERS,
     continued,

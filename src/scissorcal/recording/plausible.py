@@ -4,13 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recipe.everyday import EVERYDAY
 from scissorcal.recipe.unlikely import MARGIN
 from scissorcal.recording.recording import Joint
-
-Array = NDArray[np.float64]
 
 MOST_BEYOND = 0.1
 """Share of the samples that may be marks or spikes: a size is what the others have."""
