@@ -40,15 +40,10 @@ def _columns(columns: dict[str, str | int], units: dict[str, str]) -> tuple[str,
 
 LOG = _columns(COLUMNS, UNITS)
 MAT = (*_columns(MAT_COLUMNS, MAT_UNITS), "-s", "motor_torque=gain")
-SURFACE = """
-[plate.surface]
-kind = "spline"
-file = "heights.csv"
-"""
 
 
-def _built_in(added: str) -> str:
-    return recipe_path("paper-80gsm").read_text(encoding="utf-8") + added
+def _drawn() -> str:
+    return recipe_path("paper-80gsm").read_text(encoding="utf-8") + DRAWN
 
 
 def _imported(file: str, *words: str) -> Through:
@@ -94,8 +89,7 @@ COMMANDS: dict[str, Through] = {
     "path CSV": Through(
         "path.csv", ("control", "--device", "sim", "--path", "path.csv", "--pose", "20,10,3")
     ),
-    "drawing SVG": Through("plate.svg", ("plan",), _built_in(DRAWN)),
-    "surface CSV": Through("heights.csv", ("plan",), _built_in(SURFACE)),
+    "drawing SVG": Through("plate.svg", ("plan",), _drawn()),
     "file index": Through(".scissorcal/index.json", ("plan",)),
     "private key": Through(
         "key", ("report", "sign", "--name", "A", "--decision", "accept", "--key", "key")
