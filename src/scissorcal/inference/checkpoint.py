@@ -107,6 +107,6 @@ def _read(path: Path) -> list[Walk]:
             ]
     except Exception as error:
         raise CheckpointError(
-            f"{path}: not a readable checkpoint ({first_line(error)}); move it away, or name another "
-            "file, to start afresh."
+            f"{path}: not a readable checkpoint ({first_line(error)}); move it away, or name "
+            "another file, to start afresh."
         ) from error
