@@ -6,13 +6,11 @@ from dataclasses import replace
 import numpy as np
 from benchmarks.extremes.cells import Cell, Found, judged
 from benchmarks.extremes.made_friction import MadeFriction, Motion, changed, record, sweeps
-from numpy.typing import NDArray
 
 from scissorcal.calibration import FitResult, fit_friction
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording import Recording
 
-Array = NDArray[np.float64]
 Damage = Callable[[Recording, np.random.Generator], Recording | tuple[Recording, ...]]
 
 TRUTH = MadeFriction()

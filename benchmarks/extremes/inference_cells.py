@@ -8,11 +8,10 @@ import numpy as np
 from benchmarks.extremes.cells import Cell, Found, judged, refusal, worst_of
 from benchmarks.extremes.conjugate import Linear, line
 from benchmarks.extremes.shapes import shape_cells
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference import NotFiniteError, Posterior, infer
 
-Array = NDArray[np.float64]
 Made = Callable[[np.random.Generator], Linear]
 
 DRAWN = 0.15

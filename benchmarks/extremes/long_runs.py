@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 from benchmarks.extremes.cells import Found, judged, worst_of
 from benchmarks.extremes.states import fitted_tables, made_state
-from numpy.typing import NDArray
 
 from scissorcal.bench.extremes.long_runs import energy_of_strokes
 from scissorcal.bench.extremes.states import State
 from scissorcal.kernel import CrackLaw, Curve, Kernel, ModelTables, StepFlag, walk_crack
 from scissorcal.model import Response, edge_height, settled_contact
-
-Array = NDArray[np.float64]
 
 CLOSING_rad = 1e-5
 CONTACT_m = 0.01

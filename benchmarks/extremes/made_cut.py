@@ -8,11 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from benchmarks.extremes.made_friction import MadeFriction, Motion, record, sweeps
-from numpy.typing import NDArray
 
 from scissorcal.recording import Recording, Stroke
-
-Array = NDArray[np.float64]
 
 STROKES_A_SHEET = 4
 STEP_M, BEGIN_M = 0.034, -0.018

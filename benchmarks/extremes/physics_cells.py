@@ -13,7 +13,6 @@ from benchmarks.extremes.long_runs import (
 )
 from benchmarks.extremes.refused_inputs import refused_tables, refused_walks
 from benchmarks.extremes.states import REFERENCE_m
-from numpy.typing import NDArray
 
 from scissorcal.bench.extremes.exact_laws import Exponential, Number, Power, TableCurve, mp
 from scissorcal.kernel import Table, presliding_path
@@ -27,7 +26,6 @@ from scissorcal.model import (
     presliding_state,
 )
 
-Array = NDArray[np.float64]
 Run = Callable[[np.random.Generator], Found]
 
 FLOAT32 = 2.0**-24

@@ -4,11 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 from benchmarks.extremes.cells import Cell, Found, judged
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference import Posterior, Problem, infer
 
-Array = NDArray[np.float64]
 Density = Callable[[Array], float]
 
 STATED = 0.3

@@ -101,8 +101,8 @@ def maps_panel(answers: Answers) -> Panel:
     return Panel(
         f"maps-{subject}", PART, f"Maps: {subject}",
         "Numbers are decimal logarithms of the torque's relative error; dots are refused states, "
-        "purple diamonds wrong ones; a blank place has no torque to compare. Values are spaced "
-        "evenly in number, from one end of the extreme range to the other.",
+        "purple diamonds wrong ones; a blank place has no torque to compare. Values, in SI units, "
+        "are spaced evenly in number, from one end of the extreme range to the other.",
         charts=tuple(map_chart([a for a in answers if a[0].swept == pair]) for pair in pairs),
     )  # fmt: skip
 

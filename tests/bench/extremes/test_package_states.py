@@ -16,7 +16,7 @@ from scissorcal.bench.extremes.compare import (
 )
 from scissorcal.bench.extremes.exact_laws import NotComparedError
 from scissorcal.bench.extremes.long_runs import strokes
-from scissorcal.bench.extremes.states import UNITS, State, blade_of_law, package_states
+from scissorcal.bench.extremes.states import QUANTITIES, State, blade_of_law, package_states
 from scissorcal.kernel import Kernel
 from scissorcal.model import Edge, Response
 from scissorcal.package import open_package
@@ -40,7 +40,7 @@ def test_states_are_the_same_for_the_same_seed_and_reach_from_the_scene_to_the_a
     package = packages[0]
     first, again, other = (package_states(package, 0.05, seed) for seed in (1, 1, 2))
     assert first == again != other
-    assert {state.swept for state in first if len(state.swept) == 1} == {(n,) for n in UNITS}
+    assert {state.swept for state in first if len(state.swept) == 1} == {(n,) for n in QUANTITIES}
     for state in first:
         covered = package.covers(state.opening, state.rate, state.contact)
         assert covered or state.band == "beyond"

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.bench.extremes.exact_blade import Blade
 from scissorcal.bench.extremes.exact_laws import (
     Exponential,
@@ -24,10 +24,8 @@ from scissorcal.model import Cutting
 from scissorcal.package.manifest import Ranges
 from scissorcal.package.model_package import ModelPackage
 
-Array = NDArray[np.float64]
-
-UNITS = {"opening": "rad", "opening_rate": "rad/s", "contact": "m", "indentation": "m"}
-"""Quantities of a place, with their units; an indentation says where the contact is."""
+QUANTITIES = ("opening", "opening_rate", "contact", "indentation")
+"""Quantities of a place (rad, rad/s, m, m); an indentation says where the contact is."""
 PAIRS = (("opening", "contact"), ("opening", "indentation"), ("opening_rate", "indentation"))
 """Pairs of quantities, each drawn as a map of errors."""
 BEYOND_TIP = 1.5
@@ -66,7 +64,7 @@ def package_states(package: ModelPackage, size: float, seed: int) -> list[State]
     many, repeats = max(3, round(17 * side)), max(1, round(3 * side))
     grid, random = max(3, round(13 * side)), max(1, round(200 * size))
     moved: list[dict[str, float]] = [{}] * random
-    for name in UNITS:
+    for name in QUANTITIES:
         moved += [{name: value} for value in extreme(name, cutting, many).tolist()] * repeats
     for pair in PAIRS:
         axes = [extreme(name, cutting, grid).tolist() for name in pair]

@@ -1,19 +1,18 @@
 """`bench extremes`: a package and the model under it against 50 digits, as panels."""
 
 import json
-from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import scissorcal
+from scissorcal.aliases import Progress
+from scissorcal.identity import VERSION
 from scissorcal.workday.runs.bench_files import write_page_and_twin
 
 if TYPE_CHECKING:
     from scissorcal.package import ModelPackage
     from scissorcal.report.panel import Panel
 
-Progress = Callable[[float, str], None]
 FORMAT = "scissorcal-extremes/2"
 
 
@@ -43,7 +42,7 @@ def run_extremes(
     facts = {
         "format": FORMAT,
         "created": now.isoformat(),
-        "scissorcal_version": scissorcal.__version__,
+        "scissorcal_version": VERSION,
         "package": manifest.name,
         "content_hash": manifest.content_hash,
         "seed": seed,
@@ -51,7 +50,7 @@ def run_extremes(
     }
     said = (
         f"{len(states)} states of the package {manifest.name} ({manifest.content_hash[:12]}), seed "
-        f"{seed}. Made {now:%Y-%m-%d %H:%M %Z} by scissorcal {scissorcal.__version__}."
+        f"{seed}. Made {now:%Y-%m-%d %H:%M %Z} by scissorcal {VERSION}."
     )
     plain = TypeAdapter(list[Panel]).dump_python(panels, mode="json", exclude_defaults=True)
     twin = json.dumps(facts | {"panels": plain}, ensure_ascii=False, allow_nan=False) + "\n"
