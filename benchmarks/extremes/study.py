@@ -16,6 +16,7 @@ from benchmarks.extremes.states import (
 )
 
 from scissorcal.bench.extremes.compare import (
+    LEAST_RUN,
     PARALLEL_KERNEL,
     Judgement,
     Reference,
@@ -106,15 +107,20 @@ def compare_tables(state: State, tables: ModelTables, close: bool) -> Judgement:
     """The exact step of the tables against the exact step of the law: their approximation."""
     approximate = blade_of_tables(tables, PARALLEL_KERNEL)
     try:
-        given = Reference(approximate, state, tables).at()
-        truth = Reference(blade_of_law(state.cutting, PARALLEL_KERNEL), state, tables).at()
+        given = Reference(approximate, state, LEAST_RUN, tables).at()
+        law = blade_of_law(state.cutting, PARALLEL_KERNEL)
+        truth = Reference(law, state, LEAST_RUN, tables).at()
     except NotComparedError as error:
         return Judgement("tables", "not compared", str(error))
     if not given["stands"] or not truth["stands"]:
         return Judgement("tables", "refused", "no edge stands over the contact")
-    relative, absolute = errors_of({name: given[name] for name in ("torque", "crack")}, truth)
     words = "" if close else "fit_table: not met, too few knots for the law"
-    return Judgement("tables", "right" if close else "flagged", words, relative, absolute)
+    return Judgement(
+        "tables",
+        "right" if close else "flagged",
+        words,
+        *errors_of(given["torque"], truth["torque"]),
+    )
 
 
 def _deepest(state: State) -> float:

@@ -79,19 +79,18 @@ def totals_panel(answers: Answers, outcomes: Sequence[str] = ()) -> Panel:
 
 def _total(name: str, answers: Sequence[Judgement]) -> Row:
     right = [answer for answer in answers if answer.outcome == "right"]
-    torque = [answer.relative["torque"] for answer in right if "torque" in answer.relative]
+    errors = [answer.error for answer in right if math.isfinite(answer.error)]
+    absolute = [answer.error_Nm for answer in right if math.isfinite(answer.error_Nm)]
     of = Counter(str(answer.outcome) for answer in answers)
-    values = [
+    values = (
         count("states", len(answers)),
         *(count(outcome, of[outcome]) for outcome in OUTCOMES),
-        number("torque, median relative", np.median(torque) if torque else None, digits=2),
-        number("torque, relative", max(torque, default=None), digits=2),
+        number("torque, median relative", np.median(errors) if errors else None, digits=2),
+        number("torque, relative", max(errors, default=None), digits=2),
+        number("torque", max(absolute, default=None), "N m", digits=2),
         number("roundings", max((answer.roundings for answer in right), default=None), digits=2),
-    ]
-    for output, unit in (("torque", "N m"), ("crack", "m")):
-        errors = [answer.absolute[output] for answer in right if output in answer.absolute]
-        values.append(number(output, max(errors, default=None), unit, digits=2))
-    return Row(name, tuple(values))
+    )
+    return Row(name, values)
 
 
 def maps_panel(answers: Answers) -> Panel:
@@ -166,8 +165,8 @@ def refusals_panel(answers: Answers) -> Panel:
 
 def error_of(answer: Judgement) -> float | None:
     """The torque's relative error where there is a number to be used or to be warned of."""
-    error = answer.relative.get("torque", math.nan)
-    return error if answer.outcome in ("right", "flagged") and math.isfinite(error) else None
+    known = answer.outcome in ("right", "flagged") and math.isfinite(answer.error)
+    return answer.error if known else None
 
 
 def _plain(name: str) -> str:

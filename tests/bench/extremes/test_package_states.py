@@ -151,7 +151,7 @@ def made(packages, outcomes) -> list:
     return [
         (
             replace(base, swept=("contact",), values={"contact": value}),
-            [Judgement("model", outcome, "Why.", {"torque": 1e-9}, {"torque": 1e-12})],
+            [Judgement("model", outcome, "Why.", 1e-9, 1e-12)],
         )
         for value, outcome in outcomes
     ]
@@ -176,7 +176,7 @@ def test_a_map_marks_refused_and_wrong_states_apart(packages):
     answers = [
         (
             replace(base, swept=pair, values={"opening": 1.0, "contact": place}),
-            Judgement("kernel", outcome, "", {"torque": 1e-6}),
+            Judgement("kernel", outcome, "", 1e-6),
         )
         for place, outcome in ((1.0, "refused"), (2.0, "wrong"), (3.0, "right"))
     ]

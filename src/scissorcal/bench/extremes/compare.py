@@ -3,7 +3,8 @@
 import math
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -51,6 +52,7 @@ LARGEST_N = 1e30
 """No force beyond is compared: there is nothing that it could be the force of."""
 
 NO_EDGE = "NaN: no edge stands over the contact"
+INVALID = "INVALID: the state cannot be evaluated"
 
 Numbers = Mapping[str, Any]
 
@@ -59,51 +61,50 @@ Numbers = Mapping[str, Any]
 class Judgement:
     """What a subject (model, kernel, package, a long run) gave at one state, and how it is judged.
 
-    ``relative`` and ``absolute`` are the largest errors of each output, ``roundings`` the smallest
-    displacement of plate and blades, in roundings, that explains the torque's (0 where its own
-    rounding does). ``sentence`` says what was refused or is wrong.
+    ``error`` is the relative error of the torque (of a long run, of the energy), ``error_Nm`` the
+    torque's absolute one, both NaN where there is none. ``roundings`` is the smallest displacement
+    of plate and blades, in roundings, that explains it (0 where its own rounding does).
+    ``sentence`` says what was refused or is wrong.
     """
 
     subject: str
     outcome: Outcome
     sentence: str = ""
-    relative: Mapping[str, float] = field(default_factory=dict)
-    absolute: Mapping[str, float] = field(default_factory=dict)
+    error: float = math.nan
+    error_Nm: float = math.nan
     roundings: float = 0.0
 
 
 def compare_model(state: State) -> Judgement:
-    """The float64 model's torque and crack, without friction, against the exact law."""
+    """The float64 model's torque, without friction, against the exact law."""
 
-    def program() -> Numbers:
-        model = ExactModel(state.cutting, None)
+    def program() -> float:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            place = model.settled(state.opening, state.contact)
-            torque = float(model.torque_settled(state.opening, state.rate, place))
-        return {"torque": torque, "crack": float(place)}
+            model = ExactModel(state.cutting, None)
+            return float(model.torque(state.opening, state.rate, state.contact))
 
     def exact() -> Reference:
         return Reference(blade_of_law(state.cutting, PARALLEL_MODEL), state)
 
-    return _judged("model", exact, program, MODEL_EPS)
+    return _judged("model", exact, program, NO_EDGE, partial(_by_roundings, eps=MODEL_EPS))
 
 
 def compare_kernel(state: State, tables: ModelTables) -> Judgement:
     """A float32 step of the kernel against its own tables in 50 digits, friction included."""
 
-    def program() -> Numbers:
+    def program() -> float:
         kernel = Kernel(tables)
         kernel.reset(crack=state.contact)
         out = kernel.step(state.opening, state.rate, 0.0)
         if out.flags & StepFlag.INVALID:
-            return {"refused": "INVALID: the state cannot be evaluated"}
-        return {"torque": out.torque, "crack": kernel.crack}
+            return math.nan
+        return math.inf if math.isnan(out.torque) else out.torque
 
     def exact() -> Reference:
-        return Reference(blade_of_tables(tables, PARALLEL_KERNEL), state, tables)
+        return Reference(blade_of_tables(tables, PARALLEL_KERNEL), state, LEAST_RUN, tables)
 
-    return _judged("kernel", exact, program, KERNEL_EPS)
+    return _judged("kernel", exact, program, INVALID, partial(_by_roundings, eps=KERNEL_EPS))
 
 
 def compare_package(state: State, package: ModelPackage) -> Judgement:
@@ -113,52 +114,50 @@ def compare_package(state: State, package: ModelPackage) -> Judgement:
     states no error. Both torques are held to the package's limit.
     """
     manifest = package.manifest
-    bare = manifest.mechanics.model_copy(update={"friction": None})
-    place = [np.array([value]) for value in (state.opening, state.rate, state.contact)]
-    torque = float(AverageTorque(bare, manifest.ranges, package.arrays).torque(*place)[0])
-    try:
-        truth = Reference(blade_of_law(state.cutting, PARALLEL_KERNEL), state).at()
-    except NotComparedError as error:
-        return Judgement("package", "not compared", str(error))
-    if math.isnan(torque):
-        return _refused("package", truth, NO_EDGE, LEAST_RUN)
-    if not truth["stands"]:
-        return _refused("package", truth, "", LEAST_RUN)
     limit, bound = manifest.limits.torque_Nm, manifest.bound.stated_Nm
-    held = {"torque": max(-limit, min(limit, torque))}
-    exact = {"torque": max(-mp.mpf(limit), min(mp.mpf(limit), truth["torque"]))}
-    relative, absolute = errors_of(held, exact)
-    if not package.covers(*place)[0]:
-        words = "OutsideCoverageWarning: outside what the package covers"
-        return Judgement("package", "flagged", words, relative, absolute)
-    outcome: Outcome = "right" if absolute["torque"] <= bound else "wrong"
-    words = (
-        "" if outcome == "right" else f"{_short(held)} where it is {_short(exact)}, of {bound:g}"
-    )
-    return Judgement("package", outcome, words, relative, absolute)
+    place = [np.array([value]) for value in (state.opening, state.rate, state.contact)]
+
+    def program() -> float:
+        bare = manifest.mechanics.model_copy(update={"friction": None})
+        return float(AverageTorque(bare, manifest.ranges, package.arrays).torque(*place)[0])
+
+    def exact() -> Reference:
+        return Reference(blade_of_law(state.cutting, PARALLEL_KERNEL), state, LEAST_RUN)
+
+    def by_bound(torque: float, truth: Numbers, exact: Reference) -> Judgement:
+        felt, true = (max(-limit, min(limit, float(value))) for value in (torque, truth["torque"]))
+        errors = errors_of(felt, true)
+        if not package.covers(*place)[0]:
+            words = "OutsideCoverageWarning: outside what the package covers"
+            return Judgement("package", "flagged", words, *errors)
+        if abs(felt - true) <= bound:
+            return Judgement("package", "right", "", *errors)
+        words = f"{felt:.6g} N m where it is {true:.6g} N m, stated {bound:.2g}"
+        return Judgement("package", "wrong", words, *errors)
+
+    return _judged("package", exact, program, NO_EDGE, by_bound)
 
 
 @dataclass(frozen=True)
 class Reference:
-    """The exact answer at a state: of the law on average, or, with ``tables``, of their step."""
+    """The exact answer at a state: of the law on average, or, with ``tables``, of their step.
+
+    ``least_run`` is dx/ds above which the program states that it finds an edge over a place.
+    """
 
     law: Blade
     state: State
+    least_run: float = 0.0
     tables: ModelTables | None = None
-
-    @property
-    def least_run(self) -> float:
-        """dx/ds above which the program states that it finds an edge over a place."""
-        return 0.0 if self.tables is None else LEAST_RUN
 
     def at(self, upper: float = 0.0, turn: float = 0.0, toughness: float = 0.0) -> Numbers:
         """The answer for a plate and blades displaced (m, rad), a fracture energy by a share."""
         turned = self.law.turned(mp.mpf(self.state.opening) + turn, upper, toughness)
         spot, least = turned.over(mp.mpf(self.state.contact))
         least = min(least, turned.least_run_of_blade())
-        if self.tables is not None:
+        if self.least_run:
             least = min(least, turned.cosine)
-        if spot is None or (self.tables is not None and least <= LEAST_RUN):
+        if spot is None or least <= self.least_run:
             return {"stands": 0.0, "least": least}
         return {"stands": 1.0, "least": least} | self._standing(turned, spot, turn)
 
@@ -181,10 +180,7 @@ class Reference:
         on = 1 if before_tip else 0
         friction = table_friction(self.tables, self.state.opening + turn, rate)
         torque = on * turned.torque(rests, rate) + friction
-        answer = {"rises": float(rises), "torque": torque}
-        if steps or before_tip:
-            answer["crack"] = rests.x
-        answer |= _sizes(law, rests, rate, friction)
+        answer = {"rises": rises, "torque": torque} | _sizes(law, rests, rate, friction)
         blur = answer["reach"] * answer["steep"]
         if tooth:
             teeth = abs(rests.x - spot.x) / (tooth[1].x - tooth[0].x)
@@ -228,45 +224,61 @@ def _sizes(law: Blade, spot: Spot, rate: Any, friction: Any) -> dict[str, Any]:
     }
 
 
+def errors_of(torque: Any, truth: Any) -> tuple[float, float]:
+    """Relative and absolute error of a torque; the first is NaN where the truth is 0."""
+    away = abs(mp.mpf(torque) - truth)
+    return float(away / abs(truth)) if truth else math.nan, float(away)
+
+
 def _judged(
-    subject: str, make: Callable[[], Reference], program: Callable[[], Numbers], eps: float
+    subject: str,
+    make: Callable[[], Reference],
+    program: Callable[[], float],
+    refused: str,
+    judge: Callable[[float, Numbers, Reference], Judgement],
 ) -> Judgement:
-    """Compare what a program gives with the exact answer and its displaced ones."""
+    """Compare the torque that a program gives, NaN where it refused, with the exact answer."""
     try:
         exact = make()
         truth = exact.at()
     except NotComparedError as error:
         return Judgement(subject, "not compared", str(error))
     try:
-        given = program()
+        torque = program()
     except ScissorcalError as error:
         return Judgement(subject, "refused", str(error))
     except Exception as error:  # noqa: BLE001 - whatever it raises is what is reported
         return Judgement(subject, "wrong", f"{type(error).__name__}: {error}")
-    refused = str(given.get("refused", ""))
-    if not refused and any(not math.isfinite(float(v)) for v in given.values()):
-        if not math.isnan(float(given["torque"])) or subject != "model":
-            return Judgement(subject, "wrong", f"not finite: {_short(given)}")
-        refused = NO_EDGE
-    if refused:
-        return _refused(subject, truth, refused, exact.least_run)
-    if not truth["stands"]:
-        return _refused(subject, truth, "", exact.least_run)
+    least, stands = float(truth["least"]), truth["stands"]
+    if math.isnan(torque):  # right only where the program states that it refuses
+        if not stands or least <= exact.least_run + 1e-3 or abs(truth["torque"]) > LARGEST_FLOAT32:
+            return Judgement(subject, "refused", refused)
+        return Judgement(subject, "wrong", f"refused, although it is {_short(truth)}")
+    if not stands:  # right only on the border to where an edge stands
+        words = "a number where no edge stands over the contact"
+        near = abs(least - exact.least_run) < 1e-4
+        return Judgement(subject, "refused" if near else "wrong", words)
+    if math.isinf(torque):
+        return Judgement(subject, "wrong", f"not finite where it is {_short(truth)}")
     if abs(truth["torque"]) > LARGEST_N:
         return Judgement(subject, "not compared", "above 1e30 N m")
-    relative, absolute = errors_of(given, truth)
+    return replace(judge(torque, truth, exact), subject=subject)
+
+
+def _by_roundings(torque: float, truth: Numbers, exact: Reference, eps: float) -> Judgement:
+    """Right for the truth or for one that is displaced by up to 16 roundings."""
+    errors = errors_of(torque, truth["torque"])
     for roundings in PLACE_ROUNDINGS:
-        if _explained(given, truth, exact, eps, roundings):
-            return Judgement(subject, "right", "", relative, absolute, roundings)
+        if _explained(torque, truth, exact, eps, roundings):
+            return Judgement("", "right", "", *errors, roundings)
     if truth["rises"]:
         words = "release_falls is false: the release rises again along the blade"
-        return Judgement(subject, "flagged", words, relative, absolute, math.nan)
-    words = f"{_short(given)} where it is {_short(truth)}"
-    return Judgement(subject, "wrong", words, relative, absolute, math.inf)
+        return Judgement("", "flagged", words, *errors)
+    return Judgement("", "wrong", f"{torque:.6g} N m where it is {_short(truth)}", *errors)
 
 
 def _explained(
-    given: Numbers, truth: Numbers, exact: Reference, eps: float, roundings: float
+    torque: float, truth: Numbers, exact: Reference, eps: float, roundings: float
 ) -> bool:
     """Whether plate or blades displaced by so many roundings have the torque."""
     values = [truth]
@@ -285,35 +297,8 @@ def _explained(
     slack = VALUE_ROUNDINGS * eps * float(max(v["scale"] for v in values if v["stands"]))
     low, high = float(min(torques)), float(max(torques))
     slack += float(truth["stiffness"] * truth["reach"] * truth["steep"]) * roundings * eps
-    return low - slack <= float(given["torque"]) <= high + slack
+    return low - slack <= torque <= high + slack
 
 
-def errors_of(given: Numbers, truth: Numbers) -> tuple[dict[str, float], dict[str, float]]:
-    relative, absolute = {}, {}
-    for name, value in given.items():
-        if name in truth:
-            away = abs(mp.mpf(float(value)) - truth[name])
-            absolute[name] = float(away)
-            if truth[name]:
-                relative[name] = float(away / abs(truth[name]))
-    return relative, absolute
-
-
-def _refused(subject: str, truth: Numbers, sentence: str, least_run: float) -> Judgement:
-    """A refusal is right only where the program states that it refuses.
-
-    A number where no edge stands (no ``sentence``) is right only on the border to where one does.
-    """
-    least = float(truth["least"])
-    if not sentence:
-        words = "a number where no edge stands over the contact"
-        return Judgement(subject, "refused" if abs(least - least_run) < 1e-4 else "wrong", words)
-    huge = abs(truth.get("torque", 0)) > LARGEST_FLOAT32
-    if not truth["stands"] or least <= least_run + 1e-3 or huge:
-        return Judgement(subject, "refused", sentence)
-    return Judgement(subject, "wrong", f"refused, although it is {_short(truth)}")
-
-
-def _short(numbers: Numbers) -> str:
-    shown = [n for n in ("torque", "crack") if n in numbers]
-    return ", ".join(f"{name} {float(numbers[name]):.6g}" for name in shown) or "no answer"
+def _short(truth: Numbers) -> str:
+    return f"{float(truth['torque']):.6g} N m"

@@ -32,7 +32,7 @@ def strokes(tables: ModelTables, ends: Ends, contact: float) -> Judgement:
     if why:
         return Judgement("strokes", "refused" if error == 0.0 else "wrong", why)
     words = f"energy balance: error {error:.2g}, stated {allowed:.2g}"
-    return Judgement("strokes", "right" if error <= allowed else "wrong", words, {"energy": error})
+    return Judgement("strokes", "right" if error <= allowed else "wrong", words, error)
 
 
 def energy_of_strokes(tables: ModelTables, ends: Ends, contact: float) -> tuple[float, float, str]:
