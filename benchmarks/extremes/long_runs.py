@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.extremes.cells import Found, judged, worst_of
 from benchmarks.extremes.states import fitted_tables, made_state
 
-from scissorcal.bench.extremes.long_runs import energy_of_strokes
+from scissorcal.bench.extremes.long_runs import strokes
 from scissorcal.bench.extremes.states import State
 from scissorcal.kernel import CrackLaw, Curve, Kernel, ModelTables, StepFlag, walk_crack
 from scissorcal.model import Response, edge_height, settled_contact
@@ -49,12 +49,10 @@ def scissors_tables(values: Mapping[str, float]) -> ModelTables:
     return fitted_tables(state, _deepest(state))[0]
 
 
-def balance_of_strokes(values: Mapping[str, float], allowed: float) -> Found:
+def balance_of_strokes(values: Mapping[str, float]) -> Found:
     """Close, withdraw and close farther; compare the blades' work with the kernel's books."""
-    error, _, why = energy_of_strokes(scissors_tables(values), (LAST, FIRST), CONTACT_m)
-    if why:
-        return Found("refused" if error == 0.0 else "wrong", why)
-    return judged(error, allowed, "energy balance")
+    answer = strokes(scissors_tables(values), (LAST, FIRST), CONTACT_m)
+    return Found(answer.outcome, answer.sentence, answer.error)
 
 
 def energy_of_throw(inertia: float, allowed: float) -> Found:

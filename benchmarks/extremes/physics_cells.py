@@ -30,11 +30,6 @@ Run = Callable[[np.random.Generator], Found]
 
 FLOAT32 = 2.0**-24
 
-SMOOTH_BALANCE = 1e-3
-RIPPLED_BALANCE = 1e-2
-"""Stated energy balance of a long run, as a share of the work done: the trapezoid over steps of
-1e-5 rad leaves 1e-4, and each drop of a ripple half a step more."""
-
 THROWN_BALANCE = 1e-2
 LAW_ERROR = 1e-12
 
@@ -98,12 +93,7 @@ _LONG_RUNS: tuple[tuple[str, dict[str, float], bool], ...] = (
 
 
 def _strokes(values: dict[str, float]) -> Run:
-    allowed = SMOOTH_BALANCE if values["kappa"] == 1.0 else RIPPLED_BALANCE
-
-    def run(rng: np.random.Generator) -> Found:
-        return balance_of_strokes(values, allowed)
-
-    return run
+    return lambda rng: balance_of_strokes(values)
 
 
 def _thrown(rng: np.random.Generator) -> Found:
