@@ -70,8 +70,8 @@ def test_a_wrong_answer_ends_with_exit_code_3(few, packed: Workspace, cli: Cli, 
 
 def test_without_a_package_it_says_what_to_do(workspace: Path, cli: Cli):
     said = cli("bench", "extremes")
-    assert said.code == 2
-    assert "scissorcal package build" in said.err
+    assert said.code == 5
+    assert "build a package first with 'scissorcal package build'" in said.err
     assert not (workspace / "bench").exists()
 
 
