@@ -123,7 +123,7 @@ def blade_of_law(cutting: Cutting, parallel: float) -> Blade:
 def blade_of_tables(tables: ModelTables, parallel: float) -> Blade:
     """A kernel's own tables and float32 numbers in 50 digits."""
     numbers = (tables.upper_face, tables.fracture_energy, tables.kappa, tables.rate_damping)
-    upper, energy, kappa, damping, tip = _exact(*np.float32((*numbers, tables.tip_station)))
+    upper, energy, kappa, damping, tip = _exact(*map(np.float32, (*numbers, tables.tip_station)))
     response = TableForce(TableCurve.of(tables.response), mp.mpf(KERNEL_CAP_N))
     return Blade(
         TableCurve.of(tables.edge), response, tables.moving_blades, upper, energy, kappa,
