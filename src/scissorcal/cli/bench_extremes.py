@@ -40,9 +40,9 @@ def extremes(
 
     \b
     Example:
-      $ scissorcal bench extremes
-      Largest errors: Of ... answers ... are right to their stated error, ... refused in a
-      sentence, ... marked as not to be used, 0 not compared, and 0 wrong.
+      $ scissorcal bench extremes --size 0.1
+      Largest errors: Of 337 answers 235 are right to their stated error, 29 refused in a sentence,
+      73 marked as not to be used, 0 not compared, and 0 wrong.
       ...
     """
     from scissorcal.package import open_package
