@@ -22,7 +22,7 @@ from scissorcal.workday.workspace import FitKind, Workspace
 if TYPE_CHECKING:
     from scissorcal.calibration import FitResult
     from scissorcal.calibration.fit_model import Experiment
-    from scissorcal.calibration.verify.result import Check, PriorKind, VerifyResult
+    from scissorcal.calibration.verify.result import CheckKind, PriorKind, VerifyResult
     from scissorcal.calibration.verify.simulator import Simulator
     from scissorcal.calibration.verify.study import Study, Task
     from scissorcal.recording import Recording
@@ -31,14 +31,14 @@ if TYPE_CHECKING:
 ALGORITHM = 6
 """Raised whenever a fit of the same inputs would give other numbers."""
 
-CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")
+CHECKS: "tuple[CheckKind, ...]" = ("sbc", "halves", "prior")
 
 
 @dataclass(frozen=True)
 class VerifySettings:
     """What is checked: how many simulated ``fits``, drawn from which prior (see `make_study`)."""
 
-    checks: "tuple[Check, ...]" = CHECKS
+    checks: "tuple[CheckKind, ...]" = CHECKS
     fits: int = 100
     prior: "PriorKind" = "local"
     spread: float = 3.0
