@@ -15,7 +15,7 @@ from scissorcal.control.mechanics import (
     axis_friction,
     contact_loop,
 )
-from scissorcal.control.surface_path import ContourMap, TimedPath
+from scissorcal.control.surface_path import TimedPath
 from scissorcal.errors import InputError
 from scissorcal.kernel import ControlConfig, HybridConfig, Identity
 from scissorcal.recipe.schema import Limits
@@ -66,7 +66,6 @@ def control_settings(
     identity: Identity,
     limits: Limits,
     material: Material,
-    contour: ContourMap,
     path: TimedPath,
     rate_cutoff_Hz: float,
 ) -> Settings:
@@ -75,6 +74,7 @@ def control_settings(
     Refused are places that the blades or the sledge do not reach, where a force has no lever on the
     opening, forces beyond what the motors may give, and stiffness at which no gain is stable.
     """
+    contour = path.contour
     torque_limit = min(limits.torque_Nm, identity.torque_limit)
     force_limit = min(limits.force_N, identity.force_limit)
     largest = float(path.force.max())

@@ -2,16 +2,14 @@
 
 import time
 from collections import deque
-from collections.abc import Callable
 
 import numpy as np
 
 from scissorcal.device.motion import Samples
+from scissorcal.device.session import ShowProgress
 from scissorcal.device.timing import Percentiles, TimeHistogram
 from scissorcal.kernel import SampleFlag, StateFlag
 from scissorcal.recording import RecordingWriter, TurningPoints
-
-Progress = Callable[[float, str], None]
 
 LOOK_EVERY_S = 0.25
 AT_REST_S = 0.5
@@ -29,7 +27,7 @@ class Watch:
     """
 
     def __init__(
-        self, travel: float, writer: RecordingWriter | None, tell: Progress, seconds: float
+        self, travel: float, writer: RecordingWriter | None, tell: ShowProgress, seconds: float
     ) -> None:
         self.wanted: int | None = None
         self.frames = 0

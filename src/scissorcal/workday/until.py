@@ -50,11 +50,13 @@ deviations."""
 class Limits:
     """At least so many strokes (pairs of sweeps), at most so many planned minutes.
 
-    The first part runs in any case.
+    The first part runs in any case. Empty sweeps are at ``slowest_sweep`` (rad/s) and faster
+    (`capture_stock`).
     """
 
     max_minutes: float
     at_least: int = 0
+    slowest_sweep: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,7 @@ class UntilTolerance:
 
     The fit is brought up to date by what was recorded, the band of the torque over the scene is
     judged by the scene's tolerance and confidence, and the stroke comes next that lowers what is
-    beyond the tolerance the most per minute. ``marks`` has the state after each update. Empty
-    sweeps are at ``slowest_sweep`` (rad/s) and faster (`capture_stock`).
+    beyond the tolerance the most per minute. ``marks`` has the state after each update.
     """
 
     def __init__(
@@ -90,12 +91,11 @@ class UntilTolerance:
         earlier: Earlier,
         limits: Limits,
         *,
-        slowest_sweep: float = 0.0,
         seed: int = 0,
     ) -> None:
         self._kind, self._recipe, self._identity = kind, recipe, identity
         self._earlier, self._limits = earlier, limits
-        self._seed, self._slowest_sweep = seed, slowest_sweep
+        self._seed = seed
         self._taken = Taken()
         self._seconds = 0.0
         self._why_no_fit = ""
@@ -228,7 +228,7 @@ class UntilTolerance:
     def _renew_stock(self) -> None:
         """Judge the offers by the fits as they are."""
         self._stock = capture_stock(
-            self._recipe, self._identity, self._friction, self._cut, self._slowest_sweep
+            self._recipe, self._identity, self._friction, self._cut, self._limits.slowest_sweep
         )
         self._stock_of = (self._friction, self._cut)
 

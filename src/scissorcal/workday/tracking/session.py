@@ -56,29 +56,41 @@ class TrackMark:
 Tell = Callable[[TrackMark], None]
 
 
+@dataclass(frozen=True, eq=False)
+class TrackFacts:
+    """What a track builds on: the plate's surface, the camera, the rig and its contacts.
+
+    ``drive`` is None without a rig. Contacts below ``least_N`` are none, whatever the recipe says;
+    ``friction_known`` says whether friction of the opening was fitted, ``calibrated`` whether the
+    camera's fit has a covariance.
+    """
+
+    surface: Surface
+    about: TrackAbout
+    drive: RigDrive | None = None
+    contacts: ContactSource | None = None
+    friction_known: bool = True
+    calibrated: bool = True
+    least_N: float = 0.0
+
+
 class TrackSession:
     """Feeds a `PlateFollower` with pictures and samples, and keeps books of what came of them.
 
     ``about`` is completed by the first picture with a pose: what all pictures share is known from
-    then on. Contacts below ``least_N`` are none, whatever the recipe says. ``base_ns`` is the
-    computer's clock at 0 s of the times of pictures.
+    then on. ``base_ns`` is the computer's clock at 0 s of the times of pictures.
     """
 
     def __init__(
         self,
         recipe: Recipe,
-        surface: Surface,
-        about: TrackAbout,
+        facts: TrackFacts,
         *,
-        drive: RigDrive | None = None,
-        contacts: ContactSource | None = None,
-        friction_known: bool = True,
-        least_N: float = 0.0,
-        calibrated: bool = True,
         recorder: TrackChannels | None = None,
         base_ns: int = 0,
         tell: Tell | None = None,
     ) -> None:
+        about, drive = facts.about, facts.drive
         self.about = about
         self.states: Counter[State] = Counter()
         self.gaps: list[float] = []
@@ -91,20 +103,20 @@ class TrackSession:
         self._recorder = recorder
         self._base_ns = base_ns
         self._tell = tell
-        self._calibrated = calibrated
-        self._least_N = max(least_N, 0.0 if friction_known else UNKNOWN_FRICTION_N)
+        self._calibrated = facts.calibrated
+        self._least_N = max(facts.least_N, 0.0 if facts.friction_known else UNKNOWN_FRICTION_N)
         self._picture: State | None = None
         self._nis = math.nan
         self._begun_s = self._seen_s = math.nan
         self._first: Array | None = None
-        self._surface = surface
+        self._surface = facts.surface
         self._used = self._settings(None)
         self.follower = PlateFollower(
-            surface,
+            facts.surface,
             self._used,
             camera_delay_s=1e-3 * about.camera_delay_ms,
             rig=drive is not None,
-            contacts=contacts,
+            contacts=facts.contacts,
         )
 
     @property
