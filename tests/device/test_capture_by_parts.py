@@ -16,6 +16,7 @@ from scissorcal.device.link import open_link
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.parts import Part, stroke_part, sweep_part
 from scissorcal.device.recorder import Recorder
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import InputError
@@ -127,16 +128,14 @@ def test_a_capture_goes_on_until_there_is_no_next_part(tmp_path: Path) -> None:
     def progress(share: float, sentence: str, recorder: Recorder) -> None:
         done.append(share)
 
-    with open_writer(path, "cut", link, RECIPE, "", by_parts=True) as writer:
+    with open_writer(RigSession(link, RECIPE), "cut", path, by_parts=True) as writer:
         report = capture_by_parts(
-            link,
-            RECIPE,
+            RigSession(link, RECIPE, Operator(progress=progress)),
             "cut",
             writer,
             choose,
             longest_s=60.0,
             chosen=choose.chosen,
-            progress=progress,
         )
     recording = read_recording(path)
     assert [strokes for _, strokes in choose.heard] == [0, 2, 4, 6]
@@ -169,9 +168,9 @@ def test_what_was_recorded_stays_where_a_choice_fails(tmp_path: Path) -> None:
     path = tmp_path / "cut.mcap"
     with (
         pytest.raises(InputError, match="cannot be fitted"),
-        open_writer(path, "cut", link, RECIPE, "", by_parts=True) as writer,
+        open_writer(RigSession(link, RECIPE), "cut", path, by_parts=True) as writer,
     ):
-        capture_by_parts(link, RECIPE, "cut", writer, choose, longest_s=60.0)
+        capture_by_parts(RigSession(link, RECIPE), "cut", writer, choose, longest_s=60.0)
     recording = read_recording(path)
     assert [stroke.kind for stroke in recording.strokes] == ["closing", "opening"]
     assert {0, 1} <= set(recording.samples["stroke"].tolist())
@@ -203,8 +202,14 @@ def test_samples_are_recorded_while_the_choice_goes_on_in_its_own_thread(
             idled.set()
 
     path = tmp_path / "cut.mcap"
-    with open_writer(path, "cut", link, RECIPE, "", by_parts=True) as writer:
-        capture_by_parts(link, RECIPE, "cut", writer, choose, longest_s=60.0, progress=progress)
+    with open_writer(RigSession(link, RECIPE), "cut", path, by_parts=True) as writer:
+        capture_by_parts(
+            RigSession(link, RECIPE, Operator(progress=progress)),
+            "cut",
+            writer,
+            choose,
+            longest_s=60.0,
+        )
     assert threads
     assert threading.main_thread() not in threads
     recording = read_recording(path)
@@ -230,9 +235,11 @@ def test_a_rig_in_real_time_idles_while_the_next_part_is_chosen(tmp_path: Path) 
     with (
         SimProcess("office-paper", 1) as sim,
         open_link(sim.port) as link,
-        open_writer(path, "friction", link, RECIPE, "", by_parts=True) as writer,
+        open_writer(RigSession(link, RECIPE), "friction", path, by_parts=True) as writer,
     ):
-        report = capture_by_parts(link, RECIPE, "friction", writer, choose, longest_s=60.0)
+        report = capture_by_parts(
+            RigSession(link, RECIPE), "friction", writer, choose, longest_s=60.0
+        )
     recording = read_recording(path)
     assert {0, 1} <= set(recording.samples["stroke"].tolist())
     assert recording.duration_s > 2 * (2.0 + IDLE_S)

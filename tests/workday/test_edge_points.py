@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+from scissorcal.device import capture as rig_capture
 from scissorcal.device.crossing import Blade
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.blade import blade_on
 from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.material import Sheet
@@ -92,11 +93,11 @@ def truth() -> Specimen:
 def capture(workspace: Workspace, rig: Specimen, seed: int) -> None:
     recipe, text = workspace.recipe(), workspace.recipe_path.read_text("utf-8")
     link = LockstepLink(rig, np.random.default_rng(seed))
-    probe = ensure_probed(workspace, link, recipe)
-    for kind, take in (("friction", capture_friction), ("cut", capture_cut)):
+    session = ensure_probed(workspace, RigSession(link, recipe, recipe_toml=text))
+    for kind in ("friction", "cut"):
         path = workspace.new_recording(kind)
-        with open_writer(path, kind, link, recipe, text, probe=probe) as writer:
-            take(link, recipe, writer, probe=probe)
+        with rig_capture.open_writer(session, kind, path) as writer:
+            rig_capture.capture(session, kind, writer)
     link.close()
 
 

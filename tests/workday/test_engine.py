@@ -12,8 +12,9 @@ import pytest
 
 from scissorcal.calibration.store import load_fit, save
 from scissorcal.calibration.verify.result import VerifyResult
-from scissorcal.device.capture import capture_friction, open_writer
+from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recording import read_recording, write_recording
 from scissorcal.verdicts import Status, Verdict
@@ -335,8 +336,8 @@ def captured(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     recipe = workspace.recipe()
     link = LockstepLink("office-paper", np.random.default_rng(1))
     path = workspace.new_recording("friction")
-    with open_writer(path, "friction", link, recipe, text) as writer:
-        capture_friction(link, recipe, writer)
+    with open_writer(RigSession(link, recipe, recipe_toml=text), "friction", path) as writer:
+        capture(RigSession(link, recipe), "friction", writer)
     return workspace
 
 
@@ -353,8 +354,10 @@ def test_a_speed_that_the_fit_hardly_uses_is_named_in_plan_and_report(tmp_path: 
     workspace.recipe_path.write_text(text, encoding="utf-8")
     link = LockstepLink("office-paper", np.random.default_rng(2))
     path = workspace.new_recording("friction")
-    with open_writer(path, "friction", link, workspace.recipe(), text) as writer:
-        capture_friction(link, workspace.recipe(), writer)
+    with open_writer(
+        RigSession(link, workspace.recipe(), recipe_toml=text), "friction", path
+    ) as writer:
+        capture(RigSession(link, workspace.recipe()), "friction", writer)
     before = Engine.of(workspace).completeness("friction")
     assert all(row.used is None for row in before.summary)
     assert before.missing == ()

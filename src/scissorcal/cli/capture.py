@@ -106,7 +106,7 @@ def friction(
       64 of 64 cells filled
       ...
     """
-    kind: "CaptureKind" = "friction" if axis == "opening" else "friction-advance"
+    kind: CaptureKind = "friction" if axis == "opening" else "friction-advance"
     return _capture(open_workspace(folder), kind, rig, options, yes)
 
 

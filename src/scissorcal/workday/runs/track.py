@@ -26,7 +26,7 @@ from scissorcal.workday.tracking.feeds import Feed
 from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
 from scissorcal.workday.tracking.session import Tell, TrackSession
 from scissorcal.workday.tracking.sim_world import SimWorld
-from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder, read_track
+from scissorcal.workday.tracking.track_recorder import TrackRecorder, read_track
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
