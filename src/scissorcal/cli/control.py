@@ -42,7 +42,7 @@ _OPTIONS = {
         "as it was fitted if not given.",
     ),
     "camera": PLATE_CAMERA,
-    "record": NO_RECORD,
+    "no_record": NO_RECORD,
 }
 
 

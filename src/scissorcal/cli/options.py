@@ -84,7 +84,7 @@ PLATE_CAMERA = typer.Option(
     "(with --device sim), or none.",
 )
 PlateCamera = Annotated[str, PLATE_CAMERA]
-NO_RECORD = typer.Option(" /--no-record", help="Keep no recording.")
+NO_RECORD = typer.Option("--no-record", help="Keep no recording.")
 
 
 def positive(value: float | None) -> float | None:

@@ -52,7 +52,7 @@ _OPTIONS = {
         "stale one; what differs is said and recorded.",
     ),
     "trusted_key": TRUSTED_KEY,
-    "record": NO_RECORD,
+    "no_record": NO_RECORD,
 }
 
 

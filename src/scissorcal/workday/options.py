@@ -52,7 +52,7 @@ class RenderOptions:
     have signed package and review. On a simulator a virtual hand makes ``strokes`` at
     ``rate_rad_per_s``. ``camera`` (a number, or "sim" with the device "sim") follows an estimated
     plate, which a person taps for ``taps_s`` before. ``accept_derated`` and ``allow_mismatch`` are
-    those of `scissorcal.render.Rendering`. Without ``record`` no recording is kept.
+    those of `scissorcal.render.Rendering`. With ``no_record`` no recording is kept.
     """
 
     package_path: Path | None = None
@@ -64,7 +64,7 @@ class RenderOptions:
     accept_derated: bool = False
     allow_mismatch: bool = False
     trusted_key: Path | None = None
-    record: bool = True
+    no_record: bool = False
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class ControlOptions:
     ``force_N`` and ``speed_mm_per_s`` hold where the file does not state them. ``pose`` is text
     (`workday.tracking.stated_pose` reads it); ``camera`` (a number, or "sim" with the device "sim")
     finds the plate while the path is followed; without both it stands where the fit of its
-    photographs has it. Without ``record`` no recording is kept.
+    photographs has it. With ``no_record`` no recording is kept.
     """
 
     path_file: Path
@@ -82,7 +82,7 @@ class ControlOptions:
     speed_mm_per_s: float = 10.0
     pose: str | None = None
     camera: str = NONE
-    record: bool = True
+    no_record: bool = False
 
 
 @dataclass(frozen=True)

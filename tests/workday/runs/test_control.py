@@ -131,7 +131,7 @@ def test_a_specimen_without_a_plate_is_said(fitted: Workspace, tmp_path: Path) -
         patch.setattr(LockstepLink, "configure", refuse)
         with pytest.raises(Exception, match="give the virtual rig's specimen a plate"):
             control_workspace(
-                fitted, SIM_RIG, ControlOptions(path_of(fitted), pose="20,10,3", record=False)
+                fitted, SIM_RIG, ControlOptions(path_of(fitted), pose="20,10,3", no_record=True)
             )
 
 
@@ -163,7 +163,7 @@ def test_a_person_puts_the_plate_in_before_a_camera_looks_for_it(
             yield
 
     monkeypatch.setattr(runs_control, "_camera", lambda *given: Eye())
-    port, tracked = RigOptions("port"), ControlOptions(path_of(fitted), camera="0", record=False)
+    port, tracked = RigOptions("port"), ControlOptions(path_of(fitted), camera="0", no_record=True)
     with pytest.raises(DeviceError, match="no pose"):
         control_workspace(fitted, port, tracked, Operator(note))
     (asked, *_), (looked, *_) = events[-2:]

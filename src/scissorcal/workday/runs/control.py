@@ -75,7 +75,7 @@ def control_workspace(
     if options.pose is not None and operator is not None:
         operator.say(f"The plate stands {task.told}.")
     task.fits, task.edge = _fits(engine), blade_edge(engine, engine.recipe)
-    return run_at_rig(workspace, task, rig, operator, record=options.record)
+    return run_at_rig(workspace, task, rig, operator, record=not options.no_record)
 
 
 class _ControlTask(RigTask["ControlResult"]):

@@ -59,7 +59,7 @@ def render_workspace(
     task = _RenderTask(workspace, package, options, stale)
     task.camera = _camera(workspace, package, rig, options)
     task.source, task.taps_s = source, options.taps_s
-    run = run_at_rig(workspace, task, rig, operator, record=options.record)
+    run = run_at_rig(workspace, task, rig, operator, record=not options.no_record)
     if own:
         _write_admission(workspace.package_path(recipe), run.result, run.rig)
     return run
