@@ -9,7 +9,7 @@ from scissorcal.errors import DeviceError
 from scissorcal.recording import read_recording, read_telemetry
 from scissorcal.recording.plate_channels import FRAME, PICTURE, POSE
 from scissorcal.vision.live import Frame
-from scissorcal.workday.options import SIM_RIG, CaptureOptions
+from scissorcal.workday.options import SIM_RIG, CaptureOptions, FitOptions
 from scissorcal.workday.runs.capture import capture_into
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.tracking.sim_world import SimWorld
@@ -163,7 +163,7 @@ def test_a_path_is_followed_on_a_tracked_plate(cli: Cli, calibrated: Path) -> No
     workspace = Workspace(calibrated)
     capture_into(workspace, "friction", SIM_RIG, CaptureOptions(designed=False))
     capture_into(workspace, "friction-advance", SIM_RIG)
-    fit_workspace(workspace, ("friction", "friction-advance"), effort="draft")
+    fit_workspace(workspace, ("friction", "friction-advance"), FitOptions(effort="draft"))
     path = calibrated / "path.csv"
     path.write_text("x_mm\n10\n25\n")
     said = cli("control", *SIM, "--path", path, "--force", "2", "--json")

@@ -30,6 +30,7 @@ from scissorcal.package.build import build_package
 from scissorcal.recipe.edge import edge_sentence, stated_curve
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.runs.fit import fit_workspace, load_result
 from scissorcal.workday.runs.package import build_workspace_package
@@ -112,7 +113,7 @@ def made(root: Path, text: str) -> Workspace:
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     workspace = made(tmp_path_factory.mktemp("edge") / "points", recipe_of_points())
     capture(workspace, truth(), SEED)
-    fit_workspace(workspace, ("friction", "cut"), seed=SEED)
+    fit_workspace(workspace, ("friction", "cut"), FitOptions(seed=SEED))
     return workspace
 
 
@@ -174,7 +175,7 @@ def test_torque_and_force_are_the_rigs(package: ModelPackage) -> None:
 def test_a_line_in_its_place_is_far_off(workspace: Workspace, package: ModelPackage) -> None:
     line = made(workspace.root.parent / "line", recipe_of_line())
     shutil.copytree(workspace.root / "captures", line.root / "captures")
-    fit_workspace(line, ("friction", "cut"), seed=SEED)
+    fit_workspace(line, ("friction", "cut"), FitOptions(seed=SEED))
     straight, curved = errors(built_package(line)), errors(package)
     assert straight[0] > 0.1
     assert straight[0] > 4.0 * curved[0]

@@ -21,6 +21,7 @@ from scissorcal.verdicts import Status, Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import restore, versions
 from scissorcal.workday.index import FileIndex
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.recordings import exclude_recording, include_recording, used_recordings
 from scissorcal.workday.runs.fit import fit_workspace
@@ -94,25 +95,25 @@ def test_another_prior_is_another_identity_of_its_own_fit_only(
 
 def test_another_seed_of_friction_makes_the_cut_stale(copied: Workspace) -> None:
     assert state(copied, "fit cut") == "unverified"
-    fit_workspace(copied, ("friction",), seed=7, force=True)
+    fit_workspace(copied, ("friction",), FitOptions(seed=7, force=True))
     assert state(copied, "fit friction") == "unverified"
     assert state(copied, "fit cut") == "stale"
     assert make_plan(copied).next_command == "scissorcal fit cut"
 
 
 def test_the_same_fit_again_leaves_the_cut_current_and_adds_no_version(copied: Workspace) -> None:
-    fit_workspace(copied, force=True)
+    fit_workspace(copied, (), FitOptions(force=True))
     for version in versions(Engine.of(copied)):
         if not version.current:
             shutil.rmtree(version.path.parent)
-    fit_workspace(copied, ("friction",), force=True)
+    fit_workspace(copied, ("friction",), FitOptions(force=True))
     assert state(copied, "fit cut") == "unverified"
     assert len(versions(Engine.of(copied), "friction")) == 1
 
 
 def test_an_earlier_version_is_kept_and_restored(copied: Workspace) -> None:
     before = copied.fit_path("friction").read_bytes()
-    fit_workspace(copied, ("friction",), seed=7, force=True)
+    fit_workspace(copied, ("friction",), FitOptions(seed=7, force=True))
     engine = Engine.of(copied)
     current, earlier = versions(engine, "friction")
     assert (current.current, earlier.current) == (True, False)
@@ -136,7 +137,7 @@ def test_a_fit_that_cannot_be_written_leaves_the_earlier_one(
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match="The disk is full"):
-        fit_workspace(copied, ("friction",), seed=7, force=True)
+        fit_workspace(copied, ("friction",), FitOptions(seed=7, force=True))
     assert copied.fit_path("friction").read_bytes() == before
     assert state(copied, "fit friction") == "unverified"
 

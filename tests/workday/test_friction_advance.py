@@ -10,7 +10,7 @@ from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.requirements import requirements
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import restore, versions
-from scissorcal.workday.options import SIM_RIG
+from scissorcal.workday.options import SIM_RIG, FitOptions
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.recordings import exclude_recording
 from scissorcal.workday.runs.capture import capture_into
@@ -124,7 +124,7 @@ def test_the_report_shows_it_beside_a_missing_scene(day):
 
 
 def test_versions_are_kept_and_restored(day):
-    fit_workspace(day, (NAME,), effort="draft")
+    fit_workspace(day, (NAME,), FitOptions(effort="draft"))
     engine = Engine.of(day)
     kept = [one for one in versions(engine, NAME) if not one.current]
     assert len(kept) == 1

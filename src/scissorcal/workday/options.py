@@ -1,7 +1,8 @@
-"""Options of the commands that use a rig: what the command line reads and the library takes."""
+"""Options of commands, as the command line reads them and the library takes them."""
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 NONE = "none"
 
@@ -106,3 +107,20 @@ class TrackOptions:
     def rig(self) -> RigOptions:
         """The rig whose blade's tip touches the plate."""
         return RigOptions(self.device, self.seed, self.baud)
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How fits are made.
+
+    ``effort`` is the recipe's where not given. ``force`` fits again where nothing changed.
+    ``critic`` asks for the critic of friction, at draft effort too; a stored fit without it is made
+    again. Where the workspace cannot be written, a fit is kept in ``save_to``
+    (`workday.elsewhere`).
+    """
+
+    effort: Literal["draft", "standard", "thorough"] | None = None
+    force: bool = False
+    seed: int = 0
+    save_to: Path | None = None
+    critic: bool = False

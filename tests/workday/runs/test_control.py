@@ -18,7 +18,13 @@ from scissorcal.kernel import Capability
 from scissorcal.recording import read_attachments, read_recording, read_telemetry
 from scissorcal.recording.telemetry import CONTROL
 from scissorcal.verdicts import failed
-from scissorcal.workday.options import SIM_RIG, CaptureOptions, ControlOptions, RigOptions
+from scissorcal.workday.options import (
+    SIM_RIG,
+    CaptureOptions,
+    ControlOptions,
+    FitOptions,
+    RigOptions,
+)
 from scissorcal.workday.rigs import open_rig
 from scissorcal.workday.runs import control as runs_control
 from scissorcal.workday.runs.capture import capture_into
@@ -64,7 +70,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     workspace.recipe_path.write_text(text.replace(LONG, FEWER) + SHORT, encoding="utf-8")
     capture_into(workspace, "friction", SIM_RIG, CaptureOptions(designed=False))
     capture_into(workspace, "friction-advance", SIM_RIG)
-    fit_workspace(workspace, ("friction", "friction-advance"), effort="draft")
+    fit_workspace(workspace, ("friction", "friction-advance"), FitOptions(effort="draft"))
     (workspace.root / "path.csv").write_text("x_mm,force_N\n10,2\n30,2\n20,3\n")
     return workspace
 

@@ -16,6 +16,7 @@ from scissorcal.workday.demo.photographs import (
     photograph,
 )
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.pool import open_pool, usable_cores
 from scissorcal.workday.runs.fit import FitOutcome, fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
@@ -171,7 +172,7 @@ def make_day(
             ) from error
     what = RIG_FITS[recipe.rig.joint]
     part = _part(tell, 0.47, 1.0)
-    return geometry, fit_workspace(workspace, what, effort=effort, seed=seed, progress=part)
+    return geometry, fit_workspace(workspace, what, FitOptions(effort, seed=seed), progress=part)
 
 
 def judge(fit: "FitResult", specimen: "Specimen") -> tuple[Judged, ...]:
