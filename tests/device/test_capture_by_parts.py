@@ -14,7 +14,7 @@ from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.drive import IDLE_S
 from scissorcal.device.link import open_link
 from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.parts import Part, stroke_part, sweep_part
+from scissorcal.device.parts import ChosenStroke, Part, stroke_part, sweep_part
 from scissorcal.device.recorder import Recorder
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.process import SimProcess
@@ -33,14 +33,7 @@ def strokes_of(*wanted: tuple[float, int, int]) -> list[Part]:
     """Parts for (speed, place, sheet), numbered one after the other."""
     return [
         stroke_part(
-            RECIPE,
-            IDENTITY,
-            speed,
-            place,
-            places=PLACES,
-            sheet=sheet,
-            first=2 * number,
-            fresh=place == 0,
+            RECIPE, IDENTITY, ChosenStroke(speed, place, sheet, 2 * number, place == 0), PLACES
         )
         for number, (speed, place, sheet) in enumerate(wanted)
     ]
@@ -252,9 +245,8 @@ def test_a_press_is_reached_with_the_blades_clear_of_the_material() -> None:
     whole = cut_plan(recipe, IDENTITY).segments[0].reference
     count = recipe.capture.cut.strokes_per_sheet
     for place in range(count):
-        part = stroke_part(
-            recipe, IDENTITY, 0.4, place, places=count, sheet=0, first=0, fresh=place == 0
-        )
+        stroke = ChosenStroke(0.4, place, 0, 0, place == 0)
+        part = stroke_part(recipe, IDENTITY, stroke, count)
         reference = part.segment.reference
         assert reference.opening[0] == pytest.approx(whole.opening.max(), abs=1e-9)
         assert np.ptp(reference.advance) == 0.0

@@ -38,7 +38,8 @@ def rendered(
     **options: Any,
 ) -> tuple[RenderResult, Recording]:
     recipe = package.recipe.model_copy(update=limits and {"limits": limits})
-    session = RigSession(link or rig(), recipe, recipe_toml="# a recipe")
+    operator = Operator(progress=options.pop("progress", lambda *_: None))
+    session = RigSession(link or rig(), recipe, operator, recipe_toml="# a recipe")
     with open_writer(session, package, path) as writer:
         how = Rendering(**({"strokes": TWO, "seconds": 20.0} | options))
         result = render(session, package, how, writer=writer, rig=known)

@@ -57,17 +57,6 @@ TRUSTED_KEY = typer.Option(
 )
 TrustedKey = Annotated[Path | None, TRUSTED_KEY]
 
-Images = Annotated[
-    list[Path] | None,
-    typer.Option("--image", "-i", help="A photograph; repeat the option for each."),
-]
-
-MoreImages = Annotated[
-    list[Path] | None,
-    typer.Argument(metavar="FILE", help="More photographs: what --image *.jpg expands to."),
-]
-
-
 Axis = Annotated[
     Literal["opening", "advance"],
     typer.Option(

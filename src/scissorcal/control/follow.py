@@ -28,7 +28,7 @@ from scissorcal.device.capture import servo_config
 from scissorcal.device.capture_gains import Probed, capture_gains
 from scissorcal.device.loading import is_simulator
 from scissorcal.device.lockstep_motion import Exchanging
-from scissorcal.device.motion import Motion, Samples
+from scissorcal.device.motion import LoopTask, Motion, Samples
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder, Reference
 from scissorcal.device.session import RigSession
@@ -105,13 +105,8 @@ def control(
     watch = replace(config.watch, rest_torque=0.0)  # pressing blades rest under any torque
     config = replace(config, watch=watch, supervisor_ms=200)
     run = _Run(session, rig, job, path, settings, writer)
-    with open_motion(
-        link,
-        config,
-        longest_reference=len(path.place),
-        every_s=EVERY_S,
-        control=settings.config,
-    ) as motion:
+    task = LoopTask(control=settings.config, longest_reference=len(path.place))
+    with open_motion(link, config, task, every_s=EVERY_S) as motion:
         start = start_foot(job.points, contour, job.surface, pose)
         _prepare(motion, rig, run)
         _move_over(motion, rig, contour, start, run)

@@ -16,7 +16,7 @@ from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.drive import Drive
 from scissorcal.device.hand import hand_strokes, hand_travel
 from scissorcal.device.loading import Loader
-from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport
+from scissorcal.device.motion import STOP_MARGIN_RAD, LoopTask, Motion, MotionReport
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
 from scissorcal.device.rig_record import rig_facts
@@ -192,7 +192,7 @@ def motion_for(
     config = servo_config(session.recipe, identity, lasts_s, gains, session.rest)
     longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
     longest = max(longest, round(duration_s * 1e6 / identity.tick_us))
-    return open_motion(session.link, config, longest_reference=longest)
+    return open_motion(session.link, config, LoopTask(longest_reference=longest))
 
 
 def finish(recorder: Recorder, motion: Motion) -> CaptureReport:

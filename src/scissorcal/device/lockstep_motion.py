@@ -1,6 +1,6 @@
 """The servo in this process and in virtual time: one exchange, one tick."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol, runtime_checkable
 
@@ -12,6 +12,7 @@ from scissorcal.device.motion import (
     RELEASE_COMMANDS,
     SILENCE_S,
     Array,
+    LoopTask,
     Motion,
     MotionReport,
     Samples,
@@ -25,11 +26,8 @@ from scissorcal.kernel import (
     SAMPLE_DTYPE,
     ConfigKey,
     Contour,
-    ControlConfig,
     ControlTask,
     Mode,
-    ModelTables,
-    Piece,
     Section,
     Servo,
     ServoConfig,
@@ -57,14 +55,12 @@ class LockstepMotion(Motion):
         self,
         link: Exchanging,
         config: ServoConfig,
-        tables: ModelTables | None,
+        task: LoopTask,
         every_s: float = BLOCK_S,
-        control: ControlConfig | None = None,
-        pieces: Sequence[Piece] | None = None,
     ) -> None:
         super().__init__(link.identity, every_s)
         self._link = link
-        self._servo = Servo(tables, config, control, pieces)
+        self._servo = Servo(task.tables, config, task.control, task.pieces)
         self._control_rows: list[bytes] = []
         self._frame: bytes | None = None
         self._ticks = max(1, round(every_s / self.tick_s))

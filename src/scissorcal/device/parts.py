@@ -33,6 +33,20 @@ class Part:
         return self.segment.load == "sheet"
 
 
+@dataclass(frozen=True)
+class ChosenStroke:
+    """A stroke that comes next: its speed (rad/s), its place in its sheet from 0, its sheet.
+
+    ``first`` is its number in the recording; ``fresh`` has a fresh piece put in before it.
+    """
+
+    speed: float
+    place: int
+    sheet: int
+    first: int
+    fresh: bool
+
+
 def sweep_part(
     recipe: Recipe,
     identity: Identity,
@@ -60,38 +74,31 @@ def sweep_part(
     return _numbered(plan, whole, range(count), first)
 
 
-def stroke_part(
-    recipe: Recipe,
-    identity: Identity,
-    speed: float,
-    place: int,
-    *,
-    places: int,
-    sheet: int,
-    first: int,
-    fresh: bool,
-) -> Part:
-    """One stroke through material (or one press) and its return, at a speed in rad/s.
+def stroke_part(recipe: Recipe, identity: Identity, stroke: ChosenStroke, places: int) -> Part:
+    """One stroke through material (or one press) and its return.
 
-    ``place`` counts the strokes of a sheet from 0; a sheet has room for ``places``, as
-    ``strokes_per_sheet`` of a recipe. The stroke begins where the one before it left the crack; a
-    press, which may come after any other, with the blades clear of the material at every place.
+    A sheet has room for ``places``, as ``strokes_per_sheet`` of a recipe. The stroke begins
+    where the one before it left the crack; a press, which may come after any other, with the blades
+    clear of the material at every place.
     """
     wanted = recipe.capture.cut.model_copy(
-        update={"speeds_rad_per_s": (speed,), "strokes_per_sheet": places, "sheets": 1}
+        update={"speeds_rad_per_s": (stroke.speed,), "strokes_per_sheet": places, "sheets": 1}
     )
     plan = cut_plan(with_capture(recipe, "cut", wanted), identity)
     (whole,) = plan.segments
     request = (
-        f"Put in a fresh piece of {recipe.material.name} (piece {sheet + 1}), its near edge at the "
-        "mark; the blades stand open before it."
+        f"Put in a fresh piece of {recipe.material.name} (piece {stroke.sheet + 1}), its near "
+        "edge at the mark; the blades stand open before it."
         if recipe.scene.cut
         else whole.request
     )
     load = replace(
-        whole, load="sheet" if fresh else "nothing", sheet=sheet, request=request if fresh else ""
+        whole,
+        load="sheet" if stroke.fresh else "nothing",
+        sheet=stroke.sheet,
+        request=request if stroke.fresh else "",
     )
-    part = _numbered(plan, load, (2 * place, 2 * place + 1), first)
+    part = _numbered(plan, load, (2 * stroke.place, 2 * stroke.place + 1), stroke.first)
     return part if recipe.scene.cut else _from_clear(part, whole.reference, plan.tick_s)
 
 

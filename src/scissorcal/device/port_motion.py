@@ -1,11 +1,11 @@
 """The servo on a port, in real time: a separate process runs it, this one supervises."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from scissorcal.device.link import PortLink, check_echo
-from scissorcal.device.motion import BLOCK_S, Array, Motion, MotionReport, Samples, Stages
+from scissorcal.device.motion import BLOCK_S, Array, LoopTask, Motion, MotionReport, Samples, Stages
 from scissorcal.device.paths import Reference
 from scissorcal.device.servo_process import ServoProcess
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
@@ -14,11 +14,8 @@ from scissorcal.kernel import (
     Command,
     ConfigKey,
     Contour,
-    ControlConfig,
     LoopBlock,
     Mode,
-    ModelTables,
-    Piece,
     Section,
     ServoConfig,
     StopReason,
@@ -27,6 +24,8 @@ from scissorcal.kernel import (
 CONFIGURE_ATTEMPTS = 3
 IDLE_TIMEOUT_S = 2.0
 FIRST_POSITION_TIMEOUT_S = 2.0
+SPARE_S = 30.0
+"""Room in the shared memory beyond the longest reference, for the approach to its start."""
 
 
 class PortMotion(Motion):
@@ -39,16 +38,17 @@ class PortMotion(Motion):
         self,
         link: PortLink,
         config: ServoConfig,
-        tables: ModelTables | None,
-        capacity: int,
+        task: LoopTask,
         every_s: float = BLOCK_S,
-        control: ControlConfig | None = None,
-        pieces: Sequence[Piece] | None = None,
     ) -> None:
         super().__init__(link.identity, every_s)
         self._link = link
         self._block = LoopBlock.create(
-            config, tables, control=control, pieces=pieces, reference_capacity=capacity
+            config,
+            task.tables,
+            control=task.control,
+            pieces=task.pieces,
+            reference_capacity=task.longest_reference + round(SPARE_S * 1e6 / config.tick_us),
         )
         self._process = ServoProcess(link, self._block)
         self._drain_at = 0.0

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scissorcal.device.loading import Confirm, is_simulator
-from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, Motion
+from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, LoopTask, Motion
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.rig_record import rig_facts
 from scissorcal.device.session import RigSession
@@ -132,8 +132,9 @@ def render(
         if start.admission.is_felt:
             writer.note(felt_verdict(start.admission, accepted=start.accepted).why)
     watch = Watch(_travel(package), writer, operator.progress, how.seconds)
-    every_s, pieces = EVERY_S if follower else BLOCK_S, package.pieces or None
-    with open_motion(session.link, config, tables, every_s=every_s, pieces=pieces) as motion:
+    task = LoopTask(tables, package.pieces or None)
+    every_s = EVERY_S if follower else BLOCK_S
+    with open_motion(session.link, config, task, every_s=every_s) as motion:
         watch.wanted = _prepare(motion, how.strokes, operator.confirm)
         motion.fresh_sheet(0.0)
         with follower or nullcontext():

@@ -124,3 +124,30 @@ class FitOptions:
     seed: int = 0
     save_to: Path | None = None
     critic: bool = False
+
+
+@dataclass(frozen=True)
+class PredictOptions:
+    """What is predicted of which motion: the effort of empty motion, or the load at the far end.
+
+    ``motion`` is a recording, or a table as ``export`` writes it (``time_s`` and ``opening_rad``,
+    or ``opening_m``; for a load ``motor_torque_Nm`` too). A measured sample lies in the band with
+    the probability ``level``. ``table`` (.csv) and ``plot`` (.svg, .png) are written where named.
+    """
+
+    what: Literal["friction", "load"]
+    motion: Path
+    level: float = 0.9
+    table: Path | None = None
+    plot: Path | None = None
+
+
+@dataclass(frozen=True)
+class VerifySettings:
+    """What is checked: how many simulated ``fits``, drawn from which prior (see `make_study`)."""
+
+    checks: tuple[Literal["sbc", "halves", "prior"], ...] = ("sbc", "halves", "prior")
+    fits: int = 100
+    prior: Literal["local", "recipe"] = "local"
+    spread: float = 3.0
+    seed: int = 0

@@ -5,12 +5,12 @@ from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError
-from scissorcal.workday.options import RigOptions
 
 if TYPE_CHECKING:
     from scissorcal.device.link import Link, PortLink
     from scissorcal.device.session import Operator, RigSession
     from scissorcal.recipe.schema import Line, Recipe
+    from scissorcal.workday.options import RigOptions
 
 SIM = "sim"
 
@@ -18,7 +18,7 @@ SIM = "sim"
 @contextmanager
 def open_session(
     recipe: "Recipe",
-    rig: RigOptions,
+    rig: "RigOptions",
     operator: "Operator | None" = None,
     *,
     recipe_toml: str = "",

@@ -30,7 +30,7 @@ from scissorcal.calibration.design.state import (
 )
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.device.capture_by_parts import CHOOSING_S
-from scissorcal.device.parts import Part, part_seconds, stroke_part, sweep_part
+from scissorcal.device.parts import ChosenStroke, Part, part_seconds, stroke_part, sweep_part
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
 from scissorcal.model import EdgeBelief
@@ -145,16 +145,9 @@ class UntilTolerance:
                 self._recipe, self._identity, (following.speed,), first=first, advance=advance
             )
         else:
-            part = stroke_part(
-                self._recipe,
-                self._identity,
-                following.speed,
-                following.place,
-                places=MOST_PLACES,
-                sheet=0 if self._stock.rotates else self._taken.pieces - 1,
-                first=first,
-                fresh=fresh,
-            )
+            sheet = 0 if self._stock.rotates else self._taken.pieces - 1
+            stroke = ChosenStroke(following.speed, following.place, sheet, first, fresh)
+            part = stroke_part(self._recipe, self._identity, stroke, MOST_PLACES)
         return self._counted(part, view.seconds - following.seconds)
 
     @property

@@ -1,6 +1,6 @@
 """Pushes: a torque, or a force on the sledge, for a time by the device's ticks, rest to rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -47,6 +47,10 @@ class Axis:
     rate_moved: float
     rest: float
     seen: float
+
+    def until(self, way: float, rate: float | None = None) -> "Axis":
+        """The axis whose push ends at ``way`` and ``rate``, not where it counts as moved."""
+        return replace(self, moved=way, rate_moved=rate or self.rate_moved)
 
     def answer(self, effort: float) -> Answer:
         """The command with this effort on this axis."""
@@ -105,18 +109,15 @@ def push(
     seconds: float,
     *,
     hold: float = 0.0,
-    way: float | None = None,
-    rate: float | None = None,
 ) -> Pushed:
-    """Push with ``hold + effort`` for ``seconds``, at most until ``way`` or ``rate`` is reached.
+    """Push with ``hold + effort`` for ``seconds``, at most until the axis has moved.
 
-    ``hold`` acts before and after. Repeated where a fault, lost frames or a stall of this computer
-    disturbed it.
+    `Axis.until` gives it another end. ``hold`` acts before and after. Repeated where a fault, lost
+    frames or a stall of this computer disturbed it.
     """
-    most_way, most_rate = way or axis.moved, rate or axis.rate_moved
     for _ in range(ATTEMPTS):
         begin = talk.mark()
-        start, rested = talk.play(_pushed(talk, axis, effort, seconds, hold, most_way, most_rate))
+        start, rested = talk.play(_pushed(talk, axis, effort, seconds, hold))
         heard = talk.heard(begin)
         faulty = bool(np.any(heard["flags"] & int(StateFlag.FAULT_LATCHED)))
         gaps = bool(np.any(np.diff(heard["sequence"]) > 1))
@@ -142,13 +143,7 @@ def fastest(talk: Talk, places: NDArray[np.float64]) -> float:
 
 
 def _pushed(
-    talk: Talk,
-    axis: Axis,
-    effort: float,
-    seconds: float,
-    hold: float,
-    way: float,
-    rate: float,
+    talk: Talk, axis: Axis, effort: float, seconds: float, hold: float
 ) -> Stage[tuple[int, bool]]:
     """One push; returns the sequence at which its rest began, and whether it came to rest again."""
     state = yield RELEASE if hold == 0.0 else axis.answer(hold)
@@ -172,7 +167,7 @@ def _pushed(
         state = yield axis.answer(hold + effort)
         places.append(axis.place(state))
         seen = abs(places[-1] - places[max(0, len(places) - 1 - span)]) / (span * talk.tick_s)
-        if abs(places[-1] - start) >= way or seen >= rate:
+        if abs(places[-1] - start) >= axis.moved or seen >= axis.rate_moved:
             break
         if state.flags & StateFlag.FAULT_LATCHED:
             break

@@ -16,13 +16,13 @@ from scissorcal.workday.demo.photographs import (
     photograph,
 )
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.options import FitOptions
+from scissorcal.workday.options import FitOptions, VerifySettings
 from scissorcal.workday.pool import open_pool, usable_cores
 from scissorcal.workday.runs.fit import FitOutcome, fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
 from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.runs.report import write_workspace_report
-from scissorcal.workday.runs.verify import VerifyOutcome, VerifySettings, verify_workspace
+from scissorcal.workday.runs.verify import VerifyOutcome, verify_workspace
 from scissorcal.workday.workspace import Workspace, create_workspace
 
 if TYPE_CHECKING:

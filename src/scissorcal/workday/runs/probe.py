@@ -11,7 +11,6 @@ from scissorcal.files import replacing
 from scissorcal.foreign import read_json, reading
 from scissorcal.foreign.formats import STATE
 from scissorcal.verdicts import failed
-from scissorcal.workday.options import RigOptions
 from scissorcal.workday.rigs import open_session
 from scissorcal.workday.workspace import Workspace
 
@@ -20,11 +19,12 @@ if TYPE_CHECKING:
     from scissorcal.device.probe.result import ProbeResult
     from scissorcal.device.session import Operator, RigSession
     from scissorcal.recipe.schema import Recipe
+    from scissorcal.workday.options import RigOptions
 
 
 def probe_device(
     recipe: "Recipe",
-    rig: RigOptions,
+    rig: "RigOptions",
     operator: "Operator | None" = None,
     *,
     workspace: Workspace | None = None,
