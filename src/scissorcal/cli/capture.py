@@ -1,5 +1,7 @@
 """``scissorcal capture``"""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -13,6 +15,7 @@ from scissorcal.verdicts import Verdict
 from scissorcal.workday.options import CaptureOptions, RigOptions
 
 if TYPE_CHECKING:
+    from scissorcal.device.session import Operator
     from scissorcal.recipe.requirements import CaptureKind
     from scissorcal.recording.until import UntilMark
     from scissorcal.workday.runs.capture import Captured
@@ -106,8 +109,11 @@ def friction(
       64 of 64 cells filled
       ...
     """
+    from scissorcal.workday.runs.capture import capture_into
+
     kind: CaptureKind = "friction" if axis == "opening" else "friction-advance"
-    return _capture(open_workspace(folder), kind, rig, options, yes)
+    with _at_rig(open_workspace(folder), kind, options, yes) as (workspace, operator):
+        return _answer(workspace, kind, capture_into(workspace, kind, rig, options, operator))
 
 
 @command
@@ -132,23 +138,23 @@ def cut(
       7 strokes, 1.7 planned min: band within 7 % at 96 % of felt places (median 1.5 %); tolerance
       reached at 95 % confidence
     """
-    return _capture(open_workspace(folder), "cut", rig, options, yes)
-
-
-def _capture(
-    workspace: "Workspace",
-    kind: "CaptureKind",
-    rig: RigOptions,
-    options: CaptureOptions,
-    yes: bool,
-) -> Answer:
-    from scissorcal.cli.live_view import LiveView
     from scissorcal.workday.runs.capture import capture_into
+
+    with _at_rig(open_workspace(folder), "cut", options, yes) as (workspace, operator):
+        return _answer(workspace, "cut", capture_into(workspace, "cut", rig, options, operator))
+
+
+@contextmanager
+def _at_rig(
+    workspace: "Workspace", kind: "CaptureKind", options: CaptureOptions, yes: bool
+) -> "Iterator[tuple[Workspace, Operator]]":
+    """Show a capture to the person at the terminal; say what was kept where it fails."""
+    from scissorcal.cli.live_view import LiveView
 
     before = set(workspace.recordings(kind))
     try:
         with LiveView(ask=not yes, listed=not options.until_tolerance) as view:
-            captured = capture_into(workspace, kind, rig, options, view.operator)
+            yield workspace, view.operator
     except BaseException as error:
         kept = sorted(set(workspace.recordings(kind)) - before)
         for path in kept:
@@ -156,6 +162,9 @@ def _capture(
         if isinstance(error, ScissorcalError):
             error.kept = tuple(kept)
         raise
+
+
+def _answer(workspace: "Workspace", kind: str, captured: "Captured") -> Answer:
     return Answer(
         _facts(captured),
         _text(workspace, captured),

@@ -1,13 +1,14 @@
 """Options that several commands share, and dataclasses of options as parameters of a command."""
 
-import functools
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_type_hints
+from typing import Annotated, Any, Literal, TypeVar, get_type_hints
 
 import typer
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 Folder = Annotated[
     Path | None,
@@ -83,42 +84,52 @@ def positive(value: float | None) -> float | None:
     return value
 
 
-def options_of(words: Mapping[str, Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def options_of(words: Mapping[str, Any]) -> Callable[[Function], Function]:
     """Let a command take dataclasses of options, which typer by itself does not take.
 
     ``words`` are typer's options and arguments, by the names of fields: each of these fields gets
     one, with the type and default of the field, and the command gets the dataclass. Fields without
-    words keep their default.
+    words keep their default. TypeError where no dataclass has a field.
     """
 
-    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        signature = inspect.signature(function, eval_str=True)
-        groups = {
-            name: [field.name for field in fields(parameter.annotation) if field.name in words]
-            for name, parameter in signature.parameters.items()
-            if is_dataclass(parameter.annotation)
-        }
-
-        @functools.wraps(function)
-        def collected(**given: Any) -> Any:
-            for name, of in groups.items():
-                options = signature.parameters[name].annotation
-                given[name] = options(**{field: given.pop(field) for field in of})
-            return function(**given)
-
-        parameters: list[inspect.Parameter] = []
-        for name, parameter in signature.parameters.items():
-            if name in groups:
-                parameters += _fields_as_options(parameter.annotation, words)
-            else:
-                parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
-        unknown = set(words).difference(*groups.values())
-        if unknown:
-            raise TypeError(f"{function.__name__} has no options {', '.join(sorted(unknown))}.")
-        collected.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        return collected
+    def decorate(function: Function) -> Function:
+        function.option_words = words  # type: ignore[attr-defined]
+        grouped = {name for _, _, names in _groups(function) for name in names}
+        if set(words) - grouped:
+            unknown = ", ".join(sorted(set(words) - grouped))
+            raise TypeError(f"{function.__name__} takes no dataclass with {unknown}.")
+        return function
 
     return decorate
+
+
+def parameters_of(function: Callable[..., Any]) -> list[inspect.Parameter]:
+    """The parameters of a command as typer takes them: an option for each field."""
+    groups = {name: options for name, options, _ in _groups(function)}
+    parameters: list[inspect.Parameter] = []
+    for name, parameter in inspect.signature(function, eval_str=True).parameters.items():
+        if name in groups:
+            parameters += _fields_as_options(groups[name], function.option_words)  # type: ignore[attr-defined]
+        else:
+            parameters.append(parameter)
+    return parameters
+
+
+def gathered(function: Callable[..., Any], given: dict[str, Any]) -> dict[str, Any]:
+    """What a command takes, its dataclasses made of the options that were ``given``."""
+    for name, options, names in _groups(function):
+        given[name] = options(**{field: given.pop(field) for field in names})
+    return given
+
+
+def _groups(function: Callable[..., Any]) -> list[tuple[str, type, list[str]]]:
+    """Parameters that are dataclasses: name, class, and the fields that are options."""
+    words = getattr(function, "option_words", {})
+    return [
+        (name, options, [field.name for field in fields(options) if field.name in words])
+        for name, parameter in inspect.signature(function, eval_str=True).parameters.items()
+        if is_dataclass(options := parameter.annotation)
+    ]
 
 
 def _fields_as_options(options: type, words: Mapping[str, Any]) -> list[inspect.Parameter]:

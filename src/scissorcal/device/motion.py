@@ -170,9 +170,12 @@ class Motion(AbstractContextManager["Motion"], ABC):
         finally:
             self.engage(Mode.IDLE)
 
+    @abstractmethod
     def step(self) -> Samples:
         """Wait for about a block, send a heartbeat, and return the samples that arrived."""
-        samples = self._pass_time()
+
+    def _arrived(self, samples: Samples) -> Samples:
+        """Note the position in a block; raises the error of a servo that sends none any more."""
         if len(samples):
             place = (float(samples["opening"][-1]), float(samples["advance"][-1]))
             if np.all(np.isfinite(place)):
@@ -249,9 +252,6 @@ class Motion(AbstractContextManager["Motion"], ABC):
     @abstractmethod
     def garbled(self) -> int:
         """Frames discarded so far."""
-
-    @abstractmethod
-    def _pass_time(self) -> Samples: ...
 
     @abstractmethod
     def _why_lost(self) -> DeviceError | None:

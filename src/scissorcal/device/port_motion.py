@@ -169,14 +169,14 @@ class PortMotion(Motion):
             self._link.configure(ConfigKey.STREAM, 0.0)
             self._link.flush()
 
-    def _pass_time(self) -> Samples:
+    def step(self) -> Samples:
         """Wait until a block after the last call, or the end of the loop; empty the ring buffer."""
         self._process.heartbeat.seen()
         self._drain_at = max(self._drain_at + self.every_s, time.monotonic())
         left = self._drain_at - time.monotonic()
         if left > 0 and self._process.alive:
             time.sleep(left)  # in one piece: each time this process wakes may delay the loop
-        return self._block.read()
+        return self._arrived(self._block.read())
 
     def _why_lost(self) -> DeviceError | None:
         reason = self._block.stop_reason
