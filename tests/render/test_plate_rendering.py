@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.session import RigSession
 from scissorcal.errors import MissingError
@@ -20,8 +21,6 @@ from scissorcal.render import Rendering, RenderResult, VirtualStrokes, open_writ
 from scissorcal.render.admission import rendered_tables
 from scissorcal.render.plate_pose import FALL_S, STALE_S
 from tests.render.plate_motion import Move, Tracker, true_torque
-
-Array = NDArray[np.float64]
 
 STROKES = VirtualStrokes(count=3, rate_rad_per_s=0.5)
 BEGINS_S, TAKES_S = 7.0, 0.8

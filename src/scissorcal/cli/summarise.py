@@ -70,7 +70,6 @@ def summarise(
 
     import numpy as np
 
-    import scissorcal
     from scissorcal.calibration.signals.survey import survey
     from scissorcal.calibration.summary import (
         common_places,
@@ -84,6 +83,7 @@ def summarise(
         summarise as sum_up,
     )
     from scissorcal.files import replacing
+    from scissorcal.identity import VERSION
     from scissorcal.recording import Joint, read_recording
     from scissorcal.recording.table import refuse_no_table
     from scissorcal.report.summary import Shown, summary_page, summary_panels
@@ -145,7 +145,7 @@ def summarise(
         place=recording.joint.position_unit,
         cut_length_m=cut_length_mm * 1e-3 if cut_length_mm else None,
         created=datetime.now(UTC),
-        version=scissorcal.__version__,
+        version=VERSION,
         notes=notes,
     )
     panels = summary_panels(shown)

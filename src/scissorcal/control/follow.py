@@ -40,8 +40,6 @@ from scissorcal.recording import RecordingWriter
 from scissorcal.recording.telemetry import CONTROL
 from scissorcal.tracking.plate_pose import PlatePose, PoseSource
 
-Array = NDArray[np.float64]
-
 EVERY_S = 0.01
 HIGHER_M = 5e-3
 """By how much the tip passes over the highest place of the path on its way to the start."""

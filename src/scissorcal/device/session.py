@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from scissorcal.aliases import Say
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.recorder import Recorder
@@ -11,9 +12,6 @@ from scissorcal.kernel import Identity
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult, RestFacts
 from scissorcal.recording.until import UntilMark
-
-Say = Callable[[str], None]
-"""Shows one sentence to a person."""
 
 
 class ShowProgress(Protocol):

@@ -1,5 +1,7 @@
 """Probe a rig into a workspace: before its first motor run, and again where that is too old."""
 
+from __future__ import annotations
+
 import json
 import math
 from dataclasses import replace
@@ -23,12 +25,12 @@ if TYPE_CHECKING:
 
 
 def probe_device(
-    recipe: "Recipe",
-    rig: "RigOptions",
-    operator: "Operator | None" = None,
+    recipe: Recipe,
+    rig: RigOptions,
+    operator: Operator | None = None,
     *,
     workspace: Workspace | None = None,
-) -> "ProbeResult":
+) -> ProbeResult:
     """Probe a rig and keep the result in the workspace, if there is one.
 
     A probe that refuses the rig is kept as well, so that what it found can be looked up. Raises
@@ -40,7 +42,7 @@ def probe_device(
         return probe(session) if workspace is None else probe_into(workspace, session)
 
 
-def probe_into(workspace: Workspace, session: "RigSession", then: str = "") -> "ProbeResult":
+def probe_into(workspace: Workspace, session: RigSession, then: str = "") -> ProbeResult:
     """Probe the rig of a session, and keep what was found; as `probe_device`."""
     from scissorcal.device.probe.probe import ProbeRefusedError, probe
 
@@ -55,8 +57,8 @@ def probe_into(workspace: Workspace, session: "RigSession", then: str = "") -> "
 
 
 def ensure_probed(
-    workspace: Workspace, session: "RigSession", then: str = "", now: datetime | None = None
-) -> "RigSession":
+    workspace: Workspace, session: RigSession, then: str = "", now: datetime | None = None
+) -> RigSession:
     """The session with the workspace's probe of its rig, or a new one where none still counts.
 
     One counts if it is of exactly this rig (all that it states) and this ``rig.motor_sign``, found
@@ -87,7 +89,7 @@ def ensure_probed(
     return probed
 
 
-def last_probe(workspace: Workspace, link: "Link | None" = None) -> "ProbeResult | None":
+def last_probe(workspace: Workspace, link: Link | None = None) -> ProbeResult | None:
     """The probe that the workspace keeps, if it is of the rig on ``link`` (of any without one).
 
     None where there is none that can be read.
@@ -98,7 +100,7 @@ def last_probe(workspace: Workspace, link: "Link | None" = None) -> "ProbeResult
     return found
 
 
-def probe_state(workspace: Workspace, recipe: "Recipe", now: datetime | None = None) -> str:
+def probe_state(workspace: Workspace, recipe: Recipe, now: datetime | None = None) -> str:
     """What the workspace's probe says and whether it still counts, in a sentence.
 
     Whether it is of the rig that will be connected shows only then.
@@ -115,7 +117,7 @@ def probe_state(workspace: Workspace, recipe: "Recipe", now: datetime | None = N
     return f"{said}: no check failed{left_out}."
 
 
-def _kept(workspace: Workspace) -> "ProbeResult | str":
+def _kept(workspace: Workspace) -> ProbeResult | str:
     """The probe that the workspace keeps, or why there is none."""
     path = workspace.probe_path
     if not path.exists():
@@ -129,11 +131,11 @@ def _kept(workspace: Workspace) -> "ProbeResult | str":
         return f"{path.name} cannot be read ({error}) and is replaced"
 
 
-def _most(recipe: "Recipe") -> str:
+def _most(recipe: Recipe) -> str:
     return f"{1e3 * recipe.rig.probe.largest_torque_Nm:g} mN m"
 
 
-def _why_again(last: "ProbeResult | str", link: "Link", recipe: "Recipe", now: datetime) -> str:
+def _why_again(last: ProbeResult | str, link: Link, recipe: Recipe, now: datetime) -> str:
     """Why a probe does not count, as part of a sentence; empty where it does."""
     if isinstance(last, str):
         return last
@@ -142,7 +144,7 @@ def _why_again(last: "ProbeResult | str", link: "Link", recipe: "Recipe", now: d
     return _outdated(last, recipe, now)
 
 
-def _outdated(last: "ProbeResult", recipe: "Recipe", now: datetime) -> str:
+def _outdated(last: ProbeResult, recipe: Recipe, now: datetime) -> str:
     """Why a probe of this rig does not count, as part of a sentence; empty where it does."""
     from scissorcal.device.probe.probe import recipe_facts
 
@@ -165,7 +167,7 @@ def _outdated(last: "ProbeResult", recipe: "Recipe", now: datetime) -> str:
     return ""
 
 
-def _differs(last: "ProbeResult", link: "Link") -> bool:
+def _differs(last: ProbeResult, link: Link) -> bool:
     """Whether a probe is of another rig, or ran in virtual time where this one does not."""
     from scissorcal.device.link import PortLink
     from scissorcal.device.probe.probe import identity_digest
@@ -175,7 +177,7 @@ def _differs(last: "ProbeResult", link: "Link") -> bool:
     return last.identity != identity_digest(link.identity) or real != isinstance(link, PortLink)
 
 
-def _store(workspace: Workspace, result: "ProbeResult") -> None:
+def _store(workspace: Workspace, result: ProbeResult) -> None:
     text = json.dumps(result.as_dict(), indent=2) + "\n"
     with replacing(workspace.probe_path) as part:
         part.write_text(text, encoding="utf-8")
