@@ -193,7 +193,7 @@ def _answer(outcomes: "Sequence[FitOutcome]", critic: bool) -> Answer:
     from scissorcal.cli.fit_law import critic_text, parameter_facts
 
     laws = [outcome for outcome in outcomes if _SHOWN[outcome.what] == _LAW]
-    seen = {o.what: _shown(o).facts(o) for o in outcomes if o not in laws}
+    geometry = {o.what: _shown(o).facts(o) for o in outcomes if o not in laws}
     result: dict[str, object] = {}
     if laws:
         passed = [outcome for outcome in laws if not outcome.result.rejected]
@@ -201,12 +201,12 @@ def _answer(outcomes: "Sequence[FitOutcome]", critic: bool) -> Answer:
             "parameters": [row for outcome in passed for row in parameter_facts(outcome)],
             "not_a_calibration": {o.what: parameter_facts(o) for o in laws if o not in passed},
             "fits": [_shown(outcome).facts(outcome) for outcome in laws],
-            "geometry": seen,
+            "geometry": geometry,
         }
-    elif len(seen) == 1:
-        (result,) = seen.values()
+    elif len(geometry) == 1:
+        (result,) = geometry.values()
     else:
-        result = {"geometry": seen}
+        result = {"geometry": geometry}
     return Answer(
         result,
         "\n\n".join(

@@ -187,16 +187,16 @@ def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]"
         for done, file in enumerate(files):
             tell(done / len(files), f"{file.name}")
             try:
-                one = import_one(file)
+                imported = import_one(file)
             except InputError as error:
                 refused.append(str(error))
                 continue
-            answer = _answer(one)
+            answer = _answer(imported)
             first, *_ = answer.text.splitlines()
             lines.append(f"{file.name}: {first}")
             lines += [f"  note: {said}" for said in answer.result["notes"] if not _expected(said)]
             facts.append(answer.result)
-            paths.append(one.path)
+            paths.append(imported.path)
     if refused:
         told = InputError(
             f"{len(refused)} of {len(files)} logs were not imported; the other {len(paths)} were:"
@@ -215,27 +215,27 @@ def _expected(note: str) -> bool:
     )
 
 
-def _answer(one: _Imported) -> Answer:
+def _answer(imported: _Imported) -> Answer:
     """What was imported; a note where the recipe plans for another joint than was recorded."""
     from scissorcal.calibration.signals.survey import survey
 
-    recording, joint = one.recording, one.recording.joint
+    recording, joint = imported.recording, imported.recording.joint
     notes = list(recording.notes)
-    if one.planned != joint.kind:
+    if imported.planned != joint.kind:
         notes.append(
-            f'The recipe has a {one.planned} joint: set joint = "{joint.kind}" in its '
+            f'The recipe has a {imported.planned} joint: set joint = "{joint.kind}" in its '
             f"[rig] to plan for a {joint.kind} one."
         )
-    found = survey(recording, one.measured)
-    notes += found.notes
+    sensors = survey(recording, imported.measured)
+    notes += sensors.notes
     lines = [
-        f"{one.shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
+        f"{imported.shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
         f"{len(recording.strokes)} strokes, {joint.kind} joint",
-        *survey_lines(found),
+        *survey_lines(sensors),
         *(f"note: {sentence}" for sentence in notes),
     ]
     result = {
-        "recording": one.path,
+        "recording": imported.path,
         "kind": recording.kind,
         "joint": joint.kind,
         "position_unit": joint.position_unit,
@@ -243,10 +243,10 @@ def _answer(one: _Imported) -> Answer:
         "samples": len(recording.samples),
         "duration_s": recording.duration_s,
         "strokes": recording.strokes,
-        "survey": found,
+        "survey": sensors,
         "notes": notes,
     }
-    return Answer(result, "\n".join(lines), files=[one.path])
+    return Answer(result, "\n".join(lines), files=[imported.path])
 
 
 def _import_camera(file: Path, folder: Path | None) -> Answer:

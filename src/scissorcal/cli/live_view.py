@@ -72,9 +72,9 @@ class LiveView:
             last, self._axis = recorder.last[0], recorder.axis
             place, effort = last[self._axis.channel], last[self._axis.effort]
             self._trace.append((self._axis.places * place, self._axis.efforts * effort))
-        every = _LINE_EVERY_S if self._live is None else _DRAW_EVERY_S
+        interval_s = _LINE_EVERY_S if self._live is None else _DRAW_EVERY_S
         finished = done >= 1.0 and not self._finished
-        if now - self._drawn_s < every and not finished:
+        if now - self._drawn_s < interval_s and not finished:
             return
         self._drawn_s, self._finished = now, done >= 1.0
         share = min(max(done, 0.0), 1.0)

@@ -128,7 +128,7 @@ def _groups(function: Callable[..., Any]) -> list[tuple[str, type, list[str]]]:
     return [
         (name, options, [field.name for field in fields(options) if field.name in words])
         for name, parameter in inspect.signature(function, eval_str=True).parameters.items()
-        if is_dataclass(options := parameter.annotation)
+        if isinstance(options := parameter.annotation, type) and is_dataclass(options)
     ]
 
 

@@ -76,9 +76,9 @@ def _text(result: "ProbeResult") -> str:
 
     rows = [["", "estimate", "sd", ""]]
     for label, name, scale, unit in ESTIMATES:
-        found = getattr(result, name)
-        if found is not None:
-            rows.append([label, f"{scale * found.mean:.4g}", f"{scale * found.sd:.2g}", unit])
+        estimate = getattr(result, name)
+        if estimate is not None:
+            rows.append([label, f"{scale * estimate.mean:.4g}", f"{scale * estimate.sd:.2g}", unit])
     facts = result.facts
     for label, name, scale, unit in _FACTS:
         if math.isfinite(facts.get(name, math.nan)):

@@ -199,7 +199,7 @@ def _presliding(rig: RigMechanics, identity: Identity) -> float:
 
 def _reached(rig: RigMechanics, identity: Identity, foot: Foot, x: float) -> float:
     """Opening at a foot; InputError where tip or sledge do not come there, above it and below."""
-    found = []
+    openings = []
     lifted, lower = LIFT_M + AWAY_M, -AWAY_M
     for doing, beyond in (
         ("touching it", 0.0),
@@ -220,15 +220,15 @@ def _reached(rig: RigMechanics, identity: Identity, foot: Foot, x: float) -> flo
                 f"At x = {1e3 * x:.1f} mm the surface is {1e3 * foot.point[1]:.1f} mm above the "
                 f"pivot, and {doing} takes {takes}. Move the plate, or shorten the path."
             )
-        found.append(opening)
-    advance = rig.advance_at(foot.point[0], found[0])
+        openings.append(opening)
+    advance = rig.advance_at(foot.point[0], openings[0])
     low, high = identity.advance_min + ADVANCE_MARGIN_M, identity.advance_max - ADVANCE_MARGIN_M
     if not low <= advance <= high:
         raise InputError(
             f"At x = {1e3 * x:.1f} mm the sledge would stand at {1e3 * advance:.1f} mm: it moves "
             f"from {1e3 * low:.1f} to {1e3 * high:.1f} mm. Move the plate, or shorten the path."
         )
-    return found[0]
+    return openings[0]
 
 
 def _refuse_lever(rig: RigMechanics, foot: Foot, x: float, opening: float) -> None:

@@ -92,10 +92,10 @@ class _Watch:
 
     def until(self, strokes: int, give_up_s: float) -> bool:
         """Record until ``strokes`` of this sheet are made; False if nothing moved for too long."""
-        every = max(1, round(THINNED_S / self._motion.tick_s))
+        stride = max(1, round(THINNED_S / self._motion.tick_s))
         while True:
             for samples in self._motion.idle(LOOK_EVERY_S):
-                self._take(samples, every)
+                self._take(samples, stride)
             time, opening = np.concatenate(self._time), np.concatenate(self._opening)
             made = self._made(time, opening)
             done = (self._sheet + min(made / self._wanted, 1.0)) / self._sheets
@@ -111,10 +111,10 @@ class _Watch:
                 )
                 return False
 
-    def _take(self, samples: Samples, every: int) -> None:
+    def _take(self, samples: Samples, stride: int) -> None:
         self._recorder.take(samples, self._motion.garbled)
-        self._time.append(samples["device_time_us"][::every] * 1e-6)
-        self._opening.append(samples["opening"][::every])
+        self._time.append(samples["device_time_us"][::stride] * 1e-6)
+        self._opening.append(samples["opening"][::stride])
 
     def _made(self, time: NDArray[np.float64], opening: NDArray[np.float64]) -> int:
         """Closing strokes so far, including the current one."""

@@ -107,12 +107,12 @@ def part_seconds(part: Part, identity: Identity) -> float:
     return 1e-6 * identity.tick_us * len(part.segment.reference)
 
 
-def _from_clear(part: Part, every: Reference, tick_s: float) -> Part:
+def _from_clear(part: Part, whole: Reference, tick_s: float) -> Part:
     """A press that begins at its place with the blades as wide as any press of a capture opens."""
-    found = part.segment.reference
-    begin = int(np.flatnonzero(found.stroke >= 0)[0])
-    press = Reference(*(axis[begin:] for axis in vars(found).values()))
-    path = PathBuilder(float(every.opening.max()), float(press.advance[0]), tick_s)
+    reference_of_part = part.segment.reference
+    begin = int(np.flatnonzero(reference_of_part.stroke >= 0)[0])
+    press = Reference(*(axis[begin:] for axis in vars(reference_of_part).values()))
+    path = PathBuilder(float(whole.opening.max()), float(press.advance[0]), tick_s)
     path.rest(DWELL_S)
     path.open_to(float(press.opening[0]), APPROACH_SPEED, TURN_ACCELERATION)
     path.rest(SETTLE_S)
@@ -127,11 +127,11 @@ def _numbered(plan: Plan, segment: Segment, wanted: Iterable[int], first: int) -
     inside = np.isin(stroke_of_tick(labels), kept)
     table = np.full(labels.max() + 2, -1, dtype=np.int32)
     table[list(kept)] = np.arange(first, first + len(kept))
-    found = segment.reference
+    whole = segment.reference
     cut = Reference(
-        found.opening[inside],
-        found.opening_rate[inside],
-        found.advance[inside],
+        whole.opening[inside],
+        whole.opening_rate[inside],
+        whole.advance[inside],
         table[labels[inside]],
     )
     rest = PathBuilder(float(cut.opening[-1]), float(cut.advance[-1]), plan.tick_s)

@@ -141,28 +141,28 @@ def take_photographs(
     from scissorcal.vision.photo import read_photo
 
     before = photo_captures(workspace, kind)
-    seen: list[Seen] = []
+    sightings: list[Seen] = []
     refused: list[str] = []
     with PhotoWriter(workspace, kind) as writer:
         for path in paths:
             try:
                 photo = read_photo(path, colour=False)
                 refuse_known(photo, before, writer)
-                found = look(path, photo)
+                sighting = look(path, photo)
             except InputError as error:
                 refused.append(str(error))
                 tell(f"left out: {error}")
                 continue
-            stored = writer.add(path, photo, found.detection, found.stance)
-            if found.drawn is not None:
-                found.drawn(writer.part / f"{Path(stored.file).stem}{DRAWN_SUFFIX}")
-            seen.append(found)
-            tell(found.words)
-        if not seen:
+            stored = writer.add(path, photo, sighting.detection, sighting.stance)
+            if sighting.drawn is not None:
+                sighting.drawn(writer.part / f"{Path(stored.file).stem}{DRAWN_SUFFIX}")
+            sightings.append(sighting)
+            tell(sighting.words)
+        if not sightings:
             raise InputError(" ".join(refused[:3] or [NOTHING]) + " Nothing was kept.")
-        last = seen[-1]
+        last = sightings[-1]
         capture = writer.finish(last.detection.board if last.detection else last.board, blade)
-    return Taken(capture, tuple(seen), tuple(refused))
+    return Taken(capture, tuple(sightings), tuple(refused))
 
 
 class PhotoWriter:

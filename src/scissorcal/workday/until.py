@@ -199,17 +199,17 @@ class UntilTolerance:
         recipe, earlier = self._recipe, self._earlier
         try:
             if self._kind == "friction":
-                every = (*earlier.friction_recordings, recorded)
+                recordings = (*earlier.friction_recordings, recorded)
                 rng = np.random.default_rng((self._seed, len(self._taken.strokes)))
                 settings = recipe.fit.friction
-                fit = fit_friction(every, settings, effort="draft", rng=rng)
-                self._friction = fitted_friction(every, recipe, fit)
+                fit = fit_friction(recordings, settings, effort="draft", rng=rng)
+                self._friction = fitted_friction(recordings, recipe, fit)
                 self._used = shares_used(recorded, fit.used[-1])
             else:
-                every = (*earlier.cut_recordings, recorded)
+                recordings = (*earlier.cut_recordings, recorded)
                 assert earlier.friction is not None
                 self._cut = latest_cut(
-                    every, recipe, earlier.friction, earlier.edge, earlier.last_law
+                    recordings, recipe, earlier.friction, earlier.edge, earlier.last_law
                 )
         except InputError as error:
             self._why_no_fit = str(error)
@@ -316,11 +316,11 @@ def shares_used(recorded: Recording, spans: NDArray[np.int64]) -> dict[float, fl
     np.add.at(edges, spans[:, 0], 1)
     np.add.at(edges, spans[:, 1], -1)
     used = np.cumsum(edges)[:-1] > 0
-    found = {}
+    shares = {}
     for speed in {s.speed for s in recorded.strokes if np.isfinite(s.speed)}:
-        own = np.isin(label, [s.index for s in recorded.strokes if s.speed == speed])
-        found[speed] = float(np.mean(used[own])) if own.any() else 1.0
-    return found
+        of_speed = np.isin(label, [s.index for s in recorded.strokes if s.speed == speed])
+        shares[speed] = float(np.mean(used[of_speed])) if of_speed.any() else 1.0
+    return shares
 
 
 def _differ(now: FrictionState | CutState, then: FrictionState | CutState) -> bool:
@@ -357,7 +357,7 @@ def largest_cause(known: TorqueKnowledge) -> str:
     """What bounds the band in the end, as a sentence with the command that would lower it."""
     now = expected_band(known).excess
     without = {name: band.excess for name, band in bounds(known).items()}
-    name = min(without, key=lambda one: without[one])
+    name = min(without, key=lambda cause: without[cause])
     if now <= 0.0 or without[name] > (1.0 - NOTABLE) * now:
         return (
             "No single cause stands out: what differs between strokes, pieces and recordings is "

@@ -88,17 +88,17 @@ class Pushed:
 def axis_of(talk: Talk, name: AxisName, jitter: float, step: float) -> Axis:
     """The axis as the bounds of the talk allow to push it; ``jitter`` and ``step`` as seen idle."""
     bounds = talk.bounds
-    seen = max(MOVED_STEPS * step, MOVED_JITTERS * jitter)
+    shown = max(MOVED_STEPS * step, MOVED_JITTERS * jitter)
     still = max(1.5 * step, 6.0 * jitter)
     if name == "opening":
-        moved, rest = max(seen, MOVED_RAD), max(still, REST_RAD)
+        moved, rest = max(shown, MOVED_RAD), max(still, REST_RAD)
         return Axis(
             name, bounds.torque_Nm, bounds.angle_rad, bounds.rate_rad_per_s, moved, MOVED_RATE,
-            rest, seen,
+            rest, shown,
         )  # fmt: skip
-    moved, rest = max(seen, MOVED_M), max(still, REST_M)
+    moved, rest = max(shown, MOVED_M), max(still, REST_M)
     return Axis(
-        name, bounds.force_N, bounds.way_m, bounds.speed_m_per_s, moved, MOVED_SPEED, rest, seen
+        name, bounds.force_N, bounds.way_m, bounds.speed_m_per_s, moved, MOVED_SPEED, rest, shown
     )
 
 
@@ -125,13 +125,13 @@ def push(
         places = heard[axis.name][first:]
         off = places - float(np.mean(places[: max(1, talk.ticks(BEFORE_S) // 2)]))
         went = float(off[int(np.argmax(np.abs(off)))])
-        found = Pushed(
+        pushed = Pushed(
             effort, hold, seconds, went, fastest(talk, places), begin + first, talk.mark(),
             faulty or gaps, rested,
         )  # fmt: skip
-        if not found.disturbed:
+        if not pushed.disturbed:
             break
-    return found
+    return pushed
 
 
 def fastest(talk: Talk, places: NDArray[np.float64]) -> float:
@@ -166,8 +166,8 @@ def _pushed(
     while talk.sequence - begun < lasting:
         state = yield axis.answer(hold + effort)
         places.append(axis.place(state))
-        seen = abs(places[-1] - places[max(0, len(places) - 1 - span)]) / (span * talk.tick_s)
-        if abs(places[-1] - start) >= axis.moved or seen >= axis.rate_moved:
+        rate = abs(places[-1] - places[max(0, len(places) - 1 - span)]) / (span * talk.tick_s)
+        if abs(places[-1] - start) >= axis.moved or rate >= axis.rate_moved:
             break
         if state.flags & StateFlag.FAULT_LATCHED:
             break

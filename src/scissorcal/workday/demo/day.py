@@ -122,10 +122,12 @@ def run_demo(
     tell(0.96, "rendering")
     package, rendering, recording = _render(workspace, recipe, LockstepLink(specimen, streams[1]))
     tell(0.98, "judging")
-    verdicts = [verdict for found in geometry for verdict in found.verdicts]
+    verdicts = [verdict for outcome in geometry for verdict in outcome.verdicts]
     verdicts += [verdict for fit in fits_made for verdict in fit.verdicts]
     verdicts += [verdict for check in verified for verdict in check.result.verdicts]
-    files = [found.path for found in (*geometry, *outcomes)] + [check.path for check in verified]
+    files = [outcome.path for outcome in (*geometry, *outcomes)] + [
+        check.path for check in verified
+    ]
     return DemoResult(
         workspace=workspace.root,
         specimen=specimen.name,

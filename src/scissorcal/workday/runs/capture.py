@@ -213,8 +213,8 @@ def _earlier(engine: "Engine", kind: DesignedKind) -> "Earlier":
 
     def used(what: DesignedKind) -> "tuple[Recording, ...]":
         there = any(row.use == "used" for row in engine.recordings(what))
-        found = used_recordings(engine.workspace, engine.recipe, what, engine.index)
-        return found if there else ()
+        recordings = used_recordings(engine.workspace, engine.recipe, what, engine.index)
+        return recordings if there else ()
 
     there = available(engine, ("friction", "cut", "blade"))
     edge = edge_of_photographs(engine)[0] if kind == "cut" or "blade" in there else None

@@ -176,8 +176,10 @@ def _pose_source(engine: Engine, pose: str | None) -> "PoseSource":
             "The fit of the plate has no pose in the rig's frame: photograph the rig's card too "
             "('scissorcal capture plate --help'), or state where the plate stands with --pose."
         )
-    found = fit.rig_plate
-    return fixed_pose(found.matrix, np.asarray(found.translation_m), found.covariance)
+    pose_of_fit = fit.rig_plate
+    return fixed_pose(
+        pose_of_fit.matrix, np.asarray(pose_of_fit.translation_m), pose_of_fit.covariance
+    )
 
 
 def _fits(engine: Engine) -> "tuple[FitResult, FitResult]":

@@ -94,10 +94,10 @@ def last_probe(workspace: Workspace, link: Link | None = None) -> ProbeResult | 
 
     None where there is none that can be read.
     """
-    found = _kept(workspace)
-    if isinstance(found, str) or (link is not None and _differs(found, link)):
+    kept = _kept(workspace)
+    if isinstance(kept, str) or (link is not None and _differs(kept, link)):
         return None
-    return found
+    return kept
 
 
 def probe_state(workspace: Workspace, recipe: Recipe, now: datetime | None = None) -> str:

@@ -47,11 +47,11 @@ def render_workspace(
     from scissorcal.package import open_package
     from scissorcal.package.keys import read_public_keys
 
-    recipe, own = workspace.recipe(), options.package_path is None
+    recipe, of_workspace = workspace.recipe(), options.package_path is None
     package = open_package(options.package_path or workspace.package_path(recipe), warn=False)
     if options.trusted_key:
         _refuse_untrusted(package, read_public_keys(options.trusted_key))
-    stale = _stale(Engine.of(workspace)) if own else ""
+    stale = _stale(Engine.of(workspace)) if of_workspace else ""
     if not options.allow_mismatch:
         if stale:
             raise MissingError(f"{stale} To render it all the same: --allow-mismatch.")
@@ -60,7 +60,7 @@ def render_workspace(
     task.camera = _camera(workspace, package, rig, options)
     task.source, task.taps_s = source, options.taps_s
     run = run_at_rig(workspace, task, rig, operator, record=not options.no_record)
-    if own:
+    if of_workspace:
         _write_admission(workspace.package_path(recipe), run.result, run.rig)
     return run
 

@@ -233,10 +233,10 @@ def _result(session: TrackSession, path: Path | None, rig: str) -> TrackResult:
     follower = session.follower
     delay = session.delay
     figures = track_figures(follower, delay)
-    found = follower.now()
-    assert found is not None
-    pose = Pose.from_matrix(found.rotation, found.place_m)
-    sds = np.sqrt(np.diag(found.covariance))
+    estimate = follower.now()
+    assert estimate is not None
+    pose = Pose.from_matrix(estimate.rotation, estimate.place_m)
+    sds = np.sqrt(np.diag(estimate.covariance))
     pictures = sum(session.states.values())
     return TrackResult(
         path=path,
@@ -252,7 +252,7 @@ def _result(session: TrackSession, path: Path | None, rig: str) -> TrackResult:
         state=follower.state,
         quaternion=pose.quaternion,
         translation_m=pose.translation_m,
-        covariance=tuple(tuple(row) for row in found.covariance.tolist()),
+        covariance=tuple(tuple(row) for row in estimate.covariance.tolist()),
         sd_mm=float(1e3 * sds[3:].max()),
         sd_deg=float(np.degrees(sds[:3].max())),
         figures=figures,

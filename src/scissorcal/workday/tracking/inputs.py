@@ -137,8 +137,8 @@ def known_pose(engine: Engine) -> KnownPose:
             "rig's frame: photograph the rig card too ('scissorcal capture plate --help'), or name "
             "a camera."
         )
-    found = fit.rig_plate
-    return found.matrix, np.array(found.translation_m), found.covariance
+    pose = fit.rig_plate
+    return pose.matrix, np.array(pose.translation_m), pose.covariance
 
 
 def refuse_other_camera(path: Path, track: RecordedTrack, fitted: Any) -> None:

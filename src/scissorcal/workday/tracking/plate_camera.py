@@ -175,8 +175,8 @@ class PlateCamera:
         stack.enter_context(closing(thread))
 
         def due(now_s: float) -> Iterable[PlatePicture]:
-            for found in thread.due()[-MOST_AT_ONCE:]:
-                picture = eye.picture(found)
+            for located in thread.due()[-MOST_AT_ONCE:]:
+                picture = eye.picture(located)
                 yield replace(picture, arrived_s=picture.arrived_s - begun_s)
 
         return due

@@ -202,19 +202,19 @@ class TrackSession:
         count = self.states.total()
         if not count:
             return "The camera gave no picture."
-        seen = {state: self.states[state] for state in STATES if self.states[state]}
-        causes = ", ".join(f"in {n} {STATES[state]}" for state, n in seen.items())
+        counts = {state: self.states[state] for state in STATES if self.states[state]}
+        causes = ", ".join(f"in {n} {STATES[state]}" for state, n in counts.items())
         return (
             f"None of {count} pictures gave a pose of the plate's target to start from ({causes})."
         )
 
     def _look(self, picture: PlatePicture) -> None:
         """Take from the first picture with a pose what all pictures share."""
-        seen = picture.seen
-        if seen is None or self.started or self.about.shared is not None:
+        sighting = picture.seen
+        if sighting is None or self.started or self.about.shared is not None:
             return
         # corners' errors that repeat from picture to picture are as large as their noise at most
-        shared = seen.shared + seen.noise
+        shared = sighting.shared + sighting.noise
         self.about = replace(self.about, shared=tuple(tuple(row) for row in shared.tolist()))
         self._used = self._settings(shared)
         self.follower.assume(self._used)
@@ -224,9 +224,9 @@ class TrackSession:
     def _settings(self, shared: Array | None) -> TrackingSettings:
         if shared is None and self.about.shared is not None:
             shared = np.array(self.about.shared)
-        found = settings_of(self._recipe, shared if self._calibrated else None)
-        least = max(found.contact.least_force_N, self._least_N)
-        return replace(found, contact=replace(found.contact, least_force_N=least))
+        settings = settings_of(self._recipe, shared if self._calibrated else None)
+        least = max(settings.contact.least_force_N, self._least_N)
+        return replace(settings, contact=replace(settings.contact, least_force_N=least))
 
     def _keep(self, row: FollowedRow, host_s: float) -> None:
         if row.outcome in (Outcome.USED, Outcome.REFUSED):
