@@ -96,7 +96,6 @@ Output = Annotated[Path | None, typer.Option(help="Write here, without a workspa
 Files = Annotated[
     list[Path], typer.Argument(dir_okay=False, help="Logs of one layout, or a camera's file.")
 ]
-Joint
 
 
 @command
