@@ -10,10 +10,10 @@ from typing import Annotated
 
 import typer
 
+import scissorcal
 from scissorcal.cli.lazy import group
 from scissorcal.cli.terminal import echo, patient_output
 from scissorcal.errors import ScissorcalError
-from scissorcal.identity import VERSION
 
 THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """What libraries of linear algebra read once, when they are loaded: after the command has begun."""
@@ -45,7 +45,7 @@ _COMMANDS = {
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"scissorcal, version {VERSION}")
+        typer.echo(f"scissorcal, version {scissorcal.__version__}")
         raise typer.Exit
 
 
