@@ -4,13 +4,11 @@ from functools import partial
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from scissorcal.aliases import Array
 from scissorcal.inference import Optimum, Problem, find_optimum, optimise
 from scissorcal.inference.counting import Stop
-
-Array = NDArray[np.float64]
 
 SEEDS = range(6)
 SAME_HEIGHT = 0.01
