@@ -1,13 +1,14 @@
 """Each rung of effort against known densities, and what it says where there is none."""
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy import stats
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.inference import (
     NotFiniteError,
@@ -19,8 +20,6 @@ from scissorcal.inference import (
 )
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.thorough import run_ensembles
-
-Array = NDArray[np.float64]
 
 CORRELATED = np.array([[1.0, 0.95, 0.0], [0.95, 1.0, 0.0], [0.0, 0.0, 4.0]])
 
@@ -304,6 +303,18 @@ def test_a_checkpoint_of_another_posterior_is_refused_and_kept(tmp_path: Path) -
     path.write_bytes(before[: len(before) // 2])
     with pytest.raises(ValueError, match=r"walks\.npz: not a readable checkpoint"):
         infer(problem_of(normal(np.eye(2)), [[1.0, 1.0]]), "thorough", rng, checkpoint=path)
+
+
+def test_a_checkpoint_with_a_long_header_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "walks.npz"
+    long_header = {"chain": np.zeros(1, [(f"n{k}", float) for k in range(2000)])}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # numpy names the version of so long a header
+        np.savez(path, **long_header)
+    problem = problem_of(normal(np.eye(2)), [[1.0, 1.0]])
+    with pytest.raises(ValueError, match="not a readable checkpoint") as caught:
+        infer(problem, "thorough", np.random.default_rng(0), checkpoint=path)
+    assert "\n" not in str(caught.value)
 
 
 def test_the_generator_alone_decides_what_is_drawn() -> None:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from scissorcal.aliases import Array
 from scissorcal.bench.control.traps import settings_for
 from scissorcal.bench.control.world import Scenario, World, circle, make_world, plane
 from scissorcal.errors import DeviceError
@@ -17,8 +17,6 @@ from scissorcal.tracking.consistency import nees, pose_error
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PlateFollower, SeenPose
 from scissorcal.tracking.tracker import Outcome
-
-Array = NDArray[np.float64]
 
 SHORTEST_S = 0.06
 MOVING = Scenario("moving", moving=True, seconds=6.0)

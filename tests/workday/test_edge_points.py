@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.capture import capture_cut, capture_friction, open_writer
 from scissorcal.device.crossing import Blade
 from scissorcal.device.lockstep import LockstepLink
@@ -37,8 +37,6 @@ from scissorcal.workday.workspace import Workspace
 from tests.device.sim.build import specimen
 from tests.workday.faults import run
 from tests.workday.made import RECIPE
-
-Array = NDArray[np.float64]
 
 SEED = 5
 CAPTURE = """
@@ -148,7 +146,7 @@ def share(rendered: Array, true: Array) -> float:
 
 
 def test_plan_says_what_the_points_are(workspace: Workspace) -> None:
-    said = edge_sentence(workspace.recipe())
+    said = edge_sentence(workspace.recipe().rig.edge, "rotary")
     assert re.match(r"The edge follows 40 points of the recipe, from 0 to 75 mm: ", said)
     assert make_plan(workspace).notes[0] == said
     done = run(("plan",), workspace.root)
@@ -192,7 +190,7 @@ def test_the_report_shows_the_points(workspace: Workspace) -> None:
     assert done.code == 0, done.err
     twin = json.loads(workspace.report_json.read_text(encoding="utf-8"))
     (panel,) = (panel for panel in twin["panels"] if panel["id"] == "scene-edge")
-    assert panel["sentence"] == edge_sentence(workspace.recipe())
+    assert panel["sentence"] == edge_sentence(workspace.recipe().rig.edge, "rotary")
     values = {value["name"]: value for value in panel["rows"][0]["values"]}
     assert (values["family"]["text"], values["points"]["number"]) == ("points", 40)
     misfit = 1e6 * stated_curve(workspace.recipe().rig.edge).misfit_m

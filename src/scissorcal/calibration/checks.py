@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.fit_candidate import SEARCH_REACH, FittedCandidate
 from scissorcal.calibration.result import PRIOR_ONLY, StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
@@ -24,7 +24,6 @@ OTHER_CONTACT_M = 2e-3
 LIMITS = (K_HAT_LIMIT, ADAPTED_LIMIT)
 """Limits of k-hat, of a proposal made without draws and of one that was adapted to them."""
 
-Array = NDArray[np.float64]
 SEARCH = "whether the estimate is an optimum at all"
 DATA = "whether the recording can tell the parameters"
 FINITE = Check("fit finite", "whether there are numbers at all: how many are missing", at_most=0.0)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import needs_extra
 from scissorcal.recording.header import Joint, Kind, Stroke, StrokeKind
-from scissorcal.recording.layout import SAMPLE_DTYPE
+from scissorcal.recording.layout import SAMPLE_DTYPE, column_name, fields
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,9 +28,10 @@ class Recording:
     ``motor_torque`` newtons, as ``joint`` says. ``device`` is the identity that the rig stated
     (empty for imports), ``recipe_toml`` the recipe's text at capture, ``content_hash`` the
     SHA-256 of the file it was read from. ``notes`` are sentences on the capture and on what reading
-    it found (recovered end, garbled frames, gaps), for the report. ``marks`` are facts by name, as
-    the capture wrote them; see ``stop`` and ``unloaded``. ``beside`` is how many rows each channel
-    beside the samples has, by its topic (``read_telemetry`` reads them).
+    it found (recovered end, garbled frames, gaps), for the report; ``particular`` are those of an
+    import that are of this log and not of how all are read (not stored). ``marks`` are facts by
+    name, as the capture wrote them; see ``stop`` and ``unloaded``. ``beside`` is how many rows each
+    channel beside the samples has, by its topic (``read_telemetry`` reads them).
     """
 
     kind: Kind
@@ -43,6 +44,7 @@ class Recording:
     source: str = ""
     content_hash: str = ""
     notes: tuple[str, ...] = ()
+    particular: tuple[str, ...] = ()
     marks: tuple[tuple[str, str], ...] = ()
     beside: Mapping[str, int] = field(default_factory=dict)
 
@@ -70,8 +72,6 @@ class Recording:
         joint), ``motor_torque_Nm`` and so on; ``time_s`` is the device clock from the first sample.
         Raises InputError where pandas is not installed.
         """
-        from scissorcal.recording.layout import columns
-
         try:
             import pandas as pd
         except ImportError:
@@ -102,3 +102,19 @@ class Recording:
         if np.isnan(self.handle_radius_m):
             return motor
         return motor - self.handle_radius_m * hand
+
+
+def columns(recording: Recording) -> dict[str, NDArray[Any]]:
+    """Return the samples by column, each (N,): the fields by :func:`column_name`, and ``time_s``.
+
+    >>> from scissorcal.recording import Recording
+    >>> list(columns(Recording("cut", empty_samples(2))))[3:6]
+    ['device_time_us', 'time_s', 'opening_rad']
+    """
+    by_name: dict[str, NDArray[Any]] = {}
+    for channel in fields():
+        name = column_name(channel, recording.joint)
+        by_name[name] = np.ascontiguousarray(recording.samples[channel])
+        if channel == "device_time_us":
+            by_name["time_s"] = recording.device_time_s
+    return by_name

@@ -1,11 +1,10 @@
 """Whether a filter's covariance is honest: NEES against a chi-square's band."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.tracking.rotation import rotation_vector
-
-Array = NDArray[np.float64]
 
 
 def pose_error(rotation: Array, place_m: Array, true_rotation: Array, true_place_m: Array) -> Array:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.bench.control import arm as true_arm
 from scissorcal.bench.control.arm import Arm
 from scissorcal.bench.control.objects import Plate
@@ -34,8 +34,6 @@ from scissorcal.kernel.hybrid import Hybrid, HybridConfig, NormalLaw, hybrid_inp
 from scissorcal.tracking.rotation import cross
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.tracker import PoseEstimate, PoseTracker
-
-Array = NDArray[np.float64]
 
 LAWS = ("hybrid", "stiff position", "soft position")
 POSES = ("vision", "fused", "true")

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.bench.control.world import (
     Path,
     Probe,
@@ -23,8 +23,6 @@ from scissorcal.bench.control.world import (
 )
 from scissorcal.model.surface import Cylinder, HeightField, Plane, Sphere, Surface
 from scissorcal.model.surface.probed import fit_height_field
-
-Array = NDArray[np.float64]
 
 PROBE_NOISE_M = 5e-6
 PROBED = 21

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.bench.control.objects import Plate
 from scissorcal.bench.control.world import Scenario, World, make_world
@@ -13,8 +12,6 @@ from scissorcal.tracking.consistency import nees, pose_error
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import TrackingSettings
 from scissorcal.tracking.tracker import PoseTracker
-
-Array = NDArray[np.float64]
 
 SOURCES = ("vision", "contact", "force")
 """What the filter is told: pictures alone, contacts as well, and the force's direction too."""

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
+
 Shape = Callable[[Array, Array], tuple[Array, Array]]
 """Surface points and outward normals (n, 3) of two parameters (n,) in metres."""
 Probe = Callable[[Array], tuple[float, Array]]

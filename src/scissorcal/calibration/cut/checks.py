@@ -4,8 +4,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.lack_of_fit import Budget
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.scout import Scouted
@@ -16,8 +16,6 @@ from scissorcal.calibration.signals.sensors import Sensors
 from scissorcal.recipe.priors import LogNormalPrior
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import STATED, Check, Verdict, failed
-
-Array = NDArray[np.float64]
 
 SCATTER_SDS = 3.0
 """Prior standard deviations of the noise's scale beyond which it is no noise that grew."""

@@ -4,15 +4,12 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.calibration.camera.checks import MOST_SD_PX
 from scissorcal.calibration.edge.candidates import MOST_EVALUATIONS
 from scissorcal.calibration.edge.result import BladeFit, PhotographRow, RungRow, SeenPair
 from scissorcal.inference import Effort, SamplingStatus
 from scissorcal.verdicts import INTERVALS, STATED, Check, Verdict
-
-Array = NDArray[np.float64]
 
 MOST_DISAGREEMENT = 3.5
 MOST_APART = 0.005

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.checks import SEARCH
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.parameters import Layout
@@ -13,8 +13,6 @@ from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, side_of
 from scissorcal.model.transforms import LOG
 from scissorcal.verdicts import INTERVALS, Check, Verdict
-
-Array = NDArray[np.float64]
 
 MOST_STEPS = 30
 LOGS = (-60.0, 60.0)

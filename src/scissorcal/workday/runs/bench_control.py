@@ -1,18 +1,16 @@
 """`bench control`: its jobs spread over processes, its page and JSON twin."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scissorcal.aliases import Progress
 from scissorcal.workday.pool import open_pool
 
 if TYPE_CHECKING:
     from scissorcal.bench.control.result import ControlBench
     from scissorcal.bench.control.study import Extent
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)

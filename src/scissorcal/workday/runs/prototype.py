@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import scissorcal
 from scissorcal.errors import InputError, MissingError, needs_extra
+from scissorcal.identity import VERSION
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM
@@ -66,7 +66,7 @@ def workspace_scene(
     return scene_of(
         package,
         made_utc=(now or datetime.now(UTC)).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        version=scissorcal.__version__,
+        version=VERSION,
         fits=fits,
         hands=workspace_hands(workspace),
         warnings=[
@@ -84,13 +84,13 @@ def workspace_plate(workspace: Workspace) -> "DrawnPlate | None":
     None, too, where a file is gone or wrong: the page then says what it cannot draw.
     """
     from scissorcal.prototype.drawn_plate import drawn_plate
-    from scissorcal.recipe.plate_layers import drawings, drawn_layers
+    from scissorcal.recipe.plate_layers import drawn_layers
 
     recipe = workspace.recipe()
-    if not drawings(recipe):
+    if not recipe.plate.drawings:
         return None
     try:
-        layers = drawn_layers(recipe, workspace.root)
+        layers = drawn_layers(recipe.plate, workspace.root)
     except InputError:
         return None
     return drawn_plate(recipe.plate.cut_line_mm, layers)
