@@ -11,12 +11,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from benchmarks.consistency import mean_band, nees, share_held
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tests.second_world import SHAPES, Scene, World, draw_world
 
 from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
-from scissorcal.tracking.consistency import mean_band, nees, share_held
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import PlateMotion, TrackingSettings
 from scissorcal.tracking.tracker import PoseTracker

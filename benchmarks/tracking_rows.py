@@ -12,8 +12,9 @@ from collections.abc import Callable
 from itertools import cycle
 
 import numpy as np
+from benchmarks.control.plates import probed_surface
 
-from scissorcal.model.surface import Cylinder, HeightField, Plane, Surface
+from scissorcal.model.surface import Cylinder, Plane, Surface
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.tracker import PoseTracker
 
@@ -32,19 +33,12 @@ def main() -> None:
 
     print("| row | us | times the solution of 24 equations |")
     print("|---|---|---|")
-    for name, surface in (("plane", Plane()), ("cylinder", Cylinder(0.03)), ("probed", _probed())):
+    surfaces = {"plane": Plane(), "cylinder": Cylinder(0.03), "probed": probed_surface()}
+    for name, surface in surfaces.items():
         print(_line(f"contact, {name}", Fed(surface).contact, yardstick))
     for late in (0, LATE_ROWS):
         fed = Fed(Plane(), late)
         print(_line(f"picture, {late} contacts late", fed.picture, yardstick, fed.between))
-
-
-def _probed() -> HeightField:
-    from scissorcal.bench.control.objects import plate_of
-
-    surface = plate_of("spline").surface
-    assert isinstance(surface, HeightField)
-    return surface
 
 
 class Fed:

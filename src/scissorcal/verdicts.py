@@ -27,39 +27,6 @@ MEANINGS: dict[str, tuple[Limit, str]] = {
         "at most",
         "whether each answer of model and kernel is right or refused: how many are neither",
     ),
-    "bench.control consistency": (
-        "at most",
-        "the pose's stated uncertainty: rows whose mean NEES no consistent filter has",
-    ),
-    "bench.control normal error, fixed": (
-        "at most",
-        "what contact adds to the camera: error along the normal over that of vision alone",
-    ),
-    "bench.control normal error, moving": (
-        "at most",
-        "what contact adds to the camera: error along the normal over that of vision alone",
-    ),
-    "bench.control normal error, 1 s without pictures": (
-        "at most",
-        "what contact adds to the camera: error along the normal over that of vision alone",
-    ),
-    "bench.control traps": (
-        "at most",
-        "each part of the filter: crippled filters that stay consistent",
-    ),
-    "bench.control hybrid force": ("at most", "the pressing force: its rms error, N"),
-    "bench.control stiff position": (
-        "at least",
-        "what contact adds to control by place: force error with vision over that with contact",
-    ),
-    "bench.control path on a disc": (
-        "at least",
-        "what contact adds to the path: its error with vision over that with contact",
-    ),
-    "bench.control touch": (
-        "at most",
-        "the first touch: its peak over approach speed times sqrt(k m)",
-    ),
     "fit finite": ("at most", "whether there are numbers at all: how many are missing"),
     "fit optimum": ("at least", f"{_SEARCH}: starts that ended there"),
     "fit k-hat": ("at most", f"{_INTERVALS}: tail index of the importance weights, enough draws"),

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.consistency import mean_band, share_held
 from benchmarks.second_world import ROWS, SURFACES, follow, judge, runs, settings_of
-
-from scissorcal.tracking.consistency import mean_band, share_held
 
 from . import SHAPES, Scene, draw_world
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.control import world as first_world
 from scipy.spatial.transform import Rotation
 
-from scissorcal.bench.control import world as first_world
 from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
 
 from . import SHAPES, Scene, draw_world

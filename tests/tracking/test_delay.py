@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from benchmarks.control.pose_run import settings_for
+from benchmarks.control.world import Scenario, circle, make_world, plane
 from scipy.stats import chi2
 
-from scissorcal.bench.control.traps import settings_for
-from scissorcal.bench.control.world import Scenario, circle, make_world, plane
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.delay import DelayFit, _last, measure_delay

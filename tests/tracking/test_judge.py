@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.control.pose_run import settings_for
+from benchmarks.control.world import Scenario
 
-from scissorcal.bench.control.traps import settings_for
-from scissorcal.bench.control.world import Scenario
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PlateFollower, SeenPose

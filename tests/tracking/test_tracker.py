@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.control.pose_run import settings_for
+from benchmarks.control.world import Scenario, World, circle, make_world, plane
 from scipy.spatial.transform import Rotation
 
-from scissorcal.bench.control.traps import settings_for
-from scissorcal.bench.control.world import Scenario, World, circle, make_world, plane
 from scissorcal.errors import InputError
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.rows import CameraPose

@@ -19,8 +19,8 @@ from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording
 from scissorcal.render import PlatePose, RenderResult, VirtualStrokes, open_writer, render
 from scissorcal.render.admission import rendered_tables
-from scissorcal.tracking.consistency import pose_error
 from scissorcal.tracking.contacts import TipContacts
+from scissorcal.tracking.rotation import pose_error
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.seen_plate import SeenPlate
 from scissorcal.vision.live import Frame

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from benchmarks.consistency import nees
 from numpy.typing import NDArray
 
 from scissorcal.calibration.plate.fit import plate_target
@@ -13,8 +14,8 @@ from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import parse_recipe, read_text
 from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.recipe.schema import Recipe
-from scissorcal.tracking.consistency import nees, pose_error
 from scissorcal.tracking.contacts import TipContacts
+from scissorcal.tracking.rotation import pose_error
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import RigPose

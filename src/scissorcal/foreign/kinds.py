@@ -65,7 +65,6 @@ _MAGIC: tuple[tuple[bytes, FileKind], ...] = (
 """Bytes at the beginning that no text, and no other of these formats, begins with."""
 
 _OWN = {
-    "bench-control": "a result of 'scissorcal bench control'",
     "capture-design": "the design of a capture",
     "comparison": "a comparison's data",
     "extremes": "a result of 'scissorcal bench extremes'",

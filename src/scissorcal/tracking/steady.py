@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.tracking.consistency import pose_error
 from scissorcal.tracking.plate_pose import PlatePose
-from scissorcal.tracking.rotation import rotation_of
+from scissorcal.tracking.rotation import pose_error, rotation_of
 
 Array = NDArray[np.float64]
 
