@@ -16,7 +16,7 @@ def nees(error: Array, covariance: Array) -> float:
 
 
 def mean_band(runs: int, share: float = 0.95) -> tuple[float, float]:
-    """Band of the mean NEES over independent runs that a consistent filter keeps: 5.5 to 6.5 of 200."""
+    """Band that a consistent filter keeps of the mean NEES over runs (5.5 to 6.5 of 200)."""
     low, high = chi2.ppf([0.5 - share / 2, 0.5 + share / 2], 6 * runs) / runs
     return float(low), float(high)
 
