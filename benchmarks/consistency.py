@@ -1,10 +1,10 @@
 """Whether a filter's covariance is honest: NEES against a chi-square's band."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 
 def nees(error: Array, covariance: Array) -> float:

@@ -32,7 +32,6 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 from benchmarks.days import day_options
-from numpy.typing import NDArray
 
 from scissorcal.calibration import FitResult
 from scissorcal.calibration.cut.fit import fit_cut
@@ -75,7 +74,6 @@ from scissorcal.workday.stock import (
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-Array = NDArray[np.float64]
 Kind = Literal["friction", "cut"]
 ROUNDS = 2
 """Captures of one day at most."""

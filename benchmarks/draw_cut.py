@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tests.second_rig import capture_cut, capture_friction, fine, paper, recipe_for, smooth
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut import teeth
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path import mean_torque, path_motion
@@ -25,8 +26,6 @@ from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.model import Response
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 LOOKS = {
     "fresh": ("#009E73", "s"),

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 from benchmarks.stability import COUNTS, Loops, simulate
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 RATES = (250, 500, 1000, 2000, 4000)
 LATE_S = np.array([0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0]) * 1e-3

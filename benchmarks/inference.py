@@ -30,11 +30,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference import Posterior, Problem, infer
-
-Array = NDArray[np.float64]
 
 WALKERS = 32
 STEPS = 3000

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from benchmarks.consistency import mean_band, nees, share_held
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tests.second_world import SHAPES, Scene, World, draw_world
 
@@ -20,8 +19,6 @@ from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import PlateMotion, TrackingSettings
 from scissorcal.tracking.tracker import PoseTracker
-
-Array = NDArray[np.float64]
 
 SURFACES: dict[str, Surface] = {
     "plane": Plane(),

@@ -16,14 +16,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.render.admission_rule import (
     OSCILLATION_RATE,
     LoopFacts,
     allowed_stiffness,
     delayed_stiffness,
 )
-
-Array = NDArray[np.float64]
 
 STEP_S = 25e-6
 """A tenth of the shortest tick."""

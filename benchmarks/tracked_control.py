@@ -14,10 +14,10 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from numpy.typing import NDArray
 from tests.control.virtual import Run, go, mechanics, points, prepare, rms, specimen
 from tests.workday.track_world import a_recipe, an_eye
 
+from scissorcal.aliases import Array
 from scissorcal.control.surface_path import map_contour
 from scissorcal.device.sim.specimen import Specimen
 from scissorcal.kernel import ControlFlag
@@ -35,8 +35,6 @@ from scissorcal.workday.tracking.pose_source import TrackedPose
 from scissorcal.workday.tracking.session import RigDrive, TrackSession
 from scissorcal.workday.tracking.sim_world import SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackAbout
-
-Array = NDArray[np.float64]
 
 PATH_MM = (10.0, 40.0)
 FORCE_N = 2.0

@@ -26,8 +26,8 @@ from typing import Any
 
 import numpy as np
 from benchmarks.days import day_options
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult
 from scissorcal.calibration.cut.fit import fit_cut
 from scissorcal.calibration.friction.fit import fit_friction
@@ -52,7 +52,6 @@ from scissorcal.workday.runs.sweep_speeds import sweep_bounds
 from scissorcal.workday.stock import seconds_at_rig
 from scissorcal.workday.until import Earlier, Limits, UntilTolerance
 
-Array = NDArray[np.float64]
 RECIPES = ("paper-80gsm", "cotton-cloth")
 INTERVAL = (0.05, 0.95)
 MOST_DRAWS = 500

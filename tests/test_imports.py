@@ -12,10 +12,11 @@ import pytest
 import scissorcal
 
 PACKAGE = Path(scissorcal.__file__).parent
-LEAVES = {"errors", "verdicts", "identity", "files", "foreign", "locks", "<root>"}
+LEAVES = {"aliases", "errors", "verdicts", "identity", "files", "foreign", "locks", "<root>"}
 LOWEST = {"kernel", "model", "inference", "recipe", "recording"}
 MIDDLE = {"device", "vision", "calibration", "package", "render", "report", "tracking", "control"}
 MAY_IMPORT: dict[str, set[str]] = {
+    "aliases": set(),
     "errors": set(),
     "verdicts": set(),
     "identity": set(),

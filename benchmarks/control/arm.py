@@ -7,9 +7,8 @@ import math
 from operator import mul
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 TICK_S = 1e-3
 SUBSTEPS = 4

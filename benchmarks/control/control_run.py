@@ -32,16 +32,14 @@ from benchmarks.control.world import (
     plate_motion,
     slow_process,
 )
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from scissorcal.aliases import Array
 from scissorcal.control.contact_loop import ContactLoop
 from scissorcal.control.gains import FORCE_KP, HybridGains, choose_gains, friction_rates
 from scissorcal.kernel.hybrid import Hybrid, HybridConfig, NormalLaw, hybrid_inputs
 from scissorcal.tracking.rotation import cross
 from scissorcal.tracking.tracker import PoseEstimate, PoseTracker
-
-Array = NDArray[np.float64]
 
 POSES = ("vision", "contact", "true")
 """Where control takes the pose from; with contact the filter has pictures as well."""

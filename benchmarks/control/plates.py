@@ -19,12 +19,10 @@ from benchmarks.control.world import (
     sphere,
     wavy,
 )
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model.surface import Cylinder, HeightField, Plane, Sphere, Surface
 from scissorcal.model.surface.probed import fit_height_field
-
-Array = NDArray[np.float64]
 
 PROBE_NOISE_M = 5e-6
 

@@ -15,7 +15,8 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation, RotationSpline
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
+
 Shape = Callable[[Array, Array], tuple[Array, Array]]
 """Surface points and outward normals (n, 3) of two parameters (n,) in metres."""
 Probe = Callable[[Array], tuple[float, Array]]

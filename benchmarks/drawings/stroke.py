@@ -8,9 +8,8 @@ from benchmarks.drawings.canvas import BLUE, GREEN, GREY, INK, ORANGE, PALE, Dra
 from benchmarks.drawings.scissors import EDGE
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model import Cutting, Response, cut_torque_along, edge_height, settled_contact
-
-Array = NDArray[np.float64]
 
 PAPER = Cutting(
     edge=EDGE,

@@ -1,5 +1,7 @@
 """`bench trade` on a day of the virtual rig, with its real knobs."""
 
+from contextlib import suppress
+
 import pytest
 
 from scissorcal.bench.trade.knob import make_knob, scene_knobs
@@ -60,8 +62,6 @@ def measured_in_part(day: Workspace, knobs: tuple[str, ...]) -> tuple[Trade, flo
     """
     for doubling in range(8):
         chosen = TradeSettings(knobs=knobs, budget_s=3.0 * 2.0**doubling)
-        try:
+        with suppress(InputError):  # the budget is too small for any measurement
             return trade_workspace(day, chosen, workers=2).trade, 3.0 * 2.0**doubling
-        except InputError as refused:
-            assert "too small for any measurement" in str(refused)
     raise AssertionError("no budget up to 384 s was enough for one measurement")

@@ -3,11 +3,9 @@
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 FRICTION_Nm = 0.016
 SMOOTH = 15

@@ -5,12 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import Hybrid, HybridConfig, hybrid_inputs
 from tests.control.plant import Plant
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

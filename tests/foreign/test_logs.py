@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.signals.survey import survey
 from scissorcal.errors import InputError
 from scissorcal.recording import Recording, import_table
 from scissorcal.recording.marks import lone_excursion, marks_in
 from scissorcal.recording.wraps import continued_clock, jumps_in, overflows
-
-Array = NDArray[np.float64]
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "logs"
 COUNT, RATE_HZ = 1600, 200.0

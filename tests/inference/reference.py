@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference import Problem
-
-Array = NDArray[np.float64]
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 NIST = DATA / "nist_strd"

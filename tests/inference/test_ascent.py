@@ -4,12 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference import Counter, Problem, SearchStatus, find_optimum
 from scissorcal.inference.ascent import ascend
-
-Array = NDArray[np.float64]
 
 
 def problem(height: Callable[[Array], float], size: int, start: Array, sd: float = 10.0) -> Problem:

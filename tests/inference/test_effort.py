@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy import stats
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.inference import (
     NotFiniteError,
@@ -19,8 +19,6 @@ from scissorcal.inference import (
 )
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.thorough import run_ensembles
-
-Array = NDArray[np.float64]
 
 CORRELATED = np.array([[1.0, 0.95, 0.0], [0.95, 1.0, 0.0], [0.0, 0.0, 4.0]])
 

@@ -5,10 +5,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 
+from scissorcal.aliases import Array
 from scissorcal.inference import ArNoise, Problem, fit_ar, infer, log_density, tails_of
 from scissorcal.inference.long_run import covariance_of_sum
-
-Array = NDArray[np.float64]
 
 
 def test_covariance_of_a_sum_is_the_toeplitz_quadratic_form():

@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference import Counter, SearchStatus, infer
 from tests.inference import reference
-
-Array = NDArray[np.float64]
 
 ANOTHER_OPTIMUM = (
     "Depending on the libraries' rounding, the search without squares ends in another local "

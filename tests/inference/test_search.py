@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference import (
     Counter,
     Problem,
@@ -16,8 +16,6 @@ from scissorcal.inference import (
     hessian,
     infer,
 )
-
-Array = NDArray[np.float64]
 
 X = np.linspace(0.0, 4.0, 60)
 TRUTH = np.array([2.0, 0.7, np.log(0.05)])

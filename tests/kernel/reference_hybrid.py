@@ -10,11 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import HybridConfig, HybridFlag, NormalLaw
 
-Array = NDArray[np.float64]
 Row = dict[str, Any]
 LARGEST = 1e9
 

@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
+
+from scissorcal.aliases import Array
 
 FILE = Path(__file__).parents[1] / "golden" / "edges.json"
 MOST_PIECES, WANTED_M, LARGEST_M, SMOOTHING = 16, 5e-6, 2e-5, 1e-3
 PLACES = 41
 
-Array = NDArray[np.float64]
 Law = Callable[[Array], Array]
 
 

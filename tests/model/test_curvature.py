@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model import Edge, FrictionLaw, Response
 from scissorcal.model.curvature import (
     cubic_curvature,
@@ -16,7 +16,6 @@ from scissorcal.model.curvature import (
     response_curvature,
 )
 
-Array = NDArray[np.float64]
 SHARES = np.linspace(0.02, 0.98, 13)[:, None]
 
 

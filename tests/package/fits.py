@@ -5,13 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.calibration import FitResult, FitSeries, FittedParameter
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 
-Array = NDArray[np.float64]
 UNITS = {"response_force": "N", "response_exponent": "1", "fracture_energy": "J/m", "kappa": "1"}
 FRICTION = {
     "inertia": 6e-4,

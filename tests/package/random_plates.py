@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import ModelTables, Piece, PiecesModel, StepFlag, Strip, Table
 from scissorcal.package.plate_slopes import PlateSlopes
 from tests.kernel.zoo import BLADE_LENGTH, arc_edge, line_edge, make_tables, power_response
-
-Array = NDArray[np.float64]
 
 STROKES, PLACES = 24, 160
 TURN_RAD, MOVE_M = 4e-4, 2e-5

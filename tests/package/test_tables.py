@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model import Response
 from scissorcal.package.tables import FLOOR, LARGEST_TABLE, fit_table, hermite
-
-Array = NDArray[np.float64]
 
 FLOAT32_ROUNDING = 2e-6
 """A few float32 roundings while a cubic is evaluated, as a share of its value."""

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from playwright.sync_api import Browser
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.kernel.tables import Table
 from scissorcal.model.edge import Edge
@@ -20,7 +20,6 @@ from tests.model.golden_edges import golden
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design import SHEET, box, drawn, layer, recipe_of
 
-Array = NDArray[np.float64]
 RANDOM = 120
 OFFSET_M, SLOPE = 1e-9, 1e-6
 CURVE = """([points, at]) => tried(() => { const c = splineThrough(points); return {

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, expect
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.friction.typical import at_typical
 from scissorcal.kernel import Kernel
 from scissorcal.kernel.tables import Table
@@ -25,7 +25,6 @@ from tests.browser import open_file, put_back
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.prototype.design_bed import EDGE, Bed
 
-Array = NDArray[np.float64]
 ROUNDED = 2e-5
 """Of the torque: five roundings of a height of 8 mm, 0.9 nm each, of 0.2 mm of indentation."""
 DENSE = 250

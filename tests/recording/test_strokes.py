@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recording import TurningPoints, label_strokes
-
-Array = NDArray[np.float64]
 
 
 def trapezoids(speeds: list[float], rest_s: float, step: float = 1e-3) -> tuple[Array, Array]:

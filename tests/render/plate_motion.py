@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import ModelTables
 from scissorcal.render import PlatePose
 from tests.kernel.reference_plate import Placed, ReferencePlate
 
-Array = NDArray[np.float64]
 Samples = NDArray[np.void]
 
 FLAT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.errors import MissingError
 from scissorcal.kernel import SampleFlag
@@ -19,8 +20,6 @@ from scissorcal.render import RenderResult, VirtualStrokes, open_writer, render
 from scissorcal.render.admission import rendered_tables
 from scissorcal.render.plate_pose import FALL_S, STALE_S
 from tests.render.plate_motion import Move, Tracker, true_torque
-
-Array = NDArray[np.float64]
 
 STROKES = VirtualStrokes(count=3, rate_rad_per_s=0.5)
 BEGINS_S, TAKES_S = 7.0, 0.8

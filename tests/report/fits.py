@@ -3,14 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
 from scissorcal.recording.recording import Stroke, StrokeKind
 from scissorcal.report import RecordingSummary
 from scissorcal.verdicts import Verdict
-
-Array = NDArray[np.float64]
 
 FRICTION_SOURCE = "captures/friction-20250131T140500Z.mcap"
 CUT_SOURCE = "captures/cut-20250131T143000Z.mcap"

@@ -4,14 +4,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter
 from scissorcal.recording.recording import Recording
 from tests.calibration.truth import Truth
 from tests.report.fits import cut_fit, friction_fit
-
-Array = NDArray[np.float64]
 
 SPREAD = 0.01
 DRAWS = 120

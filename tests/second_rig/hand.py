@@ -1,14 +1,12 @@
 """Paths of a hand that makes a plan's strokes in its own way: minimum jerk, uneven, trembling."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.trajectory import Plan
 
 from .parameters import Rig
 from .simulate import HAND, Timeline
-
-Array = NDArray[np.float64]
 
 PAUSE_S = 0.12
 SLEDGE_SPEED = 0.07

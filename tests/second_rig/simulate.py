@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
+
 from .library import JUMP, PARAMETERS, ROW, Inputs, library
 from .parameters import Material, Rig
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
 OFF, SERVO, BRAKE, HAND = range(4)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from tests.second_rig import (
     Books,
     Rig,
@@ -20,8 +21,6 @@ from tests.second_rig import (
 )
 from tests.second_rig.simulate import SERVO, toughness_of
 from tests.second_rig.truth import response
-
-Array = NDArray[np.float64]
 
 
 def lever_and_slope(rig: Rig, opening: Array, contact: Array) -> tuple[Array, Array, Array]:

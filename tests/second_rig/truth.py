@@ -1,11 +1,11 @@
 """The rig's parameters under the names of the fits, and laws in closed form. For judging only."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from scissorcal.aliases import Array
 
 from .parameters import Rig
-
-Array = NDArray[np.float64]
 
 
 def true_parameters(

@@ -5,12 +5,11 @@ from math import radians
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from .motion import Motion
+from scissorcal.aliases import Array
 
-Array = NDArray[np.float64]
+from .motion import Motion
 
 FOCAL_PX, CENTRE_PX, HEIGHT_PX, BEND = 900.0, (640.0, 360.0), 720, -0.1
 FOCAL_OFF, CENTRE_OFF_PX, BEND_OFF = 4e-4, 0.25, 2e-3

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from math import pi, radians, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import cont2discrete, fftconvolve, lfilter
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
+
 Motion = Callable[[Array], tuple[Array, Array]]
 """Rotations (n, 3, 3) and places (n, 3) of a plate at times (n,)."""
 

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 from math import exp, hypot, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+
+from scissorcal.aliases import Array
 
 from .motion import Motion
 from .shapes import Shape
-
-Array = NDArray[np.float64]
 
 STEP_S, ROWS_EVERY = 1e-3, 10
 COMPLIANCE, COMPLIANCE_SPREAD, AT_N = 1e-4, 0.2, 2.5

@@ -3,14 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .camera import Picture, pictures
 from .motion import Motion, moved
 from .shapes import Shape
 from .touch import Touches, touches
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

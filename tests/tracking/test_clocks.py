@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.stats import binom
 
+from scissorcal.aliases import Array
 from scissorcal.errors import DeviceError
 from scissorcal.tracking.clocks import USUAL_DRIFT, ClockWatch, fit_clock
 
-Array = NDArray[np.float64]
 REMEDY = "Restart the camera."
 CAMERA_HZ = 33.0
 LEAST_DELAY_S = 0.06

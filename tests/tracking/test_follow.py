@@ -9,17 +9,15 @@ import pytest
 from benchmarks.consistency import nees
 from benchmarks.control.pose_run import settings_for
 from benchmarks.control.world import Scenario, World, circle, make_world, plane
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from scissorcal.aliases import Array
 from scissorcal.errors import DeviceError
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PlateFollower, SeenPose
 from scissorcal.tracking.rotation import pose_error
 from scissorcal.tracking.tracker import Outcome
-
-Array = NDArray[np.float64]
 
 SHORTEST_S = 0.06
 MOVING = Scenario("moving", moving=True, seconds=6.0)

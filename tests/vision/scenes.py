@@ -7,8 +7,6 @@ from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import Lens, Looks, Pose, render, target_layers
 from scissorcal.vision.targets.boards import Board
 
-Array = NDArray[np.float64]
-
 SOFT = Looks(softness_px=0.7, noise=0.01)
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.motion import Samples
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.kernel import ConfigKey, SampleFlag
@@ -35,8 +35,6 @@ from scissorcal.workday.tracking.track_recorder import TrackAbout
 from tests.control.virtual import mechanics
 from tests.render.plate_motion import Move, true_torque
 from tests.workday.track_world import TEXT, an_eye
-
-Array = NDArray[np.float64]
 
 TAPPED_MM = (20.0, 12.0, 12.0)
 """Where the tip reaches the plate: above it the blades can close no farther than 12 degrees."""

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.capture import capture_cut, capture_friction, open_writer
 from scissorcal.device.crossing import Blade
 from scissorcal.device.lockstep import LockstepLink
@@ -37,8 +37,6 @@ from scissorcal.workday.workspace import Workspace
 from tests.device.sim.build import specimen
 from tests.workday.faults import run
 from tests.workday.made import RECIPE
-
-Array = NDArray[np.float64]
 
 SEED = 5
 CAPTURE = """

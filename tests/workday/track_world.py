@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 from benchmarks.consistency import nees
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.plate.fit import plate_target
 from scissorcal.device.motion import Motion
 from scissorcal.model.blade_point import BladePoint
@@ -25,8 +25,6 @@ from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
 from scissorcal.workday.tracking.session import RigDrive, TrackSession
 from scissorcal.workday.tracking.sim_world import SimCamera, SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder
-
-Array = NDArray[np.float64]
 
 CAMERA_SDS = np.array([0.8, 0.8, 0.6, 0.6, 1e-3, 3e-3, 1e-4, 1e-4, 1e-3])
 RIG_SDS = np.array([5e-4, 5e-4, 5e-4, 1e-4, 1e-4, 2e-4])

@@ -5,8 +5,8 @@ from pathlib import PurePath
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.checks import trust_verdicts
 from scissorcal.calibration.comparison import candidate_rows, comparison_text
 from scissorcal.calibration.critic import NOT_ASKED, Critique, criticise, structure_verdict
@@ -20,9 +20,6 @@ from scissorcal.calibration.signals.usage import Usage
 from scissorcal.inference import Posterior, ljung_box
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 MOST_POINTS = 20000
 BAND_DRAWS = 100

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.caveats import NEXT_RECORDING
 from scissorcal.calibration.checks import HELD_OUT_LIMIT
 from scissorcal.calibration.fit_model import Experiment
@@ -20,10 +21,6 @@ from scissorcal.inference.between import BROAD, between_groups, one_normal
 from scissorcal.model.transforms import LOG
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, judge, not_evaluated
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 FEWEST_BINS = 100
 """Moving bins from which a recording is fitted by itself."""

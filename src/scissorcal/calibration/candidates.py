@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 POSITIVE_EVIDENCE = 3.0
 """Log density, counting independent observations only, that the best candidate must gain: a factor

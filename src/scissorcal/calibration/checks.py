@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.fit_candidate import SEARCH_REACH, FittedCandidate
 from scissorcal.calibration.result import PRIOR_ONLY, StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
@@ -27,8 +27,6 @@ LIMITS = (K_HAT_LIMIT, ADAPTED_LIMIT)
 """Limits of k-hat, of a proposal made without draws and of one that was adapted to them."""
 NEAR_EDGE = 0.98 * SEARCH_REACH
 """Prior standard deviations from its centre at which a parameter is at the search's limit."""
-
-Array = NDArray[np.float64]
 
 
 def trust_verdicts(

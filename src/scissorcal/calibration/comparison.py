@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.candidates import (
     POSITIVE_EVIDENCE,
     RELIABLE_UNITS,
@@ -21,8 +21,6 @@ from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.calibration.psis_loo import RELIABLE
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.recording.recording import Joint
-
-Array = NDArray[np.float64]
 
 PLACES = 5
 """Stretches of speed, and of contact or opening, among which the place of most difference lies."""

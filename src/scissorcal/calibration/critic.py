@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.candidates import POSITIVE_EVIDENCE
 from scissorcal.calibration.fit_candidate import FittedCandidate, split_strokes
 from scissorcal.calibration.leftover import DRAWS, Leftover, course_of, tabulate
@@ -22,8 +22,6 @@ from scissorcal.model.course_terms import LIBRARY
 from scissorcal.model.terms import Term
 from scissorcal.recording.recording import Joint
 from scissorcal.verdicts import Verdict, not_evaluated
-
-Array = NDArray[np.float64]
 
 FALSE_ALARM = 0.02
 """Chance that the critic proposes anything where nothing is missing."""

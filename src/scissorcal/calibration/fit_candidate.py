@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.psis_loo import LeftOut, leave_strokes_out
 from scissorcal.calibration.signals.segments import by_label
@@ -18,9 +19,6 @@ from scissorcal.inference.information import likelihood_information
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.tails import log_density
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 FOLDS = 4
 SEARCH_REACH = 8.0

@@ -2,14 +2,9 @@
 
 from typing import Literal, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.fit_candidate import Candidate
 from scissorcal.calibration.parameters import Layout
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class Experiment(Protocol):

@@ -10,15 +10,13 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.fit_candidate import FittedCandidate, split_strokes
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference import gradient, ljung_box
 from scissorcal.model.course_terms import Course
 from scissorcal.model.terms import Term
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 KNOWN_TO_LAW = 1e-3
 """Share of a term's variance that law and simpler terms cannot imitate, below which it is none."""

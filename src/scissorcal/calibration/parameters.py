@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FittedParameter
 from scissorcal.model.transforms import Transform
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.stroke_intervals import LEVEL, Interval
-
-Array = NDArray[np.float64]
 
 FLAT = 0.2
 """On a plateau the mean curve stays within this share of its mean, all in all."""

@@ -5,13 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.comparison import best_of, contenders
 from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.calibration.psis_loo import DRAWS, LeftOut
 from scissorcal.calibration.result import Effort, Predictive
 from scissorcal.inference import fit_ar
-
-Array = NDArray[np.float64]
 
 RESAMPLED = 3 * DRAWS // 4
 """Equally weighted draws, few enough that hardly one is repeated: repeated ones raise k-hats."""

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference import Counter, Problem, smooth_weights
-
-Array = NDArray[np.float64]
 
 DRAWS, MULTIPLIER = 256, 75
 """Draws, and the multiplier of their lattice."""

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.calibration.result import ReplayComparison, ReplayRow
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference import find_optimum
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 KNOTS = 60
 FEWEST_BINS = 20

@@ -8,11 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.recipe.requirements import command_words
 from scissorcal.verdicts import Verdict, failed
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Effort = Literal["draft", "standard", "thorough"]
 
 PRIOR_ONLY = 0.9

@@ -4,11 +4,10 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.parameters import Layout
 
-Array = NDArray[np.float64]
 AnyLayout = TypeVar("AnyLayout", bound=Layout)
 
 

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 LEVEL = 0.90
 FEWEST = 3

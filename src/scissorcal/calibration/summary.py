@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.plateau import (
     LEAST_PLATEAU,
     Plateau,
@@ -28,7 +29,6 @@ from scissorcal.calibration.stroke_intervals import (
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording, StrokeKind
 
-Array = NDArray[np.float64]
 Effort = Literal["motor_torque", "handle_force"]
 
 BINS = 60

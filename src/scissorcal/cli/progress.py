@@ -1,14 +1,18 @@
 """Progress for people, always on stderr: a bar on a terminal, plain lines anywhere else."""
 
+from __future__ import annotations
+
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from scissorcal.cli.terminal import echo, printable
 from scissorcal.errors import VerdictError
 
-Progress = Callable[[float, str], None]
+if TYPE_CHECKING:
+    from scissorcal.aliases import Progress
 
 _LINE_EVERY_S = 5.0
 _NEW_SENTENCE_AFTER_S = 2.0

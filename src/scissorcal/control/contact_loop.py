@@ -21,9 +21,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.control import rate_weight
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import Contour
 from scissorcal.model.surface import Surface
 from scissorcal.tracking.plate_pose import PlatePose
-
-Array = NDArray[np.float64]
 
 ROUNDS = 20
 CLOSE_M = 1e-9

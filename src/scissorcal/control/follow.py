@@ -2,12 +2,12 @@
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Progress
 from scissorcal.control.contours import Foot, contour_at, foot_of
 from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.path_file import SurfacePoints
@@ -42,9 +42,6 @@ from scissorcal.recording import RecordingWriter
 from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult
 from scissorcal.recording.telemetry import CONTROL
 from scissorcal.tracking.plate_pose import PlatePose, PoseSource
-
-Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 EVERY_S = 0.01
 HIGHER_M = 5e-3

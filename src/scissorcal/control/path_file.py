@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.foreign import read_foreign_text
 from scissorcal.foreign.formats import PATH
-
-Array = NDArray[np.float64]
 
 COLUMNS = ("x_mm", "y_mm", "force_N", "speed_mm_per_s")
 LARGEST_MM = 10_000.0

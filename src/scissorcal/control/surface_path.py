@@ -6,13 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.control.contours import Foot, foot_of, on_plate
 from scissorcal.control.path_file import SurfacePoints
 from scissorcal.errors import InputError
 from scissorcal.model.surface import HeightField, Surface
 from scissorcal.tracking.plate_pose import PlatePose
-
-Array = NDArray[np.float64]
 
 SPACING_M = 5e-4
 MARGIN_M = 5e-3

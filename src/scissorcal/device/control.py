@@ -16,7 +16,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
+
 Responses = tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.complex128]]
 """Of the place, its rate and its integral, to a unit of gain each."""
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Mask
 from scissorcal.device.capture import planned
 from scissorcal.device.completeness import planned_excitation_s
 from scissorcal.device.coverage import (
@@ -23,7 +24,6 @@ from scissorcal.recipe.schema import Capture, Recipe
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.until import UntilMark
 
-Mask = NDArray[np.bool_]
 Labels = NDArray[np.int64]
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.advance_trajectory import advance_range, sliding_speeds
 from scissorcal.device.cut_trajectory import cut_openings, press_openings
 from scissorcal.device.trajectory import opening_range
@@ -16,7 +17,6 @@ from scissorcal.recipe.schema import Recipe
 if TYPE_CHECKING:
     from rich.table import Table
 
-Array = NDArray[np.float64]
 Range = tuple[float, float]
 Direction = Literal["closing", "opening", "backward", "forward"]
 

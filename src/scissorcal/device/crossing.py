@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.recipe.edge import StatedCurve, stated_curve
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 TIP_SHARE = 0.97
 """Share of the blade's length that a plan uses: the very tip is rounded."""

@@ -4,13 +4,12 @@ import math
 import os
 import select
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers, Progress
 from scissorcal.device.diagnosis import Measurements, adapter_timer_path, brake_after_ms, diagnose
 from scissorcal.device.link import PortLink
 from scissorcal.device.timing import Percentiles
@@ -18,10 +17,6 @@ from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, State
 from scissorcal.recording.summarising import missing_frames
 from scissorcal.verdicts import Verdict
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Progress = Callable[[float, str], None]
 
 ROUND_TRIPS = 100
 SLEEPS = 500

@@ -6,12 +6,12 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from scissorcal.aliases import Array
 from scissorcal.device.link import Link
 from scissorcal.device.motion import (
     BLOCK_S,
     RELEASE_COMMANDS,
     SILENCE_S,
-    Array,
     Motion,
     MotionReport,
     Samples,

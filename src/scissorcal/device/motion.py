@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.paths import Reference
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.device.trajectory import approach, check_reference
@@ -27,7 +28,6 @@ from scissorcal.kernel import (
 )
 
 Samples = NDArray[np.void]
-Array = NDArray[np.float64]
 Stages = NDArray[np.int32]
 
 BLOCK_S = 0.05

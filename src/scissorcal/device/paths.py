@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.recipe.capture_cost import MOST_MIN
 from scissorcal.recipe.pace import glide_speed, glide_time, ramp_time
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

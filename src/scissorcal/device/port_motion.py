@@ -4,8 +4,9 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
+from scissorcal.aliases import Array
 from scissorcal.device.link import PortLink, check_echo
-from scissorcal.device.motion import BLOCK_S, Array, Motion, MotionReport, Samples, Stages
+from scissorcal.device.motion import BLOCK_S, Motion, MotionReport, Samples, Stages
 from scissorcal.device.paths import Reference
 from scissorcal.device.servo_process import ServoProcess
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles

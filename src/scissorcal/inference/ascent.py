@@ -3,13 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference.counting import Stop
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.squares import Descent
-
-Array = NDArray[np.float64]
 
 STEP = 0.02
 """Step of the central differences, in standard deviations by the scores' outer product."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 CHAINS, BURN, SWEEPS = 40, 30, 40
 """Chains run side by side, sweeps that are thrown away, and sweeps that are kept."""

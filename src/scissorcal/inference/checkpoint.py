@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
 from scissorcal.foreign import open_foreign
 from scissorcal.foreign.formats import CHECKPOINT
 
-Array = NDArray[np.float64]
 RandomState = tuple[str, NDArray[np.uint32], int, int, float]
 
 

@@ -3,12 +3,9 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scissorcal.aliases import Array
 from scissorcal.inference.problem import Problem
 
-Array = NDArray[np.float64]
 Stop = Callable[[], bool]
 """Says whether the time allowed is used up; the clock is the caller's."""
 

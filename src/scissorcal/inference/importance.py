@@ -4,12 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference.mixture import Mixture, fit_mixture, wide_mixture
 from scissorcal.inference.pareto import smooth_weights
 
-Array = NDArray[np.float64]
 Many = Callable[[Array], Array]
 
 K_HAT_LIMIT = 0.7

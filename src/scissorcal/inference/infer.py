@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Progress
 from scissorcal.inference.counting import Counter, Stop, TimeUsedUpError
 from scissorcal.inference.importance import (
     DEFENSIVE,
@@ -25,9 +25,6 @@ from scissorcal.inference.posterior import Effort, Posterior
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus, about, picked
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
-
-Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
 """Evaluations that sampling may take where the caller says nothing."""

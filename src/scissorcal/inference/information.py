@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference.curvature import gradient, hessian
 from scissorcal.inference.problem import Problem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference.curvature import gradient, hessian, natural_step
 from scissorcal.inference.information import Slopes, likelihood_information, slopes_at
 from scissorcal.inference.optimise import Optimum, move_optimum
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import NotFiniteError, picked
-
-Array = NDArray[np.float64]
 
 RIDGE = 1e-3
 """Information, in units of the prior's, that keeps directions without data well defined."""

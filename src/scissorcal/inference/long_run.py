@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference.ar_noise import ArNoise, fit_ar, runs
 from scissorcal.inference.autocorrelation import robust_covariance_of_scores
 from scissorcal.inference.information import Slopes
 from scissorcal.inference.problem import Problem
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 WELL_ABOVE_ROUNDING = 1e-6

@@ -6,12 +6,10 @@ from functools import cached_property
 from math import gamma
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.inference.mixture import Mixture
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Many = Callable[[Array], Array]
 Node = tuple[int, ...]
 

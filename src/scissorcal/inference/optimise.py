@@ -4,15 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference.ascent import ascend
 from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.squares import descend, has_squares
 from scissorcal.inference.status import NotFiniteError, SearchStatus, about, picked
-
-Array = NDArray[np.float64]
 
 WORST = 1e300
 """Stands for a log-posterior of -inf: finite, because BOBYQA calls a NaN or an infinity solved."""

@@ -1,9 +1,8 @@
 """Pareto smoothing of importance weights, and the tail index k-hat that judges them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 LARGEST_TAIL = 0.2
 """Share of the weights that may count as their tail."""

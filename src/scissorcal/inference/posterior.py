@@ -4,13 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scissorcal.aliases import Array
 from scissorcal.inference.optimise import Cluster, Optimum
 from scissorcal.inference.status import SamplingStatus
 
-Array = NDArray[np.float64]
 Effort = Literal["draft", "standard", "thorough"]
 
 

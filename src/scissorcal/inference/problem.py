@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-
+from scissorcal.aliases import Array
 
 MOST_CURVED = 3
 """Parameters along which a lattice of 400 nodes still reaches as far as draws do."""

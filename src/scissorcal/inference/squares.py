@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference.counting import Stop, TimeUsedUpError
 from scissorcal.inference.curvature import gradient, hessian
 from scissorcal.inference.problem import Problem
-
-Array = NDArray[np.float64]
 
 ALTERNATIONS = 8
 """Rounds of least squares with the standard deviations held, each followed by scoring."""

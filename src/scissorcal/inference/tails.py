@@ -1,9 +1,8 @@
 """Tails of the noise: normal, or a Student-t where residuals have outliers."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 HEAVIEST = 2.1
 LIGHTEST = 200.0

@@ -6,15 +6,12 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Progress
 from scissorcal.inference.checkpoint import RandomState, Walk, load_walks, save_walks
 from scissorcal.inference.counting import TimeUsedUpError
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.status import NotFiniteError, SamplingStatus
-
-Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 ENSEMBLES = 4
 LONG = 100.0

@@ -16,11 +16,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel.sources import c_sources
 from scissorcal.kernel.table16 import Row16
 from scissorcal.kernel.tables import TABLE_NAMES, ModelTables
 
-Array = NDArray[np.float64]
 Real = Literal["float", "double"]
 Target = Literal["host", "cortex-m4f"]
 Rows = tuple[Row16, Row16, Row16]

@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel._kernel import ffi, lib
-
-Array = NDArray[np.float64]
 
 _FRACTURE: Mapping[str, int] = {
     "none": lib.SC_CRACK_NONE,

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel._kernel import ffi, lib
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int32]
 
 _FRACTURE: Mapping[str, int] = {

@@ -3,11 +3,9 @@
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel._kernel import ffi, lib
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

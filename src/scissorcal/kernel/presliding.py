@@ -1,11 +1,9 @@
 """Dahl's presliding along a path, in C, in one pass."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel._kernel import ffi, lib
-
-Array = NDArray[np.float64]
 
 
 def presliding_path(opening: Array, length: float) -> Array:

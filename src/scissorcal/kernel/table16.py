@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel._kernel import ffi, lib
 from scissorcal.kernel.tables import LARGEST_TABLE, Table
-
-Array = NDArray[np.float64]
 
 LOWEST, STEPS = -(2**15), 2**16 - 1
 SCALE_BITS = 8

@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.model.checks import check_moving_blades, check_numbers
 from scissorcal.model.edge import Edge
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 FEWEST = 4
 """Weights of the shortest cubic spline, which is one cubic."""

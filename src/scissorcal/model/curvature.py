@@ -9,14 +9,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model.bspline import FEWEST
 from scissorcal.model.edge import Edge
 from scissorcal.model.friction import FrictionLaw, friction_level
 from scissorcal.model.response import LARGEST_ARGUMENT, Response
 
-Array = NDArray[np.float64]
 Bounds = tuple[Array, Array]
 
 

@@ -6,11 +6,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model.checks import SMALLEST, check_moving_blades, check_name, check_numbers
 from scissorcal.model.edge import Edge, EdgeView, edge_height
 from scissorcal.model.response import Response
 
-Array = NDArray[np.float64]
 Closure = Literal["work", "eq4"]
 _CLOSURES = get_args(Closure)
 

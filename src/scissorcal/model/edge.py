@@ -6,13 +6,13 @@ from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.errors import ModelError
 from scissorcal.model.bspline import FEWEST, spline_slope, spline_value
 from scissorcal.model.checks import SMALLEST, check_name, check_numbers
 
-Array = NDArray[np.float64]
 Family = Literal["line", "arc", "cubic", "spline"]
 _FAMILIES = get_args(Family)
 

@@ -4,12 +4,11 @@ from dataclasses import replace
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.model.bspline import FEWEST, spline_design
 from scissorcal.model.edge import Edge
-
-Array = NDArray[np.float64]
 
 FEWEST_POINTS, MOST_POINTS = 3, 200
 MOST_PIECES = 16

@@ -5,14 +5,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.model.checks import check_name, check_numbers
 from scissorcal.model.friction_terms import PARAMETERS, TERMS, side_of
 from scissorcal.model.terms import Motion, Role, Term
 from scissorcal.model.transforms import LOG, LOGIT
-
-Array = NDArray[np.float64]
 
 COMPLEX_STEP = 1e-30
 """Imaginary step by which a term is differentiated: exact to rounding, as nothing is subtracted

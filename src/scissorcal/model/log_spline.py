@@ -5,10 +5,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from scissorcal.aliases import Array, Integers
+
 Bounds = tuple[Array, Array]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)

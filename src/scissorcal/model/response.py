@@ -5,13 +5,12 @@ from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.errors import ModelError
 from scissorcal.model.checks import SMALLEST, check_name, check_numbers
 from scissorcal.model.log_spline import Bounds, LogSpline
-
-Array = NDArray[np.float64]
 
 Family = Literal["power", "exponential", "spline"]
 _FAMILIES = get_args(Family)

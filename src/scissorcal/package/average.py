@@ -1,13 +1,11 @@
 """The mean torque from the kernel's tables, with fracture's ripple averaged out."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import Kernel
 from scissorcal.package.compile import Arrays, kernel_tables, table_of
 from scissorcal.package.manifest import Mechanics, Ranges
-
-Array = NDArray[np.float64]
 
 LEVELS = 9
 EVEN = 1e-6

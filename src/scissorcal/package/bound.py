@@ -5,14 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model import edge_height, settled_contact
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.compile import STRONGEST_N
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.grid import FELT_SHARE, Points, nearby_points, spread_points
 from scissorcal.package.manifest import Ranges
-
-Array = NDArray[np.float64]
 
 STATED_OVER_SEEN = 2.0
 """The stated bound over the largest error found."""

@@ -10,14 +10,12 @@ times the material's torque; that part is stated, not rendered.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult
 from scissorcal.calibration.friction.typical import at_typical
 from scissorcal.calibration.result import FittedParameter
 from scissorcal.package.friction_tables import LOAD_SHARE, share_of
-
-Array = NDArray[np.float64]
 
 GROWING = ("response_force", "fracture_energy")
 

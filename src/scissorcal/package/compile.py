@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.kernel import ModelTables, Table
 from scissorcal.model import damped, edge_height, mean_share, settled_contact
@@ -26,8 +27,6 @@ from scissorcal.package.grid import NOTHING_TOUCHED, Points, spread_points
 from scissorcal.package.manifest import Fracture, Friction, Mechanics, Ranges
 from scissorcal.package.tables import Fitted, Function, NumberFormat, Rows, fit_table
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-4
 """Of each table, as a share of its value; bound.py measures the resulting error in torque."""

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.result import FitResult
 from scissorcal.model import (
@@ -16,8 +17,6 @@ from scissorcal.model import (
     friction_torque,
 )
 from scissorcal.model.cutting import contact_after_run, torque_at
-
-Array = NDArray[np.float64]
 
 MOST_AT_ONCE = 500_000
 """Draws times points evaluated in one sweep, to limit the memory of a large grid."""

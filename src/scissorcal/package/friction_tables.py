@@ -5,8 +5,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult
 from scissorcal.calibration.result import FittedParameter
 from scissorcal.errors import InputError
@@ -16,8 +16,6 @@ from scissorcal.model.friction import angle_factor, angle_slope, friction_level
 from scissorcal.model.terms import Role
 from scissorcal.package.tables import Function
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 PLACES = 201
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.package.manifest import Ranges
-
-Array = NDArray[np.float64]
 
 NOTHING_TOUCHED = (
     "Nowhere in the scene do the blades touch the material, so nothing can be rendered: "

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import ModelTables, Table
 from scissorcal.model.curvature import Span
 from scissorcal.package.profile import Profile
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 STEEPEST = 0.05

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel
 from scissorcal.package.archive import REMEDY, read_archive
@@ -28,8 +29,6 @@ from scissorcal.package.reach import reach_sentences
 from scissorcal.package.review import against
 from scissorcal.package.signature import signature_refusal
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Share of a range's end by which a place may lie beyond it and still count as inside."""

@@ -26,6 +26,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import ModelTables, Piece
 from scissorcal.model.curvature import Span
 from scissorcal.package.law_boxes import (
@@ -40,7 +41,6 @@ from scissorcal.package.law_boxes import (
     square,
 )
 
-Array = NDArray[np.float64]
 Quantity = Literal["opening", "cross", "advance", "rate"]
 
 BINS, STATIONS = 64, 97

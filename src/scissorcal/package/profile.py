@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model.curvature import Span
 from scissorcal.package.compile import TableLaw
 from scissorcal.package.proved_tables import running_maxima
-
-Array = NDArray[np.float64]
 
 CELLS = 1024
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import Table
 from scissorcal.package.compile import TableLaw
 from scissorcal.package.tables import hermite
-
-Array = NDArray[np.float64]
 
 CELLS = 32
 """Cells of each interval between knots."""

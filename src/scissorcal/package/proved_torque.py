@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model import edge_height, settled_contact
 from scissorcal.model.curvature import Span
 from scissorcal.package.bound import PARALLEL
@@ -28,8 +29,6 @@ from scissorcal.package.exact import ExactModel
 from scissorcal.package.manifest import Ranges
 from scissorcal.package.profile import profiles
 from scissorcal.package.proved_tables import ProvedTable
-
-Array = NDArray[np.float64]
 
 OPENINGS, CONTACTS = 240, 240
 STEEPEST = 0.05

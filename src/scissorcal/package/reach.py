@@ -7,6 +7,7 @@ for right there, so it cannot show how far off it may be.
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult
 from scissorcal.model import edge_height
 from scissorcal.model.cutting import torque_at, within_thickness
@@ -15,8 +16,6 @@ from scissorcal.package.exact import ExactModel, FitDraws, central_model
 from scissorcal.package.grid import Points
 from scissorcal.package.manifest import DataReach
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 OPENINGS, CONTACTS = 61, 31
 

@@ -6,8 +6,8 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.design.band import SceneSlopes, TorqueKnowledge
 from scissorcal.calibration.design.knowledge import Knowledge
 from scissorcal.calibration.design.state import CutState, FrictionState, sharing_of
@@ -17,8 +17,6 @@ from scissorcal.package.exact import ExactModel, FitDraws, central_model, exact_
 from scissorcal.package.grid import NOTHING_TOUCHED
 from scissorcal.package.scene_torque import felt_places, scene_grid
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 LARGEST_STEP = 0.05
 """Step of the difference at most: 5 % of what has a logarithm."""

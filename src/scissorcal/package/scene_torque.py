@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.fitted import has_numbers
+from scissorcal.aliases import Array, Mask
+from scissorcal.calibration.cut.structure import has_numbers
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.model import edge_height
@@ -26,8 +26,6 @@ from scissorcal.package.grid import FELT_SHARE
 from scissorcal.package.reach import data_reach, reach_sentences
 from scissorcal.recipe.schema import Recipe
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Along = Literal["opening", "opening_rate", "contact"]
 AXES: tuple[Along, ...] = ("opening", "opening_rate", "contact")
 

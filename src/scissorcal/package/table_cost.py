@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import Kernel
 from scissorcal.kernel.compiled_step import (
     SLOW_STROKE_rad_per_s,
@@ -23,8 +23,6 @@ from scissorcal.package.exact import ExactModel
 from scissorcal.package.grid import Points, spread_points
 from scissorcal.package.tables import hermite
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 GRID_POINTS = 8_009
 """Differs from the counts of the bound and of `package check`, so that the places differ."""

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import Row16, Table
 
-Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
 NumberFormat = Literal["float32", "int16", "float64"]
 Rows = tuple[Row16, Row16, Row16]

@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import ModelTables, StepFlag
 from scissorcal.model.curvature import Span
 from scissorcal.package.law_boxes import Boxes, EdgeOver, ResponseOver, slope_of_opening
-
-Array = NDArray[np.float64]
 
 
 class Tangent:

@@ -4,13 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.package.compile import law_functions, mean_energy, table_file
 from scissorcal.package.exact import FitDraws, central_model, exact_model
 from scissorcal.package.model_package import ModelPackage
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

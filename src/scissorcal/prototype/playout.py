@@ -3,7 +3,8 @@
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
+
+from scissorcal.aliases import Array
 
 LAG_s = 0.2
 """By which samples are given out behind the newest that could be here: a recording grows by a chunk
@@ -13,8 +14,6 @@ MOST_A_s = 250.0
 """Samples of each second of the rig that are kept."""
 MOST_AT_ONCE = 250
 MOST_WAITING = 2500
-
-Array = NDArray[np.float64]
 
 
 class Playout:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.prototype.playout import Playout
 from scissorcal.recording import layout
@@ -32,8 +33,6 @@ _INTERRUPTED = (
     "The command that wrote {name} ended without closing it; the next command recovers it."
 )
 _REMOVED = "{name} was removed: its command ended before anything was recorded."
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

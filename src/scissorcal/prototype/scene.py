@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult
 from scissorcal.kernel.tables import TABLE_NAMES
 from scissorcal.kernel.web_module import web_numbers
@@ -29,8 +29,6 @@ from scissorcal.prototype.parts import (
     Stroke,
 )
 from scissorcal.report.numbers import shown_unit
-
-Array = NDArray[np.float64]
 
 FORMAT: Final = "scissorcal-prototype/1"
 

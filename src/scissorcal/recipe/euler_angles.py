@@ -14,15 +14,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import ConfigDict, Field
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
 Quaternion = tuple[float, float, float, float]
 Degrees = Annotated[float, Field(strict=True)]
 Convention = Literal["intrinsic z-y'-x'' (extrinsic roll-pitch-yaw x-y-z)"]

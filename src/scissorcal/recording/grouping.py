@@ -4,9 +4,8 @@ import re
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 GROUPED = re.compile(
     r"[+-]?\d{1,3}(?P<mark>[.,'’_ \u00a0\u202f])\d{3}(?:(?P=mark)\d{3})*(?:[.,]\d*)?"

@@ -1,13 +1,9 @@
 """Values in the place of a measurement: 9999, -32768, -1 and the like, for overflow and loss."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recording.wraps import FASTER
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 MOST_MARKED = 0.05
 """Share of the samples above which a value that lies apart may be a level of the motion."""

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from scissorcal.recording.telemetry import TelemetryChannel
 
-Array = NDArray[np.float64]
-
 SOURCES = ("picture", "contact")
 OUTCOMES = ("used", "refused", "restarted", "waiting", "too late", "no contact")
 STATES = ("waiting", "fused", "pictures", "contacts", "coasting")

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recording.recording import Joint
-
-Array = NDArray[np.float64]
 
 STEADY_STEP, NEAR_WHOLE, SAME = 0.9, 0.05, 1e-9
 

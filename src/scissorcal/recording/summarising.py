@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recording.layout import MEASURED, unit_of
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.recording.resolution import (
@@ -16,8 +17,6 @@ from scissorcal.recording.resolution import (
     is_short,
     long_enough,
 )
-
-Array = NDArray[np.float64]
 
 KNOT_S = 0.0049
 """Knot distance of a fit's windows at the usual cutoff of 75 Hz; a window lasts three of them."""

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.foreign import reading, refuse_unless_regular
 from scissorcal.foreign.formats import LOG, MATLAB, PARQUET
 
-Array = NDArray[np.float64]
 Wanted = Mapping[str, str | int]
 """Channel to column: the column's heading, or its number from 0."""
 

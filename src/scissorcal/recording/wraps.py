@@ -1,12 +1,9 @@
 """Numbers that begin again: an angle after a full turn, a counter after its last number."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.recording.resolution import GAP_FACTOR, resolution_of
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 MOST_LEFT = 0.25
 """Share of a period that a step may have once it is continued: half of where its direction is a

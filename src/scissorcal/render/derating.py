@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import (
     STEP_DTYPE,
     Kernel,
@@ -19,8 +19,6 @@ from scissorcal.package.plate_slopes import PlateSlopes
 from scissorcal.package.tangent import Tangent
 from scissorcal.render.drops import largest_drop
 from scissorcal.render.felt_cost import plate_strokes
-
-Array = NDArray[np.float64]
 
 OPENINGS, CONTACTS = 48, 24
 HALVINGS = 20

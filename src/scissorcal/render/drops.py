@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import (
     Kernel,
     ModelTables,
@@ -15,8 +15,6 @@ from scissorcal.kernel import (
     Strip,
     largest_overlap,
 )
-
-Array = NDArray[np.float64]
 
 OPENINGS = 48
 

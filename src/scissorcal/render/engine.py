@@ -4,6 +4,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from scissorcal.aliases import Progress
 from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, Motion
@@ -33,7 +34,7 @@ from scissorcal.render.result import (
     render_verdicts,
 )
 from scissorcal.render.rig_facts import RigFacts
-from scissorcal.render.watch import LOOK_EVERY_S, Progress, Watch
+from scissorcal.render.watch import LOOK_EVERY_S, Watch
 from scissorcal.tracking.plate_pose import PoseSource
 
 SUPERVISOR_S = 0.2

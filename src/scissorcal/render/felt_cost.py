@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel
 
-Array = NDArray[np.float64]
 Stroke = tuple[Array, Array, NDArray[np.bool_]]
 
 BINS = 25

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.motion import Samples
 from scissorcal.kernel import ModelTables, PlateConfig, Section
 from scissorcal.render import plate_sentences as sentences
@@ -16,8 +16,6 @@ from scissorcal.render.plate_record import PlateRecord
 from scissorcal.render.plate_section import PlateSection, plate_section
 from scissorcal.render.plate_torque import PoseTorque, TorqueSpread
 from scissorcal.tracking.plate_pose import PlatePose, PoseSource
-
-Array = NDArray[np.float64]
 
 EVERY_S = 0.01
 """Between two looks at the source: its rate is about 100 Hz."""

@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import Section
-
-Array = NDArray[np.float64]
 
 STEEPEST_RAD = np.radians(45.0)
 """Beyond, between the plate's axes and the rig's, a plate is not one that the blades can cut."""

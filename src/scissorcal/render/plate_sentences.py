@@ -3,9 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 ACROSS = (
     "The plate stands across the blades (more than 45 degrees from where it can be cut). Turn it "

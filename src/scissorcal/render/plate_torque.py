@@ -4,12 +4,10 @@ from dataclasses import dataclass, fields, replace
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import Kernel, ModelTables, PlacedModel, Section
 from scissorcal.package.grid import FELT_SHARE
-
-Array = NDArray[np.float64]
 
 OPENINGS, CONTACTS = 24, 12
 

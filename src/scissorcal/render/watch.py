@@ -2,16 +2,14 @@
 
 import time
 from collections import deque
-from collections.abc import Callable
 
 import numpy as np
 
+from scissorcal.aliases import Progress
 from scissorcal.device.motion import Samples
 from scissorcal.device.timing import Percentiles, TimeHistogram
 from scissorcal.kernel import SampleFlag, StateFlag
 from scissorcal.recording import RecordingWriter, TurningPoints
-
-Progress = Callable[[float, str], None]
 
 LOOK_EVERY_S = 0.25
 AT_REST_S = 0.5

@@ -27,12 +27,8 @@ from scissorcal.report.panel import (
 )
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.summary import (
-        Array,
-        Curves,
-        Difference,
-        LogSummary,
-    )
+    from scissorcal.aliases import Array
+    from scissorcal.calibration.summary import Curves, Difference, LogSummary
 
 PART = "summary"
 LEAST_SHARE = 0.5

@@ -14,11 +14,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.errors import DeviceError
-
-Array = NDArray[np.float64]
 
 DRIFT_LIMIT_PPM = 1000.0
 """A quartz keeps 100 ppm, a poor oscillator on a chip 500; beyond is a wrong unit or a fault."""

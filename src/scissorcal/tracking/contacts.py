@@ -6,12 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.mechanism import AxisLaw
-
-Array = NDArray[np.float64]
 
 EVERY_S = 0.01
 """Contacts at 100 Hz know as much as at 1 kHz: their errors repeat from sample to sample."""

@@ -12,12 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.tracking.rotation import nearest_rotation, rotation_of
 from scissorcal.tracking.settings import PlateMotion, TrackingSettings
-
-Array = NDArray[np.float64]
 
 SIZE = 30
 TURN, PLACE, SPIN, SPEED = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)

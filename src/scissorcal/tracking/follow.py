@@ -6,16 +6,14 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model.surface import Surface
 from scissorcal.tracking.clocks import ClockFit, ClockWatch
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import TrackingSettings
 from scissorcal.tracking.tracker import Outcome, PoseEstimate, PoseTracker
-
-Array = NDArray[np.float64]
 
 RECENT_S = 0.5
 """A pose rests on what came within so long."""

@@ -7,9 +7,8 @@ have; tests compare both.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 _SMALL = 1e-6
 _THRICE = 3.0 * np.eye(3)

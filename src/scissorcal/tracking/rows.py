@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model.surface import Surface
 from scissorcal.tracking.filter import (
     BIAS,
@@ -29,8 +29,6 @@ from scissorcal.tracking.filter import (
 )
 from scissorcal.tracking.rotation import cross, cross_matrix, rotation_vector
 from scissorcal.tracking.settings import ContactErrors, ForceErrors
-
-Array = NDArray[np.float64]
 
 KNOWN_SLIDING = 3.0
 """The direction of sliding is known where its speed is so many standard deviations of itself."""

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from scissorcal.aliases import Array
 
 if TYPE_CHECKING:
     from scissorcal.recipe.plate_tracking import PlateTracking
     from scissorcal.recipe.schema import Recipe
 
-Array = NDArray[np.float64]
 
 CAMERA_GATE = 22.458
 """Chi-square of 6 degrees of freedom that 0.1 % exceed."""

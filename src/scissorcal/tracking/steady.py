@@ -3,12 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.tracking.plate_pose import PlatePose
 from scissorcal.tracking.rotation import pose_error, rotation_of
-
-Array = NDArray[np.float64]
 
 PLAY_SDS = 6.0
 """Of the noise of a picture's pose, as its six numbers have it together. With 4, 8 and 12 a plate

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.model.surface import Surface
 from scissorcal.tracking.filter import (
@@ -33,7 +33,6 @@ from scissorcal.tracking.rows import (
 )
 from scissorcal.tracking.settings import TrackingSettings
 
-Array = NDArray[np.float64]
 Row = CameraPose | Contact | ForceDirection
 
 

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.vision.geometry.camera import usual_camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.detect import SMALL_PX, Detection
-
-Array = NDArray[np.float64]
 
 PLACES = (
     "upper left",

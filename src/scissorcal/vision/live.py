@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.files import replacing
@@ -17,8 +16,6 @@ from scissorcal.foreign.formats import VIDEO
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import Board
 from scissorcal.vision.targets.detect import Detection, find_any_board
-
-Array = NDArray[np.float64]
 
 APART_FRAMES = 5
 STILL_SHARE = 0.002

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.files import replacing
 from scissorcal.vision.photo import Photo, Picture
 from scissorcal.vision.targets.detect import Detection
 
-Array = NDArray[np.float64]
 Colour = tuple[int, int, int]
 
 WIDEST_PX = 1000

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.foreign import parse_isolated, read_foreign
 from scissorcal.foreign.formats import PHOTOGRAPH
 from scissorcal.identity import bytes_digest
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 MAX_PIXELS = 25_000_000

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.design import (
     CaptureList,
     Information,
@@ -25,8 +25,6 @@ from scissorcal.device.parts import stroke_of_tick, with_capture
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
 from scissorcal.kernel import Capability, Identity
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 SWEEP_SPEEDS, CUT_SPEEDS = 5, 3
 """Speeds on offer, evenly in the logarithm over the scene's rates: of empty sweeps, of strokes."""

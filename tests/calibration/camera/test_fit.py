@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.camera.bundle import SHARED, SeenBoard, fit_bundle, seen
 from scissorcal.calibration.camera.candidates import CANDIDATES, compare_cameras
 from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera, seen_region
@@ -26,8 +26,6 @@ from scissorcal.vision.geometry.camera import Camera, usual_camera
 from scissorcal.vision.sim import Lens, Pose
 from scissorcal.vision.targets.boards import CAMERA_BOARD
 from scissorcal.vision.targets.detect import Detection
-
-Array = NDArray[np.float64]
 
 WIDTH, HEIGHT = 1280, 720
 TRUE = np.array([1150.0, 1150.0, 648.0, 354.0, -0.2, 0.05, 0.0008, -0.0005, 0.0, 0.0, 0.0])

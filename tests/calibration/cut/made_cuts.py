@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess
 from scissorcal.calibration.cut.path import Material, PathMotion, material_of, path_motion
@@ -22,8 +23,6 @@ from scissorcal.model.cutting import torque_at
 from scissorcal.recording.recording import Stroke
 from tests.calibration.cut.path.made import COULOMB, INERTIA, RATE_HZ, Made, record
 from tests.calibration.truth import Truth, sweep
-
-Array = NDArray[np.float64]
 
 TRUTH = Truth()
 EDGE = Edge("line", TRUTH.edge_offset, TRUTH.taper, 0.075)

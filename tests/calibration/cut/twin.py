@@ -8,13 +8,11 @@ are more than 1e-9 of a density.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, barycentric_interpolate
 from scipy.optimize import brentq
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import CutFitData, CutFitParameters
-
-Array = NDArray[np.float64]
 
 REST_STEPS, REST_REACH_M, ARRIVED_M = 30, 3e-5, 1e-7
 KNOTS = 21

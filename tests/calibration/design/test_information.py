@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from scissorcal.calibration.design import (
     Information,
@@ -32,7 +31,6 @@ from scissorcal.model.transforms import IDENTITY, LOG
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.workday.stock import nominal_identity
 
-Array = NDArray[np.float64]
 RECIPE = builtin_recipe("paper-80gsm")
 IDENTITY_OF_RIG = nominal_identity(RECIPE)
 

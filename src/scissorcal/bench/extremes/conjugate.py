@@ -5,11 +5,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference import Problem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

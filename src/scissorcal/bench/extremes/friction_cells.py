@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.bench.extremes.cells import Cell, Found, judged
 from scissorcal.bench.extremes.made_friction import MadeFriction, Motion, changed, record, sweeps
@@ -12,7 +11,6 @@ from scissorcal.calibration import FitResult, fit_friction
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording import Recording
 
-Array = NDArray[np.float64]
 Damage = Callable[[Recording, np.random.Generator], Recording | tuple[Recording, ...]]
 
 TRUTH = MadeFriction()

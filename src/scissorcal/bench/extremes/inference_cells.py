@@ -5,14 +5,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.bench.extremes.cells import Cell, Found, judged, refusal, worst_of
 from scissorcal.bench.extremes.conjugate import Linear, line
 from scissorcal.bench.extremes.shapes import shape_cells
 from scissorcal.inference import NotFiniteError, Posterior, infer
 
-Array = NDArray[np.float64]
 Made = Callable[[np.random.Generator], Linear]
 
 DRAWN = 0.15

@@ -7,14 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.bench.extremes.cells import Found, judged, worst_of
 from scissorcal.bench.extremes.states import State, everyday_state
 from scissorcal.kernel import CrackLaw, Curve, Kernel, StepFlag, walk_crack
 from scissorcal.model import Response, edge_height, settled_contact
-
-Array = NDArray[np.float64]
 
 CLOSING_rad = 1e-5
 STROKES = 3

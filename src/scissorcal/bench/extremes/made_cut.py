@@ -7,12 +7,9 @@ fitted.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.bench.extremes.made_friction import MadeFriction, Motion, record, sweeps
 from scissorcal.recording import Recording, Stroke
-
-Array = NDArray[np.float64]
 
 STROKES_A_SHEET = 4
 STEP_M, BEGIN_M = 0.034, -0.018

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recording import SAMPLE_DTYPE, Recording, Stroke
-
-Array = NDArray[np.float64]
 
 TICK_S = 1e-3
 LOW, HIGH = 0.2, 0.85

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.bench.extremes.cells import Cell, Found, judged, worst_of
 from scissorcal.bench.extremes.exact_laws import Exponential, Power, TableCurve, mp
@@ -28,7 +27,6 @@ from scissorcal.model import (
     presliding_state,
 )
 
-Array = NDArray[np.float64]
 Run = Callable[[np.random.Generator], Found]
 
 FLOAT32 = 2.0**-24

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recipe.everyday import EVERYDAY
 
-Array = NDArray[np.float64]
 Spacing = Literal["linear", "log", "sign-log", "whole"]
 
 ZERO_SHARE = 0.1

@@ -3,12 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.bench.extremes.cells import Cell, Found, judged
 from scissorcal.inference import Posterior, Problem, infer
 
-Array = NDArray[np.float64]
 Density = Callable[[Array], float]
 
 STATED = 0.3

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.bench.extremes.cells import Cell, Found
 from scissorcal.inference import fit_ar, ljung_box, smooth_weights, tails_of
 from scissorcal.inference.autocorrelation import robust_covariance_of_scores
@@ -12,7 +12,6 @@ from scissorcal.inference.between import between_groups
 from scissorcal.inference.least_squares import least_squares
 from scissorcal.inference.thorough import rank_r_hat
 
-Array = NDArray[np.float64]
 Check = Callable[[np.random.Generator], tuple[bool, str]]
 """Whether what was stated holds, and what was found."""
 

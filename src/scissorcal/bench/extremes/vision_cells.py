@@ -6,8 +6,8 @@ Photographs are points through a pinhole that is written out here.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.bench.extremes.cells import Cell, Found, judged, worst_of
 from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera
 from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate
@@ -17,8 +17,6 @@ from scissorcal.vision.geometry.pose import Pose, difference, left_jacobian
 from scissorcal.vision.targets.boards import CAMERA_BOARD, PLATE_BOARD
 from scissorcal.vision.targets.detect import Detection
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Spoil = Callable[[Array], Array]
 
 FOCAL, WIDTH, HEIGHT = 1200.0, 1280, 720

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.bench.trade.strokes import Stroke
 from scissorcal.kernel import Kernel, ModelTables, estimated_rates
 
-Array = NDArray[np.float64]
 Torques = NDArray[np.float32]
 
 CONTINUOUS_HZ = 64_000.0

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.sim.hand import minimum_jerk
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 SPEEDS = 3
 PEAK_OVER_MEAN = 1.875

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.point import Error
 from scissorcal.calibration.result import FitResult
@@ -22,8 +23,6 @@ from scissorcal.package.exact import (
     torque_quantiles,
 )
 from scissorcal.package.grid import Points, spread_points
-
-Array = NDArray[np.float64]
 
 PLACES = 400
 """Places spread over the scene; a quarter as many lie on its faces, and 8 in its corners."""

@@ -8,12 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.inference.least_squares import least_squares
 from scissorcal.vision.geometry.camera import PARAMETERS
-
-Array = NDArray[np.float64]
 
 DEGREES_OF_FREEDOM = 5.0
 """Of the Student-t that corner errors are taken from: a bad corner pulls less the worse it is."""

@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.camera.bundle import (
     DEGREES_OF_FREEDOM,
     SHARED,
@@ -19,8 +19,6 @@ from scissorcal.calibration.camera.bundle import (
 from scissorcal.calibration.camera.uncertainty import camera_covariance
 from scissorcal.calibration.candidates import Account, CandidateRow, compare
 from scissorcal.vision.geometry.camera import PARAMETERS
-
-Array = NDArray[np.float64]
 
 FOLDS = 5
 _SQUARE = (("fx", "fy"), ("cx",), ("cy",))

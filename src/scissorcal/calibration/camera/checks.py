@@ -3,15 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.camera.bundle import Bundle, SeenBoard, first_pose
 from scissorcal.calibration.camera.result import CrossValidation, PixelMap, ViewError
 from scissorcal.errors import InputError, VerdictError
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 from scissorcal.vision.geometry.camera import Camera
-
-Array = NDArray[np.float64]
 
 FEWEST_VIEWS = 3
 FEWEST_CORNERS = 200

@@ -1,11 +1,11 @@
 """Fit a camera to photographs of a flat board."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Progress
 from scissorcal.calibration.camera.bundle import Bundle, SeenBoard, fit_bundle
 from scissorcal.calibration.camera.candidates import CANDIDATES, compare_cameras
 from scissorcal.calibration.camera.checks import (
@@ -27,9 +27,6 @@ from scissorcal.errors import MissingError
 from scissorcal.recipe.photograph_priors import CameraPriors
 from scissorcal.vision.geometry.camera import Camera, usual_camera
 from scissorcal.vision.targets.detect import Detection
-
-Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 _DRAWS = 500
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.camera.bundle import SeenBoard, seen
 from scissorcal.calibration.camera.result import CameraFit, PixelMap, ViewError
 from scissorcal.files import replacing
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _ARROW_SHARE = 0.02
 

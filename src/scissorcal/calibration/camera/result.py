@@ -7,11 +7,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import Result, Stored, by_name
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.geometry.camera import PARAMETERS, Camera
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.camera.checks import MOST_SD_PX
 from scissorcal.calibration.camera.result import PixelMap
 from scissorcal.verdicts import Verdict, judge
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.camera.bundle import Bundle, SeenBoard, fit_bundle, projected
 from scissorcal.calibration.camera.result import CrossValidation, PixelMap
 from scissorcal.vision.geometry.camera import PARAMETERS, Camera
-
-Array = NDArray[np.float64]
 
 GRID = (21, 15)
 FEWEST_TO_HALVE = 6

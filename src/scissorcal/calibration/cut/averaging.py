@@ -4,14 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.calibration.cut.lack_of_fit import Budget
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.inference import Posterior
-
-Array = NDArray[np.float64]
 
 LEAST_PROBABILITY = 0.05
 """A law that is less probable is left out of the average."""

@@ -3,15 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Mask
 from scissorcal.calibration.between import BetweenRecordings, FitsApart, gather_recordings
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.inference import Posterior, find_optimum, infer
 from scissorcal.recording.recording import Recording
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 NOT_KNOWN = (
     "One recording: the variation of material and rig between recordings is unknown, and the "

@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.lack_of_fit import Budget
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.scout import Scouted
@@ -17,8 +17,6 @@ from scissorcal.calibration.signals.sensors import Sensors
 from scissorcal.recipe.priors import LogNormalPrior
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, failed, judge
-
-Array = NDArray[np.float64]
 
 SCATTER_SDS = 3.0
 """Prior standard deviations of the noise's scale beyond which it is no noise that grew."""

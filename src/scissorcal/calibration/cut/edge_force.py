@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.fitted import fitted_cutting
+from scissorcal.aliases import Array
+from scissorcal.calibration.cut.structure import fitted_cutting
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.model import edge_height
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 MOST_PLACES = 12

@@ -1,12 +1,12 @@
 """Fit the material's response and fracture to strokes through it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Progress
 from scissorcal.calibration.assemble import assemble
 from scissorcal.calibration.between import widened
 from scissorcal.calibration.comparison import choose
@@ -56,9 +56,6 @@ from scissorcal.model import EdgeBelief
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict
-
-Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 DRAWS = 2000
 FELT_SDS = 5.0

@@ -9,15 +9,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.fitted import fitted_cutting, some_draws
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path import path_motion
+from scissorcal.calibration.cut.structure import fitted_cutting, some_draws
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.model import Cutting, cut_torque_along, edge_height, mean_share
 from scissorcal.recording.recording import Recording
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 
 SHORTEST_CUT_M = 2e-3

@@ -6,11 +6,10 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.model import Edge, EdgeBelief, edge_height
-
-Array = NDArray[np.float64]
 
 NEWTON_STEPS = 12
 STEP_M = 1e-6

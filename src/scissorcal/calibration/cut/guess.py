@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.path import Material, PathMotion, mean_torque
 from scissorcal.calibration.cut.path.runs import Run
 from scissorcal.model import Response
-
-Array = NDArray[np.float64]
 
 LEAST_DEPTH_M = 1e-9
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.path import (
     FrictionDraws,
     Material,
@@ -19,8 +19,6 @@ from scissorcal.calibration.signals.zeros import DriveZero
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.model import FrictionLaw
 from scissorcal.recipe.priors import CutPriors
-
-Array = NDArray[np.float64]
 
 USUAL_RATE = 0.3
 SOME_DRAWS = 48

@@ -4,12 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.inference.curvature import gradient, natural_step
-
-Array = NDArray[np.float64]
 
 PERTURBATION = 1e-3
 LOAD_ERROR = 0.1

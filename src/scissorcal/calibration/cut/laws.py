@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.model.transforms import IDENTITY
 from scissorcal.recipe.priors import AnyPrior
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 LOADED = "load-dependent friction"
 """What the name of a law says of a load share."""

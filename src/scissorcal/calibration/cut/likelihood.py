@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.path import advance_line, kinetic_variance, mean_advance
 from scissorcal.calibration.cut.segments import Segments
@@ -19,8 +20,6 @@ from scissorcal.kernel import (
     cut_log_likelihoods,
 )
 from scissorcal.model import Response
-
-Array = NDArray[np.float64]
 
 TABLE_SIZE = 97
 TABLE_SPAN = (2e-3, 30.0)

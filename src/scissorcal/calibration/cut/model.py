@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.laws import NUISANCE, CutLaw
 from scissorcal.calibration.cut.likelihood import CutLikelihood, Evaluation
 from scissorcal.calibration.cut.path import mean_advance
@@ -20,9 +21,6 @@ from scissorcal.calibration.fit_candidate import (
 )
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.filtering import Bins
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scissorcal.calibration.cut.fitted import fitted_cutting, some_draws
-from scissorcal.calibration.cut.structure import cutting_from
+from scissorcal.aliases import Array
+from scissorcal.calibration.cut.structure import cutting_from, fitted_cutting, some_draws
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.model import Cutting, edge_height
-
-Array = NDArray[np.float64]
 
 POINTS = 60
 SUPPORT = (0.01, 0.99)

@@ -3,16 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Mask
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess
 from scissorcal.calibration.cut.path import PathMotion, mean_torque
 from scissorcal.calibration.cut.path.runs import Run, split
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 ELASTIC_SEGMENTS = 8
 """Segments between touching and the deepest point of an elastic piece."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.geometry import Geometry, Running
 from scissorcal.calibration.cut.guess import (
     CoarseEncoderError,
@@ -27,8 +27,6 @@ from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
 from scissorcal.inference import Counter, Optimum, find_optimum
 from scissorcal.model import EdgeBelief, Response
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 ROUNDS = 2
 KAPPAS = np.linspace(0.05, 0.985, 188)

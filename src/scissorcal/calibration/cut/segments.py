@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess
 from scissorcal.calibration.cut.path import (
@@ -31,10 +31,6 @@ from scissorcal.calibration.cut.rests import (
     shortest_segment,
 )
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
 """Least length and least teeth of running segments: in shorter ones the teeth are

@@ -12,12 +12,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.path import Material
 from scissorcal.calibration.cut.segments import Segments, Stretch, sledge_share
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Complex = NDArray[np.complex128]
 
 SUBDIVISIONS = 32

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.laws import LOADED
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.result import FitResult
@@ -15,8 +15,6 @@ from scissorcal.model.cutting import torque_at, within_thickness
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, judge, not_evaluated
-
-Array = NDArray[np.float64]
 
 BY_EYE_M = 0.5e-3
 """A blade's tip is rounded and worn: by eye or ruler its line is known to 0.5 mm

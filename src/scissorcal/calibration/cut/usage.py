@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Mask
 from scissorcal.calibration.cut.path.motion import PathMotion
 from scissorcal.calibration.cut.segments import Segments
 from scissorcal.calibration.signals.usage import GAP, INVALID, Usage, count_usage
 from scissorcal.recording.recording import Recording
-
-Mask = NDArray[np.bool_]
 
 STARTING = "crack about to start"
 FREE = "blades free of the material"

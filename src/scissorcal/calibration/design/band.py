@@ -3,12 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.design.information import Information
 from scissorcal.calibration.design.knowledge import Knowledge
-
-Array = NDArray[np.float64]
 
 REACHED_SHARE = 0.95
 """Share of the places that can be felt from which a scene's tolerance counts as reached. Where the

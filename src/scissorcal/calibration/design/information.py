@@ -4,16 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.lack_of_fit import PERTURBATION, changed_designs
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.inference.curvature import gradient, natural_step
 from scissorcal.inference.information import Slopes, likelihood_information, slopes_at
-
-Array = NDArray[np.float64]
 
 STEP = 1e-3
 """Step in prior standard deviations by which a friction law's mean is differentiated."""

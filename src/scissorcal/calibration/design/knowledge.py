@@ -4,15 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.between import usual_sd
 from scissorcal.calibration.design.information import Information
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference.between import BROAD
 from scissorcal.recipe.fields import BETWEEN_percent
-
-Array = NDArray[np.float64]
 
 SILENT = 1e-12
 """Variance of the score, as a share of its whole in units of the prior, that counts as none."""

@@ -18,7 +18,6 @@ from scissorcal.calibration.design.choice import (
 from scissorcal.calibration.design.information import Information
 from scissorcal.calibration.design.knowledge import Knowledge
 
-Array = NDArray[np.float64]
 Judge = Callable[[TorqueKnowledge], Band]
 
 FRICTION_SHARE = 0.5

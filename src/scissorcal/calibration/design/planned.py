@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.laws import CutLaw
@@ -28,9 +28,6 @@ from scissorcal.calibration.verify.simulation import (
 )
 from scissorcal.recipe.schema import FitFriction, Recipe
 from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 QUIET = TorqueNoise(0.0, 0.0, 0.01)
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.fit import cut_experiment, cut_optimum
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.known import USUAL_RATE, KnownFriction
@@ -33,8 +33,6 @@ from scissorcal.inference.curvature import gradient
 from scissorcal.model import EdgeBelief, FrictionLaw, friction_torque
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Joint, Recording
-
-Array = NDArray[np.float64]
 
 EXPECTED_LAW = "stribeck+angle"
 """Law of friction that is expected before any data: what draft effort fits to scissors."""

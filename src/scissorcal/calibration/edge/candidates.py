@@ -1,11 +1,11 @@
 """Candidate edges - line, arc, cubic, smoothing spline - compared by their evidence."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Progress
 from scissorcal.calibration.candidates import Account, compare
 from scissorcal.calibration.edge.cells import EdgeCells
 from scissorcal.calibration.edge.model import (
@@ -23,9 +23,6 @@ from scissorcal.inference.posterior import Effort
 from scissorcal.inference.status import SamplingStatus
 from scissorcal.model import Edge, EdgeBelief
 from scissorcal.recipe.photograph_priors import BladePriors
-
-Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 POLYNOMIAL = ("offset_m", "taper_rad", "curvature_per_m", "bend_per_m2")
 

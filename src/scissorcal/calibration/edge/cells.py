@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.model.bspline import FEWEST, spline_design
 from scissorcal.vision.blade.measure import BladeMeasurement
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 MOST_CELLS = 160

@@ -4,14 +4,11 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.calibration.edge.candidates import MOST_EVALUATIONS
 from scissorcal.calibration.edge.result import BladeFit, PhotographRow, RungRow, SeenPair
 from scissorcal.inference import Effort, SamplingStatus
 from scissorcal.verdicts import Verdict, judge, not_evaluated
-
-Array = NDArray[np.float64]
 
 SCOPE = "fit.blade"
 MOST_SPOILT = 0.15

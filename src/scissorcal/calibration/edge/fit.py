@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scissorcal.calibration.edge.candidates import EdgeComparison, Progress, compare_edges
+from scissorcal.aliases import Array, Progress
+from scissorcal.calibration.edge.candidates import EdgeComparison, compare_edges
 from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
 from scissorcal.calibration.edge.checks import blade_verdicts
 from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow
@@ -17,8 +17,6 @@ from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.blade.measure import BladeMeasurement
 from scissorcal.vision.blade.modes import smooth_slope
-
-Array = NDArray[np.float64]
 
 PLACES = 41
 HEIGHT_DRAWS = 400

@@ -4,15 +4,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.edge.cells import EdgeCells
 from scissorcal.inference import Cluster, Optimum, Problem
 from scissorcal.inference.status import SearchStatus
 from scissorcal.model.bspline import spline_design
 from scissorcal.recipe.photograph_priors import BladePriors
 
-Array = NDArray[np.float64]
 Family = Literal["line", "arc", "cubic", "spline"]
 
 FAMILIES: tuple[Family, ...] = ("line", "arc", "cubic", "spline")

@@ -5,11 +5,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.edge.result import BladeFit
 from scissorcal.vision.blade.photo import BladePhoto
 from scissorcal.vision.blade.picture import NickMark, blade_picture
-
-Array = NDArray[np.float64]
 
 
 def edge_picture(photo: BladePhoto, fits: Mapping[str, BladeFit]) -> NDArray[np.uint8]:

@@ -4,15 +4,13 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.edge.cells import FoundNick
 from scissorcal.calibration.result import Result, Stored, by_name
 from scissorcal.errors import InputError
 from scissorcal.model import EdgeBelief
 from scissorcal.verdicts import Verdict
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Integers
 from scissorcal.calibration.friction.commanded import (
     Actuation,
     as_sliding_joint,
@@ -22,8 +22,6 @@ from scissorcal.inference import Stop
 from scissorcal.recipe.friction import AdvanceSettings
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict
-
-Integers = NDArray[np.int64]
 
 NO_SENSOR = ("sensor zeros", "zero drift")
 """Checks of sensors that the force along the cut has none of."""

@@ -4,16 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.parameters import Layout
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, side_of
 from scissorcal.model.transforms import LOG
 from scissorcal.verdicts import Verdict, judge, not_evaluated
-
-Array = NDArray[np.float64]
 
 SCOPE = "fit.friction"
 CERTAIN = 3.0

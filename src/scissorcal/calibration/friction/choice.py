@@ -1,11 +1,11 @@
 """The law that is used: chosen among candidates, fitted with the noise that its residuals have."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Progress
 from scissorcal.calibration.candidates import POSITIVE_EVIDENCE
 from scissorcal.calibration.comparison import choose
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
@@ -13,9 +13,6 @@ from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.search import scan_nodes
 from scissorcal.inference import Stop, gradient, tails_of
 from scissorcal.model.friction_terms import parts_of
-
-Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 USUAL_LAWS = {"rotary": "stribeck+angle", "linear": "coulomb+viscous"}
 """The law that evidence takes on most days, by the kind of joint: the pivot's on 12 of 12 days of

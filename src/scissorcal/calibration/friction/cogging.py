@@ -6,12 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.friction.moments import FIXED, MEASURED, StrokeMoments
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.calibration.signals.weak_form import Windows
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 FEWEST_PERIODS = 6
 """Periods within the recorded opening below which a ripple is the law's change with angle."""

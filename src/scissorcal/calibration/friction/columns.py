@@ -7,15 +7,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.kernel import presliding_path
 from scissorcal.model.friction_terms import PARAMETERS, side_of
 from scissorcal.model.terms import Motion, Role, Term
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Product = tuple[float, tuple[str, ...]]
 Cell = tuple[tuple[int, ...], tuple[int, ...]]
 """Nodes of Stribeck's speed and of Dahl's length that parameters lie between, four or one each."""

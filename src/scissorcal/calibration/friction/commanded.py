@@ -10,17 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Mask
 from scissorcal.calibration.friction.refusals import FEWEST_BINS
 from scissorcal.calibration.signals.segments import bridge
 from scissorcal.calibration.signals.weak_form import HELD, Windows, weigh
 from scissorcal.calibration.signals.window_length import spline
 from scissorcal.kernel import presliding_path
 from scissorcal.recording.recording import Joint, Recording, StrokeKind
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 WAYS: dict[StrokeKind, StrokeKind] = {"forward": "opening", "backward": "closing"}
 """Kinds of strokes of a sliding joint: its place grows as an opening does."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult
 from scissorcal.model.friction import FrictionLaw, friction_torque
-
-Array = NDArray[np.float64]
 
 POINTS_EACH_WAY = 40
 SLOWEST_SHARE = 5e-3

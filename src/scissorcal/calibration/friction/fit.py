@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Progress
 from scissorcal.calibration.assemble import assemble
 from scissorcal.calibration.between import (
     NOT_KNOWN,
@@ -64,8 +65,6 @@ from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.probe import newest_probe
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.verdicts import Verdict, not_evaluated
-
-Progress = Callable[[float, str], None]
 
 PRESLIDING = "presliding_fine_rad"
 """Fact of a probe: the shortest way over which friction builds up after a turn, which a fit of cuts

@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.model.friction_terms import PARAMETERS, REFERENCE, TERMS, terms_of
 from scissorcal.model.terms import Term
 from scissorcal.recipe.priors import FrictionPriors
 from scissorcal.recording.recording import Joint
-
-Array = NDArray[np.float64]
 
 SIDES = {"": "", "_pos": ", positive rate", "_neg": ", negative rate"}
 

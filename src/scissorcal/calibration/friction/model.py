@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.fit_candidate import Candidate, Likelihood
 from scissorcal.calibration.friction.columns import SCALES, FrictionBasis
 from scissorcal.calibration.friction.layout import Drive, friction_layout, friction_precision
@@ -22,9 +22,6 @@ from scissorcal.model.terms import Role, Term
 from scissorcal.model.transforms import LOG
 from scissorcal.recipe.priors import JointPriors
 from scissorcal.recording.recording import Joint
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 BESIDE = 1.02
 """A search begins a little beside least squares: for the simplest law they are its optimum, and a

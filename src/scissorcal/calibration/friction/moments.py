@@ -12,15 +12,13 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.friction.columns import SCALES, Cell, FrictionBasis, coupled_nodes
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference.ar_noise import runs
 from scissorcal.model.transforms import IDENTITY, Transform
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Block = tuple[str, int, int]
 
 MEASURED: Block = ("measured", 0, 0)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.friction.cogging import Cogging
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.result import FittedParameter, in_words
@@ -15,9 +16,6 @@ from scissorcal.inference import Posterior
 from scissorcal.kernel import presliding_path
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.recording.recording import Joint
-
-Array = NDArray[np.float64]
-
 
 FLOOR_SDS = 3.0
 """Standard deviations of the rate's noise that the rate floor stands for."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.friction.columns import FrictionBasis
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.search import search_from
@@ -17,10 +17,6 @@ from scissorcal.calibration.signals.zeros import DriveZero, without_zeros
 from scissorcal.errors import InputError
 from scissorcal.model.friction_terms import terms_of
 from scissorcal.recording.recording import Recording
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 Unit = Literal["stroke", "recording"]
 

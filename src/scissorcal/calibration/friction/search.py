@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.fit_candidate import CandidateProblem
 from scissorcal.calibration.friction.columns import Cell
 from scissorcal.calibration.friction.moments import ReducedLaw
@@ -13,8 +13,6 @@ from scissorcal.inference.least_squares import least_squares
 from scissorcal.inference.optimise import Cluster, Optimum, is_rounded
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import SearchStatus, about, picked
-
-Array = NDArray[np.float64]
 
 MOST_ROUNDS = 20
 TINY = 1e-300

@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior
@@ -19,8 +19,6 @@ from scissorcal.recipe.priors import LogNormalPrior
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording import probe as probes
 from scissorcal.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 FOUND = {"stribeck": "log_rise_share", "stribeck_rate": "log_rise_rate"}
 """Parameters of the law by the names of the probe's; the first is a share of Coulomb friction."""

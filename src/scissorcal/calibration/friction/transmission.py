@@ -14,16 +14,14 @@ first way of ``presliding_length`` is a guess.
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.friction.columns import FrictionBasis
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.weak_form import Windows, weigh
 from scissorcal.errors import InputError
 from scissorcal.model.friction_terms import needs_load, terms_of
 from scissorcal.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 CREEP = 1e-9
 """Rate (rad/s) that stands for rest: the direction of friction stays, and no more than that."""

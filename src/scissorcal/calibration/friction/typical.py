@@ -4,12 +4,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult
 from scissorcal.model import FrictionLaw, friction_torque
-
-Array = NDArray[np.float64]
 
 RATES = np.array([-1.0, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 1.0])
 """Rates (rad/s) at which two laws of friction are compared."""

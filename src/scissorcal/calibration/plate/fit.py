@@ -22,7 +22,6 @@ from scissorcal.vision.targets.detect import Detection
 if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
 
-Array = NDArray[np.float64]
 
 UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _EXACT_PRINT = {"print_scale_sd_percent": 0.0}

@@ -6,10 +6,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.recording.resolution import noise_of, resolution_of
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 BIN_S = 0.005
 HIGHEST = 0.4

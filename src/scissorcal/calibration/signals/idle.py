@@ -3,13 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.signals.segments import pieces_of, stretches
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import noise_of, resolution_of
-
-Array = NDArray[np.float64]
 
 IDLE_S = 1.0
 """Least duration of an idle period."""

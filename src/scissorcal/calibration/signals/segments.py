@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import (
@@ -17,10 +17,6 @@ from scissorcal.recording.resolution import (
     is_short,
     long_enough,
 )
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 _STRAIGHT = ("motor_torque", "handle_force", "advance", "torque_command", "force_command")
 

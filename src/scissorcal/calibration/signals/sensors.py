@@ -6,17 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.segments import still_clock, stretches
 from scissorcal.recording.marks import marks_in
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of
 from scissorcal.verdicts import Verdict, judge
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 Scope = Literal["fit.friction", "fit.cut"]
 

@@ -3,16 +3,14 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.recipe.pace import ADVANCE_ACCELERATION, TURN_ACCELERATION, ramp_time
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.recording.resolution import noise_of, resolution_of
 from scissorcal.verdicts import Verdict, judge, not_evaluated
-
-Array = NDArray[np.float64]
 
 ENDS = 0.1
 """Share of a stroke's time at either end that is not judged, or the time of its ramp: there blades

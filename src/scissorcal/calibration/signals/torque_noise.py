@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 LENGTHS = (4, 8, 16, 32, 64, 128)
 """Ticks over which the torque is summed."""

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Mask
 from scissorcal.calibration.signals.segments import bridge, by_label
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.recipe.requirements import LITTLE
 from scissorcal.recording.recording import Recording
 
-Mask = NDArray[np.bool_]
 Masks = tuple[Mask, ...]
 Spans = NDArray[np.int64]
 

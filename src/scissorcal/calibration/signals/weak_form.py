@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.filtering import (
     BIN_S,
     Bins,
@@ -28,10 +28,6 @@ from scissorcal.calibration.signals.window_length import (
 )
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 WINDOWS_AT_ONCE = 8192
 """Windows that are weighed together: their samples, a third of a megabyte a column, stay in the

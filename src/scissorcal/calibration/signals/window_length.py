@@ -4,15 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.filtering import BIN_S
 from scissorcal.calibration.signals.segments import stretches
 from scissorcal.recording.resolution import edge_samples
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 HALF_AT = 0.365
 """Frequency times knot distance at which a quadratic B-spline passes half: sinc^3 = 1 / 2."""

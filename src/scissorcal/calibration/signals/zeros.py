@@ -4,14 +4,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.calibration.signals.idle import IDLE_S, IdlePeriod, idle_periods, is_driven
 from scissorcal.recording.probe import probe_of
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict, judge, not_evaluated
-
-Array = NDArray[np.float64]
 
 SURE = 2.0
 """Standard deviations of what is left of a zero that a verdict counts."""

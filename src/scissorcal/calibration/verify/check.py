@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.generating import generating_prior
@@ -18,8 +18,6 @@ from scissorcal.calibration.verify.summary import (
     summarise_simulated,
 )
 from scissorcal.calibration.verify.verdicts import FALSE_ALARM, RANKS_SHARE, verify_verdicts
-
-Array = NDArray[np.float64]
 
 FEWEST_DRAWS = 600
 """Draws of each posterior where importance weights are even; a rank takes 199 of them."""

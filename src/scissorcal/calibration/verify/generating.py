@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.calibration.verify.result import PriorKind
-
-Array = NDArray[np.float64]
 
 NOT_SIMULATED = ("noise", "noise_scale", "rest_phase", "rest_spread")
 """Parameters of a likelihood that a simulation does not take from the truth: the size of the noise

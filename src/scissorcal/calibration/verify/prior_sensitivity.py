@@ -1,11 +1,9 @@
 """Prior sensitivity: how posteriors change when prior or likelihood are raised to a power."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.verify.result import Diagnosis
-
-Array = NDArray[np.float64]
 
 STEP = 1.01
 """A component is raised to this power and to its reciprocal."""

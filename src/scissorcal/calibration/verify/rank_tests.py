@@ -3,12 +3,9 @@
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.verify.result import RankBand
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 POINTS = 100
 """Places at which an empirical distribution is compared with the uniform one."""

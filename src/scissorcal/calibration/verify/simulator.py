@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.comparison import names_of_contenders
 from scissorcal.calibration.cut import fit_cut
 from scissorcal.calibration.cut.known import KnownFriction
@@ -28,8 +28,6 @@ from scissorcal.model import EdgeBelief
 from scissorcal.recipe.priors import CutPriors
 from scissorcal.recipe.schema import FitFriction, Recipe
 from scissorcal.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 UNSEEN = 0.1
 """Part of the torque's noise that accelerations may be which no encoder shows, in a simulated

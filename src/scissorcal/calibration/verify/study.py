@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.verify.generating import Generating, refit_prior, unbroken
@@ -19,7 +20,6 @@ from scissorcal.calibration.verify.simulator import Simulator
 from scissorcal.errors import MissingError, ScissorcalError
 from scissorcal.inference import Posterior, infer, ljung_box
 
-Array = NDArray[np.float64]
 Kind = Literal["simulated", "half", "whole"]
 Record = Mapping[str, Any]
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.verify.halves import HalfFit, compare, effort_difference
 from scissorcal.calibration.verify.prior_sensitivity import SENSITIVE, diagnose
@@ -25,8 +26,6 @@ from scissorcal.calibration.verify.result import (
 )
 from scissorcal.calibration.verify.study import LEVELS, Record, Study
 from scissorcal.inference import gradient
-
-Array = NDArray[np.float64]
 
 COVERAGE_LEVELS = (0.5, 0.9)
 RUNGS = ("draft", "standard", "thorough")

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.probe.talk import RELEASE, Stage, Talk
 from scissorcal.kernel import Identity, StateFlag
 from scissorcal.recording.probe import Estimate
 from scissorcal.recording.summarising import missing_frames
-
-Array = NDArray[np.float64]
 
 SETTLE_S = 0.1
 IDLE_S = 1.0

@@ -14,15 +14,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.probe.joint_posterior import JointFit
 from scissorcal.device.probe.joint_problem import STEP_S, Problem
 from scissorcal.device.probe.joint_values import Prior, Push, joint_of, perturbed, starts_of
 from scissorcal.kernel.joint import follow_joint
 from scissorcal.recording.probe import Swing
-
-Array = NDArray[np.float64]
 
 COAST_S, TRAVEL_STEP_S = 0.15, 1e-3
 LONGEST = 6

@@ -4,13 +4,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.probe.joint_values import NAMES, joint_of
 from scissorcal.kernel.joint import Joint
 from scissorcal.recording.probe import Estimate, Posterior
-
-Array = NDArray[np.float64]
 
 LEFT_OUT = 0.05
 """Share of inertia and dry friction that the law leaves out: on 60 rigs of another friction law the

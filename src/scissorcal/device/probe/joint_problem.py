@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.probe.idle import correlation_time
 from scissorcal.device.probe.joint_posterior import JointFit
 from scissorcal.device.probe.joint_values import (
@@ -22,8 +22,6 @@ from scissorcal.device.probe.joint_values import (
 )
 from scissorcal.kernel.joint import follow_joints
 from scissorcal.recording.probe import Swing
-
-Array = NDArray[np.float64]
 
 STEP_S = 2.5e-4
 """Longest step of the simulation; a tenth of the fastest motor lag that matters would be shorter,

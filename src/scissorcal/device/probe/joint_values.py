@@ -5,11 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel.joint import Joint
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.probe.idle import correlation_time
 from scissorcal.kernel import StateFlag
 from scissorcal.recording.probe import Estimate
-
-Array = NDArray[np.float64]
 
 LAGS = np.linspace(0.0, 20e-3, 101)
 HELD_S = 0.01

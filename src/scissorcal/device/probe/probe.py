@@ -1,10 +1,10 @@
 """The probe: look, then touch, then push a little; stop and say why at the first thing wrong."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
+from scissorcal.aliases import Progress
 from scissorcal.device.link import Link, PortLink
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.probe.clipping import clipping
@@ -43,8 +43,6 @@ from scissorcal.identity import digest
 from scissorcal.kernel import Capability, ConfigKey, Identity
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict, failed
-
-Progress = Callable[[float, str], None]
 
 REQUEST = (
     "Take everything out from between the blades, leave them half open, let go of the handles and "

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.probe.joint_fit import fit_joint, swings_of, travel_of
 from scissorcal.device.probe.joint_posterior import JointFit
 from scissorcal.device.probe.joint_values import NAMES, Prior, Push
@@ -13,8 +13,6 @@ from scissorcal.device.probe.pushes import MOVED_STEPS, Axis, Pushed, push
 from scissorcal.device.probe.talk import Talk
 from scissorcal.kernel import CommandFlag
 from scissorcal.recording.probe import Swing
-
-Array = NDArray[np.float64]
 
 AIM_RAD, AIM_STEPS = 20e-3, 15.0
 """A swing shall go so far: beyond what most joints yield, and 15 steps are known to 2 %."""

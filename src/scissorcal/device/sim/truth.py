@@ -6,13 +6,12 @@ Parameters under the names that fits use, and the average torque in closed form 
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.device.sim.blade import BladeOnSheet, blade_on
 from scissorcal.device.sim.friction import DryFriction
 from scissorcal.device.sim.specimen import Specimen
-
-Array = NDArray[np.float64]
 
 GAUSS = tuple(zip(*(column.tolist() for column in np.polynomial.legendre.leggauss(5)), strict=True))
 

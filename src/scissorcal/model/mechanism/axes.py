@@ -4,13 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.model.checks import SMALLEST, check_numbers
 from scissorcal.model.friction import FrictionLaw, friction_torque
 from scissorcal.model.mechanism.dynamics import Mechanism
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

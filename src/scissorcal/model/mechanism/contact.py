@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.checks import check_numbers
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.model.mechanism.contact import Constraint, ContactLaw
-
-Array = NDArray[np.float64]
 
 INDEPENDENT = 1e-7
 """Least singular value of the constraints' directions, each scaled to one, over the largest: below

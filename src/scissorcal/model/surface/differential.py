@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scissorcal.model.surface.protocol import Array, Surface
+from scissorcal.aliases import Array
+from scissorcal.model.surface.protocol import Surface
 
 
 def nearest(surface: Surface, points: ArrayLike) -> Array:

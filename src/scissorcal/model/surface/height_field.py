@@ -6,10 +6,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import ModelError
 from scissorcal.model.bspline import FEWEST, spline_powers
 from scissorcal.model.checks import check_numbers
-from scissorcal.model.surface.protocol import Array, NearestPoints, SurfacePoint, as_points
+from scissorcal.model.surface.protocol import NearestPoints, SurfacePoint, as_points
 
 _BEYOND = 3
 """Pieces added at each end: over one the curvature falls to 0, over two that along the border; the

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.model.surface.protocol import Array, NearestPoints
+from scissorcal.aliases import Array
+from scissorcal.model.surface.protocol import NearestPoints
 
 if TYPE_CHECKING:
     from scissorcal.model.surface.height_field import HeightField

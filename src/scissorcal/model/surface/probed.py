@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.model.surface.height_field import HeightField
 from scissorcal.model.surface.probed_checks import (
     checked_points,
@@ -18,7 +19,6 @@ from scissorcal.model.surface.probed_checks import (
     refuse_kinks,
     refuse_shape,
 )
-from scissorcal.model.surface.protocol import Array
 from scissorcal.model.surface.spline_fit import SplineFit, fit_spline
 
 _WEIGHTS_PER_POINT = 0.7

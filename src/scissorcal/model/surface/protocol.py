@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 
 class SurfacePoint(NamedTuple):

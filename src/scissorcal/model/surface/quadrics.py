@@ -13,9 +13,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.errors import ModelError
 from scissorcal.model.checks import check_numbers
-from scissorcal.model.surface.protocol import Array, NearestPoints, SurfacePoint, as_points
+from scissorcal.model.surface.protocol import NearestPoints, SurfacePoint, as_points
 
 _ROUNDING = 1e-13
 """Gradients of phi0, which has no unit, shorter than this have no direction."""

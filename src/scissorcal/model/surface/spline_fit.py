@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model.bspline import FEWEST
 from scissorcal.model.surface.height_field import HeightField
-from scissorcal.model.surface.protocol import Array
 
 _PENALTY = 1e-6
 """Of second differences of weights, against the mean weight of the points: 1 nm where a spline

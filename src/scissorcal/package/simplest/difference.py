@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Mask
 from scissorcal.model import edge_height, friction_torque, mean_share
 from scissorcal.package.bound import PARALLEL, TIP_CLEARANCE
 from scissorcal.package.compile import SLOWEST_EPS, scene_ranges
@@ -15,9 +15,6 @@ from scissorcal.package.exact import ExactModel
 from scissorcal.package.grid import FELT_SHARE, Points, spread_points
 from scissorcal.package.simplest.law import Law
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 PROJECTING, JUDGING = 160, 700
 """Places over which a law is projected, and independent ones on which the result is judged; a

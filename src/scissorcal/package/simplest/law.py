@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult
 from scissorcal.package.exact import ExactModel, FitDraws, central_model, exact_model
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

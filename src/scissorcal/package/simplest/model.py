@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult, FittedParameter
 from scissorcal.package.bound import SHARE_OF_TOLERANCE
 from scissorcal.package.compile import Compiled
@@ -22,8 +22,6 @@ from scissorcal.package.simplest.walk import Walked, cost_of, walk
 from scissorcal.package.smallest_tables import package_tables
 from scissorcal.package.table_cost import table_bytes
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 SHARE_OF_OMISSIONS = 0.5
 """Of the scene's tolerance, for everything that is left out together. Tables may use

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.package.simplest.difference import Felt, Scene, felt
 from scissorcal.package.simplest.law import Law, column, with_columns
 from scissorcal.package.simplest.restructure import Free
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 CENTRAL_STEPS = 20

@@ -10,9 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 from scissorcal.package.simplest.candidates import Candidate
 from scissorcal.package.simplest.difference import (
     PROJECTING,
@@ -26,8 +23,6 @@ from scissorcal.package.simplest.law import Law
 from scissorcal.package.simplest.nearest import nearest
 from scissorcal.package.simplest.restructure import restructure, settled
 from scissorcal.recipe.schema import Recipe
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model import Response, edge_height, mean_share
 from scissorcal.model.friction_terms import PARAMETERS, side_of, terms_of
 from scissorcal.model.terms import Role
@@ -16,8 +16,6 @@ from scissorcal.package.exact import FitDraws
 from scissorcal.package.simplest.candidates import NONE, Candidate
 from scissorcal.package.simplest.difference import Scene
 from scissorcal.package.simplest.law import Law, column, structured, with_columns, without
-
-Array = NDArray[np.float64]
 
 EDGE_FIELDS = ("offset_m", "taper_rad", "curvature_per_m", "bend_per_m2")
 EDGE_TERMS = {"line": 2, "arc": 3, "cubic": 4}

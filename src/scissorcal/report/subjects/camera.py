@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.camera.result import CameraFit, PixelMap
 from scissorcal.report.numbers import finite, finite_each, percent, short, significant
 from scissorcal.report.panel import (
@@ -22,7 +23,6 @@ from scissorcal.report.panel import (
     number,
     words,
 )
-from scissorcal.report.reduce import Array
 from scissorcal.vision.geometry.camera import PARAMETERS
 
 PART = "camera"

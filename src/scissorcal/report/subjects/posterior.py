@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.caveats import (
     COLUMN,
     NOT_KNOWN,
@@ -28,7 +29,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.reduce import Array, thinned
+from scissorcal.report.reduce import thinned
 
 MOST_PAIRS = 6
 MOST_DOTS = 150

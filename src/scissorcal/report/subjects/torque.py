@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult, rms_interval, worst_stroke
 from scissorcal.recording.recording import Stroke
 from scissorcal.report.numbers import Number, finite, percent, short, unit_text, with_unit
@@ -26,7 +27,7 @@ from scissorcal.report.panel import (
     percent_of,
     points,
 )
-from scissorcal.report.reduce import Array, block_means, limits_of, mean, median, rms, thinned
+from scissorcal.report.reduce import block_means, limits_of, mean, median, rms, thinned
 from scissorcal.report.strokes import (
     BETWEEN,
     KINDS,

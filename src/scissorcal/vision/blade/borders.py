@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.parts import BladeParts
 from scissorcal.vision.blade.profile import (
@@ -16,8 +17,6 @@ from scissorcal.vision.blade.profile import (
     steepest,
 )
 from scissorcal.vision.blade.view import View
-
-Array = NDArray[np.float64]
 
 _MOST_POINTS = 3000
 _SHADOW_SEARCH = 0.05

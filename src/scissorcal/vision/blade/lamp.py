@@ -1,12 +1,9 @@
 """Where the lamp is: the side on which scissors have their cast shadow."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.vision.blade.scissors import Scissors
 from scissorcal.vision.blade.silhouette import Silhouette
-
-Array = NDArray[np.float64]
 
 _LEAST_DARK, _MOST_DARK = 0.04, 0.6
 _REACH = 0.12

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints, find_border, find_hole, fit_circle
@@ -19,8 +19,6 @@ from scissorcal.vision.blade.modes import (
 from scissorcal.vision.blade.parts import BACK_FIRST, BACK_LAST, FIRST, LAST, BladeParts
 from scissorcal.vision.blade.profile import Light
 from scissorcal.vision.blade.view import View
-
-Array = NDArray[np.float64]
 
 _ANCHORS, _STRETCHES = 14, 30
 _LEAST_HALVED = 0.4

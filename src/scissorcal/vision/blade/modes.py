@@ -4,14 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints
 from scissorcal.vision.blade.parts import BladeParts
 from scissorcal.vision.blade.view import View
-
-Array = NDArray[np.float64]
 
 SHARP = 1.4
 """Largest blur, relative to the median, of points that determine the centreline."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.borders import find_border
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
@@ -15,8 +15,6 @@ from scissorcal.vision.blade.plain_view import PlainView
 from scissorcal.vision.blade.profile import Light
 from scissorcal.vision.blade.tip import BEFORE_TIP, metal_end
 from scissorcal.vision.blade.view import View
-
-Array = NDArray[np.float64]
 
 SEARCH = 0.1
 """Largest distance, in blade lengths, of the outline of scissors from the metal, by shadows."""

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.silhouette import Silhouette
 from scissorcal.vision.targets.boards import MAT_PIVOT_M
 
-Array = NDArray[np.float64]
 EdgeSide = Literal["down", "up"]
 
 FIRST, LAST = 0.12, 0.97

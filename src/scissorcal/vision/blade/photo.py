@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.blade.lamp import lamp_direction
@@ -18,8 +17,6 @@ from scissorcal.vision.blade.view import View, see_mat
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.marker_corners import linear_light
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

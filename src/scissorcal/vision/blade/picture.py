@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.vision.blade.measure import BladeMeasurement
 from scissorcal.vision.blade.silhouette import Silhouette
 from scissorcal.vision.blade.view import View
 from scissorcal.vision.overlay import Canvas
 from scissorcal.vision.photo import Photo
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 LARGEST = 1600

@@ -3,11 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recipe.photograph_priors import BladePriors
-
-Array = NDArray[np.float64]
 
 FOCAL_SHARE = 0.85
 """Focal length over the picture's longer side: 0.72 of a telephone's wide lens to 1.0 of a normal

@@ -4,13 +4,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.parts import BACK_LAST, BladeParts
 from scissorcal.vision.blade.silhouette import Silhouette
-
-Array = NDArray[np.float64]
 
 OPEN_FIRST = 0.55
 """Where halving begins on open blades, in shares of the length: a range that is seen at most

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.view import View
 
-Array = NDArray[np.float64]
 Light = NDArray[np.float32]
 Mask = NDArray[np.uint8]
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.vision.blade.parts import BladeParts
 from scissorcal.vision.blade.profile import (
     ASIDE,
@@ -16,8 +16,6 @@ from scissorcal.vision.blade.profile import (
     best_path,
 )
 from scissorcal.vision.blade.view import View
-
-Array = NDArray[np.float64]
 
 BEFORE_TIP = 0.85
 """Share of the outline's length up to which edge and back are metal's, whatever casts a shadow."""

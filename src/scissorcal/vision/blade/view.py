@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.recipe.photograph_priors import BladePriors
 from scissorcal.vision.geometry.board_pose import Corners, locate_board, project_pose
@@ -13,8 +13,6 @@ from scissorcal.vision.geometry.camera import PARAMETERS, Camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import BLADE_MAT, MAT_FIELD_M
 from scissorcal.vision.targets.detect import Detection, find_board
-
-Array = NDArray[np.float64]
 
 LEAST_MARKERS = 6
 

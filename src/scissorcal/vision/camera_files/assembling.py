@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.vision.camera_files.checks import check_coefficients, check_matrix, check_size
 from scissorcal.vision.camera_files.keys import Entry, Facts, is_off, is_zero
 from scissorcal.vision.camera_files.models import (
@@ -18,8 +18,6 @@ from scissorcal.vision.camera_files.numbers import array_at, number_at, size_at,
 from scissorcal.vision.camera_files.refusal import RefusedError, short, shown
 from scissorcal.vision.camera_files.vocabulary import OWN
 from scissorcal.vision.geometry.camera import Camera
-
-Array = NDArray[np.float64]
 
 _COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _LENGTHS = (0, 4, 5, 8, 12, 14)

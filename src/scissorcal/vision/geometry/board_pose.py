@@ -5,13 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
 from scissorcal.vision.targets.detect import Detection
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LEAST_SD_PX = 0.02
 """Least standard deviation of a corner."""

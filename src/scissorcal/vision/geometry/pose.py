@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.recipe.euler_angles import EulerAngles
-
-Array = NDArray[np.float64]
 
 NEARLY_UNIT = 1e-6
 """How far a quaternion's length or a matrix's product with its transpose may be from one: rounding

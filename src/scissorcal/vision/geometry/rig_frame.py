@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import (
     LEAST_SD_PX,
@@ -18,8 +19,6 @@ from scissorcal.vision.geometry.board_pose import (
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, between, left_jacobian
 from scissorcal.vision.targets.detect import Detection
-
-Array = NDArray[np.float64]
 
 OPEN = 3.0
 """Prior standard deviation (rad and m) of both poses: a turn that may be any has 1.8 rad, and no

@@ -2,15 +2,11 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from scissorcal.aliases import Array
 from scissorcal.vision.geometry.board_pose import BoardPose
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import RigPose
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

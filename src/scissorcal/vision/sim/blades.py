@@ -4,12 +4,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array
 from scissorcal.vision.sim.lens import Pose
 from scissorcal.vision.sim.photograph import Layer
-
-Array = NDArray[np.float64]
 
 STEEL = 0.28
 _SCREW = 0.12

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 
 def coverage(polygons: Iterable[Array], width: int, height: int) -> NDArray[np.float32]:

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.vision.sim.coverage import coverage
 from scissorcal.vision.sim.lens import Lens, Pose
 from scissorcal.vision.sim.looks import Bytes, Looks, Picture, develop
 from scissorcal.vision.sim.shadows import CastShadow, cast
-
-Array = NDArray[np.float64]
 
 FINEST_PX = 1.5
 """Projected polygons are subdivided to sides this short, which distortion leaves straight."""

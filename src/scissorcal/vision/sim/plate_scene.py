@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.vision.sim.lens import Pose, about
 from scissorcal.vision.sim.photograph import Layer
 from scissorcal.vision.sim.targets import target_layers
 from scissorcal.vision.targets.boards import RIG_MARKERS, MarkedBoard
-
-Array = NDArray[np.float64]
 
 LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """A level plate in the rig's frame: its upper face looks along y, in which the blades close."""

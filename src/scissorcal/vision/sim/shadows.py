@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.vision.sim.coverage import coverage
 from scissorcal.vision.sim.lens import Lens, Pose
 from scissorcal.vision.sim.looks import Picture
@@ -14,7 +14,6 @@ from scissorcal.vision.sim.looks import Picture
 if TYPE_CHECKING:
     from scissorcal.vision.sim.photograph import Layer
 
-Array = NDArray[np.float64]
 
 _SAMPLES = 24
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))

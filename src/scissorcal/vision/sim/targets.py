@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.vision.sim.lens import Pose
 from scissorcal.vision.sim.photograph import Layer
 from scissorcal.vision.targets.boards import Board, Chessboard
 from scissorcal.vision.targets.sheet import board_ink
-
-Array = NDArray[np.float64]
 
 PAPER, INK = 0.85, 0.04
 

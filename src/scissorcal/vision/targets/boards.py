@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
 
 DICTIONARY = "DICT_5X5_250"
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.errors import InputError
 from scissorcal.vision.photo import Photo, Picture
 from scissorcal.vision.targets.boards import (
@@ -19,9 +20,6 @@ from scissorcal.vision.targets.boards import (
 )
 from scissorcal.vision.targets.marker_corners import refine_marker_corners
 from scissorcal.vision.targets.refusals import no_board_sentence
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LEAST_CORNERS = 6
 """Least number of corners that determine a chessboard's pose."""

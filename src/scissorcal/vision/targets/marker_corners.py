@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from scissorcal.aliases import Array
+
 Flags = NDArray[np.bool_]
 
 _ALONG = np.linspace(0.12, 0.88, 28)

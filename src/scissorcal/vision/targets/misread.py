@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.vision.photo import Picture
 from scissorcal.vision.targets.board_words import words_of_board
 from scissorcal.vision.targets.boards import (
@@ -20,8 +21,6 @@ from scissorcal.vision.targets.boards import (
     MarkedBoard,
     dictionary,
 )
-
-Array = NDArray[np.float64]
 
 LEAST_MARKERS = 4
 """Four markers have 32 coordinates for the 8 unknowns of a homography, and span an area."""

@@ -1,11 +1,11 @@
 """The whole day on a virtual rig in virtual time, ending in truth against estimate."""
 
-from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scissorcal.aliases import Progress
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.verdicts import Verdict
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
     from scissorcal.render import RenderResult
 
-Progress = Callable[[float, str], None]
 
 RENDER_S = 30.0
 RIG_FITS = {"rotary": ("friction", "cut"), "linear": ("friction",)}

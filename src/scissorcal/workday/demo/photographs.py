@@ -1,11 +1,11 @@
 """The demo's photographs: rendered, taken in and fitted as a lab's own would be, then judged."""
 
 import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scissorcal.aliases import Progress
 from scissorcal.recipe.requirements import requirements
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.photographs import BladeSetup
@@ -18,8 +18,6 @@ from scissorcal.workday.workspace import Workspace
 if TYPE_CHECKING:
     from scissorcal.device.sim.specimen import Specimen
     from scissorcal.recipe.schema import Recipe
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)

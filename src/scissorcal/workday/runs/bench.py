@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import scissorcal
+from scissorcal.aliases import Progress
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
 from scissorcal.workday.engine import Engine
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from scissorcal.bench.trade.schedule import Schedule
     from scissorcal.bench.trade.study import Task
 
-Progress = Callable[[float, str], None]
 
 FINISH_S = 2.0
 """Time within a budget for writing the results."""

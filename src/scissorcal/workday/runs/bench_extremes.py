@@ -1,18 +1,18 @@
 """`bench extremes`: its jobs spread over processes, its page and JSON twin."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scissorcal.aliases import Progress
 from scissorcal.workday.pool import open_pool
 
 if TYPE_CHECKING:
     from scissorcal.bench.extremes.result import Extremes
     from scissorcal.bench.extremes.study import Done, Extent, Job
 
-Progress = Callable[[float, str], None]
 
 FINISH_S = 2.0
 """Time within a budget for writing the results."""

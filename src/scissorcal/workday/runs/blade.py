@@ -19,13 +19,14 @@ from scissorcal.workday.photographs import (
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
+    from scissorcal.aliases import Progress
     from scissorcal.calibration.camera.result import CameraFit
     from scissorcal.calibration.edge.result import BladeFit, SeenPair
     from scissorcal.vision.blade.photo import BladePhoto
     from scissorcal.vision.geometry.camera import Camera
     from scissorcal.vision.photo import Photo
     from scissorcal.workday.engine import Engine
-    from scissorcal.workday.runs.fit import Made, Progress, Request
+    from scissorcal.workday.runs.fit import Made, Request
 
 STREAM = 3
 

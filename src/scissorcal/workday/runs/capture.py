@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from scissorcal.aliases import Say
 from scissorcal.errors import InputError
 from scissorcal.recipe.capture_cost import CaptureKind, capture_cost, refuse_long
 from scissorcal.recipe.load import parse_recipe, read_text
@@ -13,7 +14,7 @@ from scissorcal.recipe.requirements import DesignedKind, requirements
 from scissorcal.recipe.show import with_designed_captures
 from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.runs.design import designed_for
-from scissorcal.workday.runs.probe import Say, ensure_probed, last_probe
+from scissorcal.workday.runs.probe import ensure_probed, last_probe
 from scissorcal.workday.runs.sweep_speeds import (
     sliding_below_encoder,
     sweep_bounds,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scissorcal.aliases import Say
 from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import PATH
@@ -15,13 +16,13 @@ from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.runs.cut import edge_of_photographs
 from scissorcal.workday.runs.fit import load_result
-from scissorcal.workday.runs.probe import Say, ensure_probed
+from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.tracking.stated_pose import stated_pose
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
+    from scissorcal.aliases import Progress
     from scissorcal.calibration.result import FitResult
-    from scissorcal.control.follow import Progress
     from scissorcal.control.mechanics import RigMechanics
     from scissorcal.control.result import ControlResult
     from scissorcal.device.link import Link

@@ -6,6 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from scissorcal.aliases import Progress
 from scissorcal.errors import InputError, MissingError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine, refuse_other_fit
@@ -16,7 +17,6 @@ from scissorcal.workday.workspace import Workspace
 if TYPE_CHECKING:
     from scissorcal.calibration.result import Effort
 
-Progress = Callable[[float, str], None]
 Stop = Callable[[], bool]
 
 

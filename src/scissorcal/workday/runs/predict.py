@@ -1,11 +1,11 @@
 """What a workspace's friction fit predicts of a motion, with a band, as table and plot."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from scissorcal.aliases import Progress
 from scissorcal.errors import InputError, needs_extra
 from scissorcal.files import replacing
 from scissorcal.foreign import open_foreign, reading
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from scissorcal.calibration.friction.predict import Band, Prediction
     from scissorcal.recording import Joint, Recording
 
-Progress = Callable[[float, str], None]
 What = Literal["friction", "load"]
 
 CHANNELS = ("opening", "motor_torque", "handle_force", "torque_command", "force_command")

@@ -1,8 +1,9 @@
 """Probe a rig into a workspace: before its first motor run, and again where that is too old."""
 
+from __future__ import annotations
+
 import json
 import math
-from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
@@ -15,18 +16,15 @@ from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
+    from scissorcal.aliases import Progress, Say
     from scissorcal.device.link import Link
     from scissorcal.device.loading import Confirm
     from scissorcal.device.probe.result import ProbeResult
     from scissorcal.recipe.schema import Recipe
 
-Progress = Callable[[float, str], None]
-Say = Callable[[str], None]
-"""Shows one sentence to a person."""
-
 
 def probe_device(
-    recipe: "Recipe",
+    recipe: Recipe,
     device: str,
     *,
     workspace: Workspace | None = None,
@@ -34,8 +32,8 @@ def probe_device(
     baud: int | None = None,
     realtime: bool = False,
     progress: Progress | None = None,
-    confirm: "Confirm | None" = None,
-) -> "ProbeResult":
+    confirm: Confirm | None = None,
+) -> ProbeResult:
     """Probe ``device`` (a port, or "sim") and keep the result in the workspace, if there is one.
 
     "sim" is a virtual rig in virtual time, unless ``realtime``; ``baud`` takes the place of the
@@ -55,13 +53,13 @@ def probe_device(
 
 def probe_into(
     workspace: Workspace,
-    link: "Link",
-    recipe: "Recipe",
+    link: Link,
+    recipe: Recipe,
     *,
     progress: Progress | None = None,
-    confirm: "Confirm | None" = None,
+    confirm: Confirm | None = None,
     then: str = "",
-) -> "ProbeResult":
+) -> ProbeResult:
     """Probe the rig on a link, and keep what was found; as `probe_device`."""
     from scissorcal.device.probe.probe import ProbeRefusedError, probe
 
@@ -77,15 +75,15 @@ def probe_into(
 
 def ensure_probed(
     workspace: Workspace,
-    link: "Link",
-    recipe: "Recipe",
+    link: Link,
+    recipe: Recipe,
     *,
     progress: Progress | None = None,
-    confirm: "Confirm | None" = None,
+    confirm: Confirm | None = None,
     then: str = "",
     say: Say | None = None,
     now: datetime | None = None,
-) -> "ProbeResult":
+) -> ProbeResult:
     """The workspace's probe of this rig, or a new one where there is none that still counts.
 
     One counts if it is of exactly this rig (all that it states) and this ``rig.motor_sign``, found
@@ -110,7 +108,7 @@ def ensure_probed(
     return result
 
 
-def _refuse_unanswered(result: "ProbeResult", link: "Link", recipe: "Recipe", tell: Say) -> None:
+def _refuse_unanswered(result: ProbeResult, link: Link, recipe: Recipe, tell: Say) -> None:
     from scissorcal.device.unanswered import refuse_unanswered
 
     said = refuse_unanswered(recipe, link.identity, result.inertia_kg_m2)
@@ -118,7 +116,7 @@ def _refuse_unanswered(result: "ProbeResult", link: "Link", recipe: "Recipe", te
         tell(said)
 
 
-def last_probe(workspace: Workspace, link: "Link | None" = None) -> "ProbeResult | None":
+def last_probe(workspace: Workspace, link: Link | None = None) -> ProbeResult | None:
     """The probe that the workspace keeps, if it is of the rig on ``link`` (of any without one).
 
     None where there is none that can be read.
@@ -129,7 +127,7 @@ def last_probe(workspace: Workspace, link: "Link | None" = None) -> "ProbeResult
     return found
 
 
-def probe_state(workspace: Workspace, recipe: "Recipe", now: datetime | None = None) -> str:
+def probe_state(workspace: Workspace, recipe: Recipe, now: datetime | None = None) -> str:
     """What the workspace's probe says and whether it still counts, in a sentence.
 
     Whether it is of the rig that will be connected shows only then.
@@ -146,7 +144,7 @@ def probe_state(workspace: Workspace, recipe: "Recipe", now: datetime | None = N
     return f"{said}: no check failed{left_out}."
 
 
-def _kept(workspace: Workspace) -> "ProbeResult | str":
+def _kept(workspace: Workspace) -> ProbeResult | str:
     """The probe that the workspace keeps, or why there is none."""
     path = workspace.probe_path
     if not path.exists():
@@ -160,11 +158,11 @@ def _kept(workspace: Workspace) -> "ProbeResult | str":
         return f"{path.name} cannot be read ({error}) and is replaced"
 
 
-def _most(recipe: "Recipe") -> str:
+def _most(recipe: Recipe) -> str:
     return f"{1e3 * recipe.rig.probe.largest_torque_Nm:g} mN m"
 
 
-def _why_again(last: "ProbeResult | str", link: "Link", recipe: "Recipe", now: datetime) -> str:
+def _why_again(last: ProbeResult | str, link: Link, recipe: Recipe, now: datetime) -> str:
     """Why a probe does not count, as part of a sentence; empty where it does."""
     if isinstance(last, str):
         return last
@@ -173,7 +171,7 @@ def _why_again(last: "ProbeResult | str", link: "Link", recipe: "Recipe", now: d
     return _outdated(last, recipe, now)
 
 
-def _outdated(last: "ProbeResult", recipe: "Recipe", now: datetime) -> str:
+def _outdated(last: ProbeResult, recipe: Recipe, now: datetime) -> str:
     """Why a probe of this rig does not count, as part of a sentence; empty where it does."""
     from scissorcal.device.probe.probe import recipe_facts
 
@@ -196,7 +194,7 @@ def _outdated(last: "ProbeResult", recipe: "Recipe", now: datetime) -> str:
     return ""
 
 
-def _differs(last: "ProbeResult", link: "Link") -> bool:
+def _differs(last: ProbeResult, link: Link) -> bool:
     """Whether a probe is of another rig, or ran in virtual time where this one does not."""
     from scissorcal.device.link import PortLink
     from scissorcal.device.probe.probe import identity_digest
@@ -206,7 +204,7 @@ def _differs(last: "ProbeResult", link: "Link") -> bool:
     return last.identity != identity_digest(link.identity) or real != isinstance(link, PortLink)
 
 
-def _store(workspace: Workspace, result: "ProbeResult") -> None:
+def _store(workspace: Workspace, result: ProbeResult) -> None:
     text = json.dumps(result.as_dict(), indent=2) + "\n"
     with replacing(workspace.probe_path) as part:
         part.write_text(text, encoding="utf-8")

@@ -7,24 +7,25 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scissorcal.aliases import Say
 from scissorcal.errors import InputError, MissingError, ScissorcalError, VerdictError
 from scissorcal.files import replacing
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import line_of, open_rig
 from scissorcal.workday.runs.fit import available, load_result
-from scissorcal.workday.runs.probe import Say, ensure_probed
+from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from scissorcal.aliases import Progress
     from scissorcal.device.loading import Confirm
     from scissorcal.package import ModelPackage
     from scissorcal.recipe.plate_tracking import PlateTracking
     from scissorcal.recipe.schema import Recipe
     from scissorcal.render import PoseSource, RenderResult, RigFacts, VirtualStrokes
-    from scissorcal.render.watch import Progress
     from scissorcal.workday.tracking.plate_camera import PlateCamera, TrackedRun
 
 NONE = "none"

@@ -2,12 +2,13 @@
 
 import pickle
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from scissorcal.aliases import Progress
 from scissorcal.errors import InputError, MissingError
 from scissorcal.identity import digest
 from scissorcal.workday.engine import Engine
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from scissorcal.calibration.verify.study import Study, Task
     from scissorcal.recording import Recording
 
-Progress = Callable[[float, str], None]
 
 ALGORITHM = 6
 """Raised whenever a fit of the same inputs would give other numbers."""

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from scissorcal.tracking.contacts import TipContacts
     from scissorcal.workday.tracking.pictures import PlateEye
 
-Array = NDArray[np.float64]
 KnownPose = tuple[Array, Array, Array]
 """Rotation (3, 3), place (3,) in m and covariance (6, 6) in the rig's frame."""
 

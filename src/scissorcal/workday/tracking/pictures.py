@@ -4,9 +4,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
@@ -15,8 +12,6 @@ from scissorcal.vision.geometry.seen_plate import SeenPlate, seen_plate
 from scissorcal.vision.live import Frame
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 from scissorcal.vision.track import State, Tracked, track
-
-Array = NDArray[np.float64]
 
 TARGETS = ("", PLATE_BOARD.name, PLATE_STRIP.name)
 """Names of targets, in the order of their numbers in a recording."""

@@ -22,11 +22,11 @@ from scissorcal.workday.tracking.sim_world import CARRY_S, SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackChannels
 
 if TYPE_CHECKING:
+    from scissorcal.aliases import Say
     from scissorcal.device.link import Link
     from scissorcal.device.motion import Motion
     from scissorcal.recipe.schema import Line, Recipe
     from scissorcal.recording import RecordingWriter
-    from scissorcal.workday.runs.probe import Say
 
 PATIENCE_S = 10.0
 """For so long a first pose is waited for."""

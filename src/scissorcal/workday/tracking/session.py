@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.model.surface import Surface
 from scissorcal.recipe.schema import Recipe
 from scissorcal.tracking.delay import DelayFit, measure_delay
@@ -17,8 +18,6 @@ from scissorcal.tracking.tracker import Outcome, PoseEstimate
 from scissorcal.vision.track import STATES, State
 from scissorcal.workday.tracking.pictures import PlatePicture
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackChannels
-
-Array = NDArray[np.float64]
 
 UNKNOWN_FRICTION_N = 1.0
 """Least force of a contact where friction of the pivot was not fitted: three times what 13 mN m of

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.sim.hand import minimum_jerk
 from scissorcal.device.sim.plate import plate_pose
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from scissorcal.device.motion import Motion
     from scissorcal.recipe.schema import Recipe
 
-Array = NDArray[np.float64]
 
 CAMERA_OFFSET_S, CAMERA_DRIFT = 3000.0, 80e-6
 """The camera's clock: when it was switched on, and that it runs faster."""

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.foreign import parse_json, reading
 from scissorcal.foreign.formats import RECORDING
@@ -27,8 +28,6 @@ from scissorcal.tracking.follow import FollowedRow
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.seen_plate import SeenPlate
 from scissorcal.workday.tracking.pictures import TARGETS, PlatePicture
-
-Array = NDArray[np.float64]
 
 TRACK_MARK = "track"
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording, Stroke
-
-Array = NDArray[np.float64]
 
 RATE_HZ = 1000
 INERTIA = 2e-4

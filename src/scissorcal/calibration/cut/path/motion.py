@@ -3,15 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.segments import Bridged, bridge, sheets_of
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 STRIDES = (1, 2, 4, 8, 16)
 CLEAR = 3.0

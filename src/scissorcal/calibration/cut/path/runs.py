@@ -4,12 +4,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.path.motion import PathMotion, turning_points
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 TURN_RAD = 3e-3
 """A turn that is reversed within this angle is a tremor."""

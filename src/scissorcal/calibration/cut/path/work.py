@@ -6,14 +6,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.path.motion import PathMotion, turning_points
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.model import FrictionLaw, friction_torque, presliding_state
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 DEFAULT_SLOW_TIME_S = 0.012
 SURE = 3.0

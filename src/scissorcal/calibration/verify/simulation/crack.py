@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.kernel import CrackLaw, CrackPath, Curve, walk_crack
 from scissorcal.model import Cutting, Edge, Response
-
-Array = NDArray[np.float64]
 
 EDGE_KNOTS = 385
 EDGE_FROM, EDGE_TO = -1.0, 3.0

@@ -3,16 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.path import built_friction, built_up
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.weak_form import HELD
 from scissorcal.calibration.signals.window_length import SMOOTH
 from scissorcal.calibration.verify.simulation.motion import SmoothPiece
 from scissorcal.model import FrictionLaw
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

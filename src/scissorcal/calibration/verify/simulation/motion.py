@@ -4,16 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.cut.path import PathMotion, path_motion
 from scissorcal.calibration.signals.segments import bridge
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 MOVED_HZ = 15.0
 """Motion up to here is kept however coarse an encoder is: excitations of the inertia end here."""

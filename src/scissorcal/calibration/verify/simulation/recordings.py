@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
@@ -15,8 +15,6 @@ from scissorcal.calibration.verify.simulation.drive import DriveTruth, measured_
 from scissorcal.calibration.verify.simulation.motion import Motion
 from scissorcal.model import Cutting, FrictionLaw
 from scissorcal.recording.recording import Recording
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
