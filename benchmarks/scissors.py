@@ -135,7 +135,8 @@ def photographed(
         texture=rng.uniform(0.0, 0.03),
         texture_m=rng.uniform(0.3e-3, 2e-3),
     )
-    layers = [sheet, CastShadow.of(metal[:2], above, lamp), *metal]
+    blades = [outline for layer in metal[:2] for outline in layer.outlines_m]
+    layers = [sheet, CastShadow.of(blades, above, metal[0].pose, lamp), *metal]
     looks = random_looks(rng, px_per_mm, rng.uniform(0.3, 0.8))
     picture = render(layers, lens, looks, rng, background=0.8)
     data = np.frombuffer(as_jpeg(picture, int(rng.integers(80, 97))), dtype=np.uint8)

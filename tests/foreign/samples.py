@@ -98,13 +98,13 @@ def _drawing(path: Path) -> None:
 
 def _read_drawing(path: Path) -> None:
     recipe = parse_recipe(recipe_path("paper-80gsm").read_text(encoding="utf-8") + DRAWN)
-    pieces = plate_pieces(recipe, path.parent)
+    pieces = plate_pieces(recipe.plate, path.parent)
     places = [[one.begin_m, *(strip.end_m for strip in one.strips)] for one in pieces]
     assert places
     for place in places:
         assert np.isfinite(place).all()
         assert (np.diff(place) > 0.0).all()
-    assert plate_sentence(recipe, pieces)
+    assert plate_sentence(recipe.plate, recipe.material.name, recipe.material.thickness_mm, pieces)
 
 
 def _recipe(path: Path) -> None:

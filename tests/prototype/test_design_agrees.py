@@ -121,7 +121,7 @@ def test_a_saved_recipe_is_taken_and_has_the_same_pieces(bed: Bed, tmp_path: Pat
     )  # fmt: skip
     text = bed.run("(given) => recipeText(given, scene, null)", given)
     recipe = parse_recipe(text)
-    wanted = numbers(plate_pieces(recipe, tmp_path))
+    wanted = numbers(plate_pieces(recipe.plate, tmp_path))
     found = of_page(bed, given)
     assert [len(one) for one in found] == [len(one) for one in wanted]
     for one, other in zip(found, wanted, strict=True):

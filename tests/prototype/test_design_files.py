@@ -69,7 +69,7 @@ def test_a_plate_from_files_is_drawn_and_saved_with_its_outlines(
     browser: Browser, tmp_path: Path
 ) -> None:
     workspace = create_workspace(tmp_path / "holed", "paper-with-hole")
-    wanted = numbers(plate_pieces(workspace.recipe(), workspace.root))
+    wanted = numbers(plate_pieces(workspace.recipe().plate, workspace.root))
     assert len(wanted) == 2
     plate = workspace_plate(workspace)
     assert plate is not None
@@ -86,7 +86,7 @@ def test_a_plate_from_files_is_drawn_and_saved_with_its_outlines(
         bed.page.get_by_label("instead of the package's plate").check()
         assert spans(bed) == [(round(one[0], 3), round(one[-2], 3)) for one in wanted]
         text = saved(bed, tmp_path)
-    own = numbers(plate_pieces(parse_recipe(text), tmp_path))
+    own = numbers(plate_pieces(parse_recipe(text).plate, tmp_path))
     for one, other in zip(own, wanted, strict=True):
         assert one == pytest.approx(other, abs=1e-3)
 

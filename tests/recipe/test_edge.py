@@ -68,15 +68,16 @@ def test_points_become_the_models_curve() -> None:
     assert recipe.rig.edge.length_m == curve.edge.length_m == 0.075
     assert curve.edge.offset_at([0.0, 0.03, 0.075]) == pytest.approx([-8e-3, -7e-3, -5e-3])
     assert curve.pieces == 1
-    assert edge_sentence(recipe).startswith("The edge follows 3 points of the recipe, from 0 to 75")
-    assert "not measured" in edge_sentence(recipe)
+    said = edge_sentence(recipe.rig.edge, "rotary")
+    assert said.startswith("The edge follows 3 points of the recipe, from 0 to 75")
+    assert "not measured" in said
     assert stated_curve(parse_recipe(text_with(POINTS)).rig.edge) is curve
 
 
 def test_points_may_plan_for_photographs_and_have_deviations() -> None:
     recipe = parse_recipe(text_with(POINTS + '\nsource = "photographs"\noffset_sd_mm = 0.05'))
     assert recipe.rig.edge.offset_sd_mm == 0.05
-    assert "Photographs take its place" in edge_sentence(recipe)
+    assert "Photographs take its place" in edge_sentence(recipe.rig.edge, recipe.rig.joint)
 
 
 @pytest.mark.parametrize("family", ["line", "arc"])
@@ -88,7 +89,7 @@ def test_lines_and_arcs_are_their_numbers(family: str) -> None:
     assert (edge.family, edge.offset_m, edge.length_m) == (family, -8e-3, 75e-3)
     assert edge.taper_rad == np.radians(2.0)
     assert edge.curvature_per_m == (0.5 if bent else 0.0)
-    assert edge_sentence(recipe) == ""
+    assert edge_sentence(recipe.rig.edge, recipe.rig.joint) == ""
 
 
 def test_recipes_without_points_are_written_as_before() -> None:
@@ -128,4 +129,6 @@ def test_the_example_of_the_documents_says_what_it_prints() -> None:
     page = (Path(__file__).parents[2] / "docs/files.md").read_text(encoding="utf-8")
     example = re.search(r"```toml\n\[rig\.edge\]\n(.*?)```", page, re.DOTALL)
     assert example is not None
-    assert f"note: {edge_sentence(parse_recipe(text_with(example[1])))}\n" in page
+    assert (
+        f"note: {edge_sentence(parse_recipe(text_with(example[1])).rig.edge, 'rotary')}\n" in page
+    )

@@ -56,7 +56,7 @@ def test_a_tracked_plate_is_a_uniform_sheet() -> None:
 
 def test_fifteen_holes_are_sixteen_pieces() -> None:
     recipe = parse_recipe(f"{BASE}\n{SHEET}{many_holes(15)}")
-    assert len(plate_pieces(recipe, Path())) == 16
+    assert len(plate_pieces(recipe.plate, Path())) == 16
 
 
 def test_a_drawing_that_is_missing_is_named(tmp_path: Path) -> None:
@@ -64,18 +64,19 @@ def test_a_drawing_that_is_missing_is_named(tmp_path: Path) -> None:
         BASE + "\n" + SHEET.replace(f"outline_mm = {BOX}", 'outline = "plate.svg"')
     )
     with pytest.raises(InputError, match=r"plate\.svg does not exist"):
-        plate_pieces(recipe, tmp_path)
+        plate_pieces(recipe.plate, tmp_path)
 
 
 def test_a_uniform_sheet_has_neither_pieces_nor_a_sentence() -> None:
     recipe = parse_recipe(BASE)
-    assert plate_pieces(recipe, Path()) == ()
-    assert plate_sentence(recipe, ()) == ""
+    assert plate_pieces(recipe.plate, Path()) == ()
+    assert plate_sentence(recipe.plate, "paper", 0.1, ()) == ""
 
 
 def test_what_is_assumed_and_declared_is_said() -> None:
     recipe = parse_recipe(f"{BASE}\n{SHEET.replace('0.1', '0.3')}toughness_ratio = 2\n")
-    said = plate_sentence(recipe, plate_pieces(recipe, Path()))
+    pieces = plate_pieces(recipe.plate, Path())
+    said = plate_sentence(recipe.plate, "paper", recipe.material.thickness_mm, pieces)
     assert "rest on an assumption: response and fracture energy proportional" in said
     assert "declared in the recipe, not measured" in said
     assert "the whole plate is taken to be of that one material" in said

@@ -146,7 +146,7 @@ def share(rendered: Array, true: Array) -> float:
 
 
 def test_plan_says_what_the_points_are(workspace: Workspace) -> None:
-    said = edge_sentence(workspace.recipe())
+    said = edge_sentence(workspace.recipe().rig.edge, "rotary")
     assert re.match(r"The edge follows 40 points of the recipe, from 0 to 75 mm: ", said)
     assert make_plan(workspace).notes[0] == said
     done = run(("plan",), workspace.root)
@@ -190,7 +190,7 @@ def test_the_report_shows_the_points(workspace: Workspace) -> None:
     assert done.code == 0, done.err
     twin = json.loads(workspace.report_json.read_text(encoding="utf-8"))
     (panel,) = (panel for panel in twin["panels"] if panel["id"] == "scene-edge")
-    assert panel["sentence"] == edge_sentence(workspace.recipe())
+    assert panel["sentence"] == edge_sentence(workspace.recipe().rig.edge, "rotary")
     values = {value["name"]: value for value in panel["rows"][0]["values"]}
     assert (values["family"]["text"], values["points"]["number"]) == ("points", 40)
     misfit = 1e6 * stated_curve(workspace.recipe().rig.edge).misfit_m

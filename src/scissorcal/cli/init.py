@@ -31,13 +31,12 @@ def init(
       Edit my-paper/recipe.toml, then go there: cd my-paper
       next: scissorcal plan
     """
-    from scissorcal.recipe.plate_layers import drawings
     from scissorcal.workday.workspace import create_workspace
 
     workspace = create_workspace(folder, recipe)
     works_in(workspace)
     loaded = workspace.recipe()
-    drawn = [workspace.root / name for name in drawings(loaded)]
+    drawn = [workspace.root / name for name in loaded.plate.drawings]
     text = (
         f"{folder} is a workspace for {loaded.name} ({loaded.description})\n"
         f"Edit {folder / workspace.recipe_path.name}, then go there: cd {folder}\n"

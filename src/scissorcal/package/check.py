@@ -8,7 +8,7 @@ import numpy as np
 from scissorcal.package.bound import deviation
 from scissorcal.package.grid import spread_points
 from scissorcal.package.model_package import ModelPackage, open_package
-from scissorcal.package.review import against as review_refusal
+from scissorcal.package.signature import against as review_refusal
 from scissorcal.package.signature import signature_refusal, signer_words, unasked_words
 from scissorcal.verdicts import Verdict, judge, not_evaluated
 

@@ -167,7 +167,8 @@ def table_laws(model: ExactModel, recipe: Recipe) -> dict[str, TableLaw]:
     points = spread_points(scene_ranges(recipe), SCOUTS)
     reach = _reach(model, points, recipe.limits.torque_Nm)
     if recipe.plate.layers:
-        deepest = _reach(*hardest_layer(model, recipe, points)).indentation
+        hardest, limit = hardest_layer(model, recipe)
+        deepest = _reach(hardest, points, limit).indentation
         reach = replace(reach, indentation=max(reach.indentation, deepest))
     cutting = model.cutting
     edge, response = cutting.edge, cutting.response

@@ -13,7 +13,6 @@ from scissorcal.recipe.priors import Section
 if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import LayerPiece
     from scissorcal.package.exact import ExactModel
-    from scissorcal.package.grid import Points
     from scissorcal.recipe.schema import Recipe
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -78,10 +77,8 @@ def piece_records(
     )
 
 
-def hardest_layer(
-    model: "ExactModel", recipe: "Recipe", points: "Points"
-) -> "tuple[ExactModel, Points, float]":
-    """A sheet as tough and as high as any of a drawn plate, the points, and its torque limit.
+def hardest_layer(model: "ExactModel", recipe: "Recipe") -> "tuple[ExactModel, float]":
+    """A sheet as tough and as high as any of a drawn plate, and its torque limit.
 
     As deep as the blades press that one the tables of the response have to reach.
     """
@@ -92,7 +89,7 @@ def hardest_layer(
     energy = None if cutting.fracture_energy is None else max(ratios) * cutting.fracture_energy
     face = max(1.0, sum(thickness)) * cutting.upper_face_m
     sheet = replace(cutting, fracture_energy=energy, upper_face_m=face)
-    return replace(model, cutting=sheet), points, recipe.limits.torque_Nm / min(1.0, *thickness)
+    return replace(model, cutting=sheet), recipe.limits.torque_Nm / min(1.0, *thickness)
 
 
 def kernel_pieces(records: Sequence[PieceRecord]) -> tuple[Piece, ...]:

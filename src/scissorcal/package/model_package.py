@@ -26,8 +26,7 @@ from scissorcal.package.exact import (
 )
 from scissorcal.package.manifest import CutRecord, FrictionRecord, Manifest
 from scissorcal.package.reach import reach_sentences
-from scissorcal.package.review import against
-from scissorcal.package.signature import signature_refusal
+from scissorcal.package.signature import against, signature_refusal
 from scissorcal.recipe.schema import Recipe
 
 ROUNDING = 1e-9

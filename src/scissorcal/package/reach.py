@@ -37,7 +37,7 @@ def data_reach(recipe: Recipe, cut: FitResult) -> DataReach | None:
     places = Points(opening.ravel(), np.zeros(opening.size), contact.ravel())
     limit = recipe.limits.torque_Nm
     if recipe.plate.layers:
-        model, places, limit = hardest_layer(model, recipe, places)
+        model, limit = hardest_layer(model, recipe)
     depth, crossed, through = _scene_depth(model, places, limit)
     response = model.cutting.response
     return DataReach(

@@ -1,7 +1,7 @@
 """The review: who signed a report, the decision, and every file that it covers."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Annotated, Any, Literal, Self
 
@@ -114,52 +114,3 @@ def stamp(now: datetime) -> str:
     if now.tzinfo is None:
         raise ValueError("a review's time needs its time zone")
     return now.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-
-
-def against(
-    review: Review | None, fits: Mapping[str, str], trusted: Sequence[str] | None = None
-) -> str:
-    """Why a package of these fits (inputs hash by fit) should not be rendered.
-
-    ``trusted`` are public keys (OpenSSH) of which one must have signed; None asks for no key.
-    Empty if its review is valid, else the rest of a sentence that begins with the package.
-    """
-    if review is None:
-        return "is not signed: its report has not been reviewed"
-    if any(review.fit_hashes.get(what) != digest for what, digest in fits.items()):
-        return (
-            f"has a review of other fits ({review.words}): run 'scissorcal report', review and "
-            "sign it, then 'scissorcal package build'"
-        )
-    if review.key is not None:
-        why = unproved(review.key, review.signed_text, "review")
-        if why:
-            return f"has a review ({review.words}) with a signature {why}"
-    if trusted is not None and (review.key is None or review.key.public_key not in trusted):
-        return (
-            f"has a review that none of the trusted keys signed ({review.words}; "
-            f"{review.identity_words})"
-        )
-    if review.decision == "reject":
-        return f"should not be rendered: its report was {review.words}"
-    return ""
-
-
-def unproved(key: KeySignature, text: str, what: str) -> str:
-    """Why a key's signature does not show who signed a text; empty where it does.
-
-    ``what`` names what has the text, such as "review". The rest of a sentence on the signature.
-    """
-    from scissorcal.package.keys import can_check, holds
-
-    if not can_check():
-        return (
-            f"by the key {key.fingerprint} that is not checked, because cryptography is not "
-            "installed: pip install 'scissorcal[keys]'"
-        )
-    if not holds(key, text):
-        return (
-            f"by the key {key.fingerprint} that is not of this {what}: it is forged, or the {what} "
-            "was changed since. Fetch an unchanged copy"
-        )
-    return ""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from scissorcal.package.manifest import Manifest
-from scissorcal.package.review import KeySignature, unproved
+from scissorcal.package.review import KeySignature, Review
 
 Sign = Callable[[str], KeySignature]
 """Signs a text, such as `keys.signer` of a private key."""
@@ -63,3 +63,52 @@ def unasked_words(manifest: Manifest) -> str:
         "Its hashes show that it is whole, not who made it: anyone who can write the file can "
         "write them. 'scissorcal package build --key FILE' signs it, --trusted-key asks for that."
     )
+
+
+def against(
+    review: Review | None, fits: Mapping[str, str], trusted: Sequence[str] | None = None
+) -> str:
+    """Why a package of these fits (inputs hash by fit) should not be rendered.
+
+    ``trusted`` are public keys (OpenSSH) of which one must have signed; None asks for no key.
+    Empty if its review is valid, else the rest of a sentence that begins with the package.
+    """
+    if review is None:
+        return "is not signed: its report has not been reviewed"
+    if any(review.fit_hashes.get(what) != digest for what, digest in fits.items()):
+        return (
+            f"has a review of other fits ({review.words}): run 'scissorcal report', review and "
+            "sign it, then 'scissorcal package build'"
+        )
+    if review.key is not None:
+        why = unproved(review.key, review.signed_text, "review")
+        if why:
+            return f"has a review ({review.words}) with a signature {why}"
+    if trusted is not None and (review.key is None or review.key.public_key not in trusted):
+        return (
+            f"has a review that none of the trusted keys signed ({review.words}; "
+            f"{review.identity_words})"
+        )
+    if review.decision == "reject":
+        return f"should not be rendered: its report was {review.words}"
+    return ""
+
+
+def unproved(key: KeySignature, text: str, what: str) -> str:
+    """Why a key's signature does not show who signed a text; empty where it does.
+
+    ``what`` names what has the text, such as "review". The rest of a sentence on the signature.
+    """
+    from scissorcal.package.keys import can_check, holds
+
+    if not can_check():
+        return (
+            f"by the key {key.fingerprint} that is not checked, because cryptography is not "
+            "installed: pip install 'scissorcal[keys]'"
+        )
+    if not holds(key, text):
+        return (
+            f"by the key {key.fingerprint} that is not of this {what}: it is forged, or the {what} "
+            "was changed since. Fetch an unchanged copy"
+        )
+    return ""

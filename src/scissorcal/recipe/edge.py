@@ -15,7 +15,6 @@ from scissorcal.recipe.priors import Section
 
 if TYPE_CHECKING:
     from scissorcal.model.edge import Edge as Curve
-    from scissorcal.recipe.schema import Recipe
 
 Offset_mm = Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)]
 Point_mm = Annotated[tuple[Offset_mm, Offset_mm], Strict(False)]
@@ -152,10 +151,9 @@ def _through(points_mm: tuple[tuple[float, float], ...]) -> StatedCurve:
     return StatedCurve(*edge_through(1e-3 * np.array(points_mm, dtype=np.float64)))
 
 
-def edge_sentence(recipe: Recipe) -> str:
-    """What a recipe's points make of the blade's edge; "" where it states a line or an arc."""
-    edge = recipe.rig.edge
-    if edge.points_mm is None or recipe.rig.joint == "linear":
+def edge_sentence(edge: Edge, joint: str) -> str:
+    """What a stated edge's points make of the blade; "" where it is a line or an arc."""
+    if edge.points_mm is None or joint == "linear":
         return ""
     curve = stated_curve(edge)
     those = "one cubic" if curve.pieces == 1 else f"a smooth curve of {curve.pieces} cubics"

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field, Strict, model_validator
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.fields import Thickness_mm
+from scissorcal.recipe.fields import Finite, Range, Thickness_mm
+from scissorcal.recipe.plate_surface import PlateSurface, Touch
+from scissorcal.recipe.plate_tracking import PlateTracking
 from scissorcal.recipe.priors import Section
 
 if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import Layer, LayerPiece, Outline
     from scissorcal.recipe.drawing import Drawing
-    from scissorcal.recipe.schema import Recipe
 
 MOST_PIECES = 16
 MOST_STRIPS = 64
@@ -129,25 +130,50 @@ class PlateLayer(DrawnPart):
 Layers = Annotated[tuple[PlateLayer, ...], Strict(False), Field(max_length=MOST_PIECES)]
 
 
-def refuse_impossible_layers(recipe: Recipe) -> None:
+class Plate(Section):
+    """What the plate is: its layers as drawn, else a uniform sheet of the material; its target.
+
+    ``layers``, in order from below, are cut along the line y = ``cut_line_mm`` of the drawing; x
+    runs along the cut from the near edge. What follows matters where the pose is estimated.
+    ``place_mm`` is the pattern's upper left corner as printed, in the plate's frame (x along the
+    cut from the near edge, y to the left of the cut, z out of the upper face); ``turn_deg`` turns
+    its upper edge from x towards y. The pattern faces up.
+    """
+
+    place_mm: Range = (0.0, 0.0)
+    turn_deg: Finite = 0.0
+    surface: PlateSurface = PlateSurface()
+    touch: Touch = Touch()
+    tracking: PlateTracking = PlateTracking()
+    cut_line_mm: Place_mm = 0.0
+    layers: Layers = ()
+
+    @property
+    def drawings(self) -> tuple[str, ...]:
+        """Names of the files beside the recipe in which the plate is drawn, sorted."""
+        parts = (part for layer in self.layers for part in layer.parts)
+        return tuple(sorted({part.outline for part in parts if part.outline is not None}))
+
+
+def refuse_impossible_layers(plate: Plate, plate_pose: str, joint: str) -> None:
     """ValueError for layers that the scene cannot have, or that miss the line of the cut.
 
     Layers that stand in a drawing are judged where it is read (:func:`plate_pieces`).
     """
-    layers = recipe.plate.layers
+    layers = plate.layers
     if not layers:
-        if recipe.plate.cut_line_mm != 0.0:
+        if plate.cut_line_mm != 0.0:
             raise ValueError("plate.cut_line_mm needs [[plate.layers]], the plate that is drawn")
         return
     names = [layer.name for layer in layers]
     if len(set(names)) != len(names):
         raise ValueError("plate.layers: two layers have one name; give each its own")
-    if recipe.scene.plate_pose == "estimated":
+    if plate_pose == "estimated":
         raise ValueError(
             'scene.plate_pose = "estimated" does not go together with plate.layers: a plate that '
             'is tracked is a uniform sheet; set scene.plate_pose = "known"'
         )
-    if recipe.rig.joint == "linear":
+    if joint == "linear":
         raise ValueError(
             'plate.layers need blades, and rig.joint = "linear" has none: remove the layers'
         )
@@ -158,58 +184,54 @@ def refuse_impossible_layers(recipe: Recipe) -> None:
             f"plate.layers have {len(written)} corners, and a recipe holds {MOST_CORNERS}: draw "
             'them in an SVG file, and name it with outline = "plate.svg"'
         )
-    if not drawings(recipe):
-        _pieces(recipe, {})
+    if not plate.drawings:
+        _pieces(plate, {})
 
 
-def drawings(recipe: Recipe) -> tuple[str, ...]:
-    """Names of the files beside a recipe in which its plate is drawn, sorted."""
-    parts = (part for layer in recipe.plate.layers for part in layer.parts)
-    return tuple(sorted({part.outline for part in parts if part.outline is not None}))
-
-
-def drawn_layers(recipe: Recipe, folder: Path) -> tuple[Layer, ...]:
-    """The layers of a recipe's plate with all their outlines; none for the uniform sheet.
+def drawn_layers(plate: Plate, folder: Path) -> tuple[Layer, ...]:
+    """The layers of a plate with all their outlines; none for the uniform sheet.
 
     ``folder`` is the recipe's, for its drawings. Raises InputError, with the file, where a drawing
     cannot be read, or lacks a shape.
     """
     from scissorcal.recipe.drawing import read_drawing
 
-    shapes = {name: read_drawing(folder / name) for name in drawings(recipe)}
+    shapes = {name: read_drawing(folder / name) for name in plate.drawings}
     try:
-        return tuple(_layer(layer, shapes) for layer in recipe.plate.layers)
+        return tuple(_layer(layer, shapes) for layer in plate.layers)
     except ValueError as error:
         files = ", ".join(str(folder / name) for name in shapes)
-        raise InputError(f"{files}: the plate of {recipe.name} cannot be drawn: {error}.") from None
+        raise InputError(f"{files}: the plate cannot be drawn: {error}.") from None
 
 
-def plate_pieces(recipe: Recipe, folder: Path) -> tuple[LayerPiece, ...]:
-    """The pieces of a recipe's plate on the line of the cut; none for the uniform sheet.
+def plate_pieces(plate: Plate, folder: Path) -> tuple[LayerPiece, ...]:
+    """The pieces of a plate on the line of the cut; none for the uniform sheet.
 
     ``folder`` is the recipe's, for its drawings. Raises InputError, with the file, where a drawing
     cannot be read, or the layers make no plate that can be cut.
     """
     from scissorcal.recipe.drawing import read_drawing
 
-    if not recipe.plate.layers:
+    if not plate.layers:
         return ()
-    shapes = {name: read_drawing(folder / name) for name in drawings(recipe)}
+    shapes = {name: read_drawing(folder / name) for name in plate.drawings}
     try:
-        return _pieces(recipe, shapes)
+        return _pieces(plate, shapes)
     except ValueError as error:
         files = ", ".join(str(folder / name) for name in shapes)
-        raise InputError(f"{files}: the plate of {recipe.name} cannot be cut: {error}.") from None
+        raise InputError(f"{files}: the plate cannot be cut: {error}.") from None
 
 
-def plate_sentence(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> str:
+def plate_sentence(
+    plate: Plate, material: str, thickness_mm: float, pieces: tuple[LayerPiece, ...]
+) -> str:
     """What the plate on the line of the cut is, and what of it is measured, in words.
 
-    Empty for the uniform sheet.
+    ``material`` and ``thickness_mm`` are the captured sheet's. Empty for the uniform sheet.
     """
     if not pieces:
         return ""
-    layers, strips = recipe.plate.layers, [s for piece in pieces for s in piece.strips]
+    layers, strips = plate.layers, [s for piece in pieces for s in piece.strips]
     ratios = sorted({strip.toughness_ratio for strip in strips})
     thick = sorted({piece.thickness_m * 1e3 for piece in pieces})
     gaps = len(pieces) - len(layers)
@@ -218,10 +240,10 @@ def plate_sentence(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> str:
         f"{_counted(len(pieces), 'piece')} with {_counted(gaps, 'gap')} within layers, from "
         f"{min(piece.begin_m for piece in pieces) * 1e3:.4g} to "
         f"{max(piece.end_m for piece in pieces) * 1e3:.4g} mm. Captured and fitted is a uniform "
-        f"sheet of {recipe.material.name}, {recipe.material.thickness_mm:g} mm thick; the whole "
+        f"sheet of {material}, {thickness_mm:g} mm thick; the whole "
         "plate is taken to be of that one material."
     )
-    if thick != [recipe.material.thickness_mm]:
+    if thick != [thickness_mm]:
         said += (
             f" Layers of {', '.join(f'{one:g}' for one in thick)} mm rest on an assumption: "
             "response and fracture energy proportional to the thickness."
@@ -234,11 +256,11 @@ def plate_sentence(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> str:
     return said
 
 
-def _pieces(recipe: Recipe, shapes: dict[str, Drawing]) -> tuple[LayerPiece, ...]:
+def _pieces(plate: Plate, shapes: dict[str, Drawing]) -> tuple[LayerPiece, ...]:
     from scissorcal.model.plate_pieces import SMALLEST_M, layer_pieces
 
-    layers = [_layer(layer, shapes) for layer in recipe.plate.layers]
-    found = layer_pieces(layers, recipe.plate.cut_line_mm * 1e-3)
+    layers = [_layer(layer, shapes) for layer in plate.layers]
+    found = layer_pieces(layers, plate.cut_line_mm * 1e-3)
     first = min(found, key=lambda piece: piece.begin_m)
     if first.begin_m < -SMALLEST_M:
         raise ValueError(

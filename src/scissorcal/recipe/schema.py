@@ -17,7 +17,6 @@ from scissorcal.recipe.fields import (
     BETWEEN_percent,
     Between_percent,
     Count,
-    Finite,
     Length_mm,
     NonNegative,
     Positive,
@@ -35,9 +34,7 @@ from scissorcal.recipe.friction import FitFriction as FitFriction
 from scissorcal.recipe.friction import FrictionRung as FrictionRung
 from scissorcal.recipe.friction import FrictionTerm as FrictionTerm
 from scissorcal.recipe.photograph_priors import BladePriors, CameraPriors, PlatePriors
-from scissorcal.recipe.plate_layers import Layers, Place_mm, refuse_impossible_layers
-from scissorcal.recipe.plate_surface import PlateSurface, Touch
-from scissorcal.recipe.plate_tracking import PlateTracking
+from scissorcal.recipe.plate_layers import Plate, refuse_impossible_layers
 from scissorcal.recipe.priors import CutPriors, LogNormalPrior, Section
 
 Rendered = Literal["torque", "handle_force", "translation_force"]
@@ -189,25 +186,6 @@ class Scene(Section):
         return low * 1e-3, high * 1e-3
 
 
-class Plate(Section):
-    """What the plate is: its layers as drawn, else a uniform sheet of the material; its target.
-
-    ``layers``, in order from below, are cut along the line y = ``cut_line_mm`` of the drawing; x
-    runs along the cut from the near edge. What follows matters where the pose is estimated.
-    ``place_mm`` is the pattern's upper left corner as printed, in the plate's frame (x along the
-    cut from the near edge, y to the left of the cut, z out of the upper face); ``turn_deg`` turns
-    its upper edge from x towards y. The pattern faces up.
-    """
-
-    place_mm: Range = (0.0, 0.0)
-    turn_deg: Finite = 0.0
-    surface: PlateSurface = PlateSurface()
-    touch: Touch = Touch()
-    tracking: PlateTracking = PlateTracking()
-    cut_line_mm: Place_mm = 0.0
-    layers: Layers = ()
-
-
 class Limits(Section):
     """What the loop never exceeds, whatever the model says.
 
@@ -353,7 +331,7 @@ class Recipe(Section):
 
     @model_validator(mode="after")
     def _layers_can_be_cut(self) -> Recipe:
-        refuse_impossible_layers(self)
+        refuse_impossible_layers(self.plate, self.scene.plate_pose, self.rig.joint)
         return self
 
     @property

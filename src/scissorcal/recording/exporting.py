@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from scissorcal.errors import InputError, file_error
 from scissorcal.files import replacing
 from scissorcal.recipe.euler_angles import euler_deg, singular_within_deg
-from scissorcal.recording import layout
 from scissorcal.recording.channels import CHANNELS
 from scissorcal.recording.header import METADATA_NAME
 from scissorcal.recording.parquetfile import require_pyarrow
-from scissorcal.recording.recording import Recording
+from scissorcal.recording.recording import Recording, columns
 from scissorcal.recording.scan import scan_file
 from scissorcal.recording.schema import describe
 from scissorcal.recording.telemetry import TelemetryChannel
@@ -45,7 +44,7 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
         METADATA_NAME: metadata.model_dump_json(),
         "scissorcal.notes": json.dumps(recording.notes, ensure_ascii=False),
     }
-    return _write(layout.columns(recording), about, Path(path), overwrite)
+    return _write(columns(recording), about, Path(path), overwrite)
 
 
 def export_channel(

@@ -6,7 +6,7 @@ no padding). The schema is a plain message definition, so viewers of CDR plot a 
 a plug-in and without ROS.
 """
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scissorcal.recording.header import Joint
 
 if TYPE_CHECKING:
-    from scissorcal.recording.recording import Recording
+    pass
 
 PROFILE = "scissorcal"
 TOPIC = "/scissorcal/sample"
@@ -119,22 +119,6 @@ def column_name(field: str, joint: Joint) -> str:
     if not unit or field.endswith(f"_{unit}"):
         return field
     return f"{field}_{unit}"
-
-
-def columns(recording: "Recording") -> dict[str, NDArray[Any]]:
-    """Return the samples by column, each (N,): the fields by :func:`column_name`, and ``time_s``.
-
-    >>> from scissorcal.recording import Recording
-    >>> list(columns(Recording("cut", empty_samples(2))))[3:6]
-    ['device_time_us', 'time_s', 'opening_rad']
-    """
-    found: dict[str, NDArray[Any]] = {}
-    for field in fields():
-        name = column_name(field, recording.joint)
-        found[name] = np.ascontiguousarray(recording.samples[field])
-        if field == "device_time_us":
-            found["time_s"] = recording.device_time_s
-    return found
 
 
 def message_definition(joint: Joint) -> str:

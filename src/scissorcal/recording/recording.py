@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import needs_extra
 from scissorcal.recording.header import Joint, Kind, Stroke, StrokeKind
-from scissorcal.recording.layout import SAMPLE_DTYPE
+from scissorcal.recording.layout import SAMPLE_DTYPE, column_name, fields
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,8 +70,6 @@ class Recording:
         joint), ``motor_torque_Nm`` and so on; ``time_s`` is the device clock from the first sample.
         Raises InputError where pandas is not installed.
         """
-        from scissorcal.recording.layout import columns
-
         try:
             import pandas as pd
         except ImportError:
@@ -102,3 +100,19 @@ class Recording:
         if np.isnan(self.handle_radius_m):
             return motor
         return motor - self.handle_radius_m * hand
+
+
+def columns(recording: Recording) -> dict[str, NDArray[Any]]:
+    """Return the samples by column, each (N,): the fields by :func:`column_name`, and ``time_s``.
+
+    >>> from scissorcal.recording import Recording
+    >>> list(columns(Recording("cut", empty_samples(2))))[3:6]
+    ['device_time_us', 'time_s', 'opening_rad']
+    """
+    by_name: dict[str, NDArray[Any]] = {}
+    for channel in fields():
+        name = column_name(channel, recording.joint)
+        by_name[name] = np.ascontiguousarray(recording.samples[channel])
+        if channel == "device_time_us":
+            by_name["time_s"] = recording.device_time_s
+    return by_name

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from scissorcal.errors import InputError, OtherKindError
 from scissorcal.foreign.kinds import fit_name
 from scissorcal.identity import digest
-from scissorcal.recipe.plate_layers import drawings
 from scissorcal.recipe.requirements import CaptureKind, Requirements, requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.facts import UNFINISHED, rendering
@@ -130,7 +129,7 @@ class Engine:
 
     def _drawings(self) -> dict[str, str]:
         """Digests of the files in which the recipe's plate is drawn; "" of one that is missing."""
-        paths = {name: self.workspace.root / name for name in drawings(self.recipe)}
+        paths = {name: self.workspace.root / name for name in self.recipe.plate.drawings}
         return {
             name: self.index.digest(path) if path.is_file() else "" for name, path in paths.items()
         }

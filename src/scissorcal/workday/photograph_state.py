@@ -1,38 +1,34 @@
 """What state a step of photographs is in."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError
 from scissorcal.identity import digest
 from scissorcal.workday.facts import photographs, refuse_changed
-from scissorcal.workday.states import StepState, counted
+from scissorcal.workday.states import DayStates, StepState, counted
 from scissorcal.workday.steps import Step
 from scissorcal.workday.workspace import Workspace
 
-if TYPE_CHECKING:
-    from scissorcal.workday.engine import Engine
 
-
-def photographs_state(engine: "Engine", step: Step, why: str) -> StepState:
+def photographs_state(day: DayStates, step: Step, why: str) -> StepState:
     """The state of a step whose inputs are photographs."""
-    paths = photograph_indexes(engine.workspace, step)
+    paths = photograph_indexes(day.workspace, step)
     try:
-        read = [engine.index.facts(path, "photographs", photographs) for path in paths]
+        read = [day.index.facts(path, "photographs", photographs) for path in paths]
         for path, facts in zip(paths, read, strict=True):
-            refuse_changed(path.parent, facts["sha256"], engine.index.digest)
+            refuse_changed(path.parent, facts["sha256"], day.index.digest)
     except InputError as error:
         return StepState(step.name, "failed", str(error), why, step.command)
     first = [path for path in paths if path.parent.name.startswith(f"{step.photographs[0]}-")]
     if not first:
-        return _without_photographs(engine, step, why)
+        return _without_photographs(day, step, why)
     count = sum(int(facts["photographs"]) for facts in read)
     return StepState(
         step.name,
         "done",
         counted(count, "photograph"),
         why,
-        files=tuple(engine.workspace.relative(path.parent) for path in paths),
+        files=tuple(day.workspace.relative(path.parent) for path in paths),
         content=digest([facts["content"] for facts in read]),
     )
 
@@ -46,16 +42,16 @@ def photograph_indexes(workspace: Workspace, step: Step) -> list[Path]:
     return paths
 
 
-def _without_photographs(engine: "Engine", step: Step, why: str) -> StepState:
+def _without_photographs(day: DayStates, step: Step, why: str) -> StepState:
     """A camera may come from a file, which then takes the place of photographs."""
     fit = f"fit {step.what}"
-    path = engine.file(fit)
+    path = day.file(fit)
     if step.what == "camera" and path.is_file():
         try:
-            imported = engine.facts(fit)["imported"]
+            imported = day.facts(fit)["imported"]
         except InputError:
             imported = False
         if imported:
-            files = (engine.workspace.relative(path),)
+            files = (day.workspace.relative(path),)
             return StepState(step.name, "done", "imported from a file", why, files=files)
     return StepState(step.name, "missing", "no photographs yet", why, step.command)

@@ -74,9 +74,15 @@ def make_plan(workspace: Workspace) -> Plan:
         _costs(engine),
         _choice(engine),
         _design(engine),
-        edge_sentence(engine.recipe),
-        plate_sentence(engine.recipe, plate_pieces(engine.recipe, workspace.root)),
+        edge_sentence(engine.recipe.rig.edge, engine.recipe.rig.joint),
+        _plate_sentence(engine),
     )
+
+
+def _plate_sentence(engine: Engine) -> str:
+    plate, material = engine.recipe.plate, engine.recipe.material
+    pieces = plate_pieces(plate, engine.workspace.root)
+    return plate_sentence(plate, material.name, material.thickness_mm, pieces)
 
 
 def _costs(engine: Engine) -> tuple[CaptureCost, ...]:

@@ -6,38 +6,37 @@ from typing import TYPE_CHECKING, Any
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import PAGE
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN
-from scissorcal.recipe.plate_layers import drawings
 from scissorcal.report.signature_block import unsigned_digest, with_signature
+from scissorcal.workday.states import DayStates
 from scissorcal.workday.steps import STEPS
 
 if TYPE_CHECKING:
     from scissorcal.package.review import Review
-    from scissorcal.workday.engine import Engine
 
 COVERED = ("recordings", "photographs", "fit", "verify")
 """Kinds of steps whose files a report rests on, beside the recipe and its drawings."""
 
 
-def reviewed_content(engine: "Engine") -> dict[str, str]:
+def reviewed_content(day: DayStates) -> dict[str, str]:
     """SHA-256 of every file that a signature made now would cover, by its name in the workspace."""
-    workspace, index = engine.workspace, engine.index
+    workspace, index = day.workspace, day.index
     page, twin = workspace.report_html, workspace.report_json
-    found = {REPORT_PAGE: _page_digest(engine, page)} if page.is_file() else {}
+    found = {REPORT_PAGE: _page_digest(day, page)} if page.is_file() else {}
     if twin.is_file():
         found[REPORT_TWIN] = index.digest(twin)
-    drawn = (workspace.root / name for name in drawings(engine.recipe))
-    for path in (workspace.recipe_path, *filter(Path.is_file, drawn), *_rests_on(engine)):
+    drawn = (workspace.root / name for name in day.recipe.plate.drawings)
+    for path in (workspace.recipe_path, *filter(Path.is_file, drawn), *_rests_on(day)):
         found[workspace.relative(path)] = index.digest(path)
     return found
 
 
-def changed_since(engine: "Engine", review: "Review") -> tuple[str, ...]:
+def changed_since(day: DayStates, review: "Review") -> tuple[str, ...]:
     """Files that are not as they were signed, each with what happened to it."""
-    now, page = reviewed_content(engine), engine.workspace.report_html
+    now, page = reviewed_content(day), day.workspace.report_html
     found = []
     for name, signed in review.content.items():
         if name not in now:
-            there = (engine.workspace.root / name).is_file()
+            there = (day.workspace.root / name).is_file()
             found.append(f"{name} {'is no longer used' if there else 'is gone'}")
         elif now[name] != signed:
             found.append(f"{name} was changed")
@@ -47,34 +46,34 @@ def changed_since(engine: "Engine", review: "Review") -> tuple[str, ...]:
     return tuple(found)
 
 
-def _rests_on(engine: "Engine") -> "list[Path]":
-    root, files = engine.workspace.root, []
+def _rests_on(day: DayStates) -> "list[Path]":
+    root, files = day.workspace.root, []
     for step in STEPS:
-        if step.kind not in COVERED or not engine.shown(step.name):
+        if step.kind not in COVERED or not day.shown(step.name):
             continue
-        for name in engine.state(step.name).files:
+        for name in day.state(step.name).files:
             path = root / name
-            files += _photographs(engine, step.name) if path.is_dir() else [path]
+            files += _photographs(day, step.name) if path.is_dir() else [path]
     return [path for path in dict.fromkeys(files) if path.is_file()]
 
 
-def _photographs(engine: "Engine", name: str) -> "list[Path]":
+def _photographs(day: DayStates, name: str) -> "list[Path]":
     """The index files and photographs of a step's folders."""
     from scissorcal.workday.facts import photographs
 
     found = []
-    for folder in engine.state(name).files:
-        index = engine.workspace.root / folder / "capture.json"
-        facts: dict[str, Any] = engine.index.facts(index, "photographs", photographs)
+    for folder in day.state(name).files:
+        index = day.workspace.root / folder / "capture.json"
+        facts: dict[str, Any] = day.index.facts(index, "photographs", photographs)
         found += [index, *(index.parent / file for file in facts["sha256"])]
     return found
 
 
-def _page_digest(engine: "Engine", page: Path) -> str:
+def _page_digest(day: DayStates, page: Path) -> str:
     def read(path: Path) -> dict[str, Any]:
         return {"sha256": unsigned_digest(_page_text(path))}
 
-    return str(engine.index.facts(page, "sha256 without signature", read)["sha256"])
+    return str(day.index.facts(page, "sha256 without signature", read)["sha256"])
 
 
 def _shows(page: Path, review: "Review") -> bool:

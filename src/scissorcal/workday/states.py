@@ -1,7 +1,16 @@
 """The states that a step of the day may be in."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from scissorcal.recipe.schema import Recipe
+    from scissorcal.workday.index import FileIndex
+    from scissorcal.workday.workspace import Workspace
 
 State = Literal[
     "missing", "damaged", "stale", "incomplete", "failed", "unverified", "done", "excluded"
@@ -45,6 +54,22 @@ class StepState:
     content: str = ""
     failed: tuple[str, ...] = ()
     optional: bool = False
+
+
+class DayStates(Protocol):
+    """The states of all steps of a day, as one step's state is worked out from those of others."""
+
+    workspace: Workspace
+    recipe: Recipe
+    index: FileIndex
+
+    def state(self, name: str) -> StepState: ...
+
+    def shown(self, name: str) -> bool: ...
+
+    def file(self, name: str) -> Path: ...
+
+    def facts(self, name: str) -> dict[str, Any]: ...
 
 
 def counted(number: int, thing: str) -> str:

@@ -179,7 +179,7 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
     source = recipe_file(recipe_name)
     text = read_text(source)
     recipe = parse_recipe(text, str(source))
-    plate_pieces(recipe, source.parent)
+    plate_pieces(recipe.plate, source.parent)
     copies = _drawings_to_copy(recipe, source.parent, workspace.root)
     try:
         made = [one for one in (workspace.root, *workspace.root.parents) if not one.exists()]
@@ -206,10 +206,9 @@ def _drawings_to_copy(recipe: "Recipe", source: Path, target: Path) -> dict[Path
     """What is to be written for the drawings of a recipe; what lies there already is left."""
     from scissorcal.foreign import read_foreign
     from scissorcal.foreign.formats import DRAWING
-    from scissorcal.recipe.plate_layers import drawings
 
     copies = {}
-    for name in drawings(recipe):
+    for name in recipe.plate.drawings:
         data, path = read_foreign(source / name, DRAWING), target / name
         if not path.exists():
             copies[path] = data

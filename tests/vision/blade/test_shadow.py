@@ -47,7 +47,7 @@ def strip_in_shadow(height_m, size):
     sheet = Layer([0.2 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])], POSE, 0.8)
     metal = Layer([strip], POSE, 0.2)
     lamp = Lamp((1.5, 0.0), size, 0.5)
-    shadow = CastShadow.of([metal], lambda points: np.full(len(points), height_m), lamp)
+    shadow = CastShadow.of([strip], lambda points: np.full(len(points), height_m), POSE, lamp)
     picture = render([sheet, shadow, metal], LENS, SHARP, np.random.default_rng(0))
     return linear(picture).astype(np.float32)
 

@@ -10,6 +10,7 @@ from scissorcal.aliases import Array
 from scissorcal.errors import ModelError
 from scissorcal.model.bspline import FEWEST, spline_powers
 from scissorcal.model.checks import check_numbers
+from scissorcal.model.surface.height_search import nearest_on_height_field
 from scissorcal.model.surface.protocol import NearestPoints, SurfacePoint, as_points
 
 _BEYOND = 3
@@ -100,8 +101,6 @@ class HeightField:
 
         See :mod:`scissorcal.model.surface.height_search` for what is searched.
         """
-        from scissorcal.model.surface.height_search import nearest_on_height_field
-
         return nearest_on_height_field(self, as_points(points))
 
     def inside(self, points: ArrayLike) -> NDArray[np.bool_]:

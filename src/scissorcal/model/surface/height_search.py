@@ -7,16 +7,13 @@ second and the z of the first give lambda and q_z, and x, y minimise the distanc
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.model.surface.protocol import NearestPoints
-
-if TYPE_CHECKING:
-    from scissorcal.model.surface.height_field import HeightField
+from scissorcal.model.surface.protocol import NearestPoints, Surface
 
 _SAMPLES = 2
 """Places searched on each interval of the spline."""
@@ -40,7 +37,23 @@ _AS_NEAR = 1e-9
 """Distances that differ by less than this share, at places that are apart, count as equal."""
 
 
-def nearest_on_height_field(field: HeightField, points: Array) -> NearestPoints:
+class Heights(Surface, Protocol):
+    """What is asked of a height field: its rectangle and intervals beside level and derivatives."""
+
+    @property
+    def x_m(self) -> tuple[float, float]: ...
+
+    @property
+    def y_m(self) -> tuple[float, float]: ...
+
+    @property
+    def intervals(self) -> tuple[int, int]: ...
+
+    @property
+    def interval_m(self) -> tuple[float, float]: ...
+
+
+def nearest_on_height_field(field: Heights, points: Array) -> NearestPoints:
     """Nearest points of a height field, from the lowest of several local minima of the distance.
 
     Minima are sought on a net of two places per interval, and of doubled gaps beyond. One between
@@ -63,7 +76,7 @@ def nearest_on_height_field(field: HeightField, points: Array) -> NearestPoints:
     )
 
 
-def _net(field: HeightField, points: Array) -> Array:
+def _net(field: Heights, points: Array) -> Array:
     """Places on the surface (n, m, 3), and on its continuation as far as ``points`` are."""
     far = float(np.linalg.norm(points[np.isfinite(points).all(axis=-1)], axis=-1).max(initial=0.0))
     axes = []
@@ -76,7 +89,7 @@ def _net(field: HeightField, points: Array) -> Array:
     return _lifted(field, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
 
 
-def _search(field: HeightField, net: Array, p: Array) -> NearestPoints:
+def _search(field: Heights, net: Array, p: Array) -> NearestPoints:
     known = np.asarray(np.isfinite(p).all(axis=-1))
     target = np.where(known[:, None], p, 0.0)
     starts = _starts(field, net, target)
@@ -98,7 +111,7 @@ def _search(field: HeightField, net: Array, p: Array) -> NearestPoints:
     return NearestPoints(points, distance, unique, converged)
 
 
-def _starts(field: HeightField, net: Array, p: Array) -> Array:
+def _starts(field: Heights, net: Array, p: Array) -> Array:
     """Where to start (points, starts, 2): local minima of the net, and places beside p."""
     squares = ((net - p[:, None, None]) ** 2).sum(axis=-1)
     padded = np.pad(squares, ((0, 0), (1, 1), (1, 1)), constant_values=np.inf)
@@ -122,7 +135,7 @@ def _starts(field: HeightField, net: Array, p: Array) -> Array:
 
 
 def _descend(
-    field: HeightField, place: Array, p: Array
+    field: Heights, place: Array, p: Array
 ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Minimise the distance from each start; places, whether converged, whether a strict minimum.
 
@@ -148,7 +161,7 @@ def _descend(
     return place, good, _step(slope, bend, metric)[2] > _CLOSED
 
 
-def _distance(field: HeightField, u: Array, p: Array) -> tuple[Array, Array, Array, Array]:
+def _distance(field: Heights, u: Array, p: Array) -> tuple[Array, Array, Array, Array]:
     """D at places (n, 2), its gradient and Hessian by them, and the surface's metric I + f' f'."""
     at = np.concatenate((u, np.zeros((len(u), 1))), axis=-1)
     tilt = -field.gradient(at)[..., :2]
@@ -179,9 +192,7 @@ def _step(slope: Array, bend: Array, metric: Array) -> tuple[Array, Array, Array
     return step, np.linalg.norm(along, axis=-1), values[:, 0]
 
 
-def _halved(
-    field: HeightField, u: Array, p: Array, value: Array, slope: Array, step: Array
-) -> Array:
+def _halved(field: Heights, u: Array, p: Array, value: Array, slope: Array, step: Array) -> Array:
     """The step that lowers D by a part of what its slope says, halved up to 40 times."""
     falls = (slope * step).sum(axis=-1)
     rounding = 1e-15 * (_reach(field) + np.linalg.norm(p, axis=-1)) * np.sqrt(value) + 1e-14 * value
@@ -197,12 +208,12 @@ def _halved(
     return np.asarray(u + share[:, None] * step)
 
 
-def _reach(field: HeightField) -> float:
+def _reach(field: Heights) -> float:
     """Size of the numbers from which places are computed."""
     return max(map(abs, (*field.x_m, *field.y_m)))
 
 
-def _lifted(field: HeightField, place: Array) -> Array:
+def _lifted(field: Heights, place: Array) -> Array:
     """Points (..., 3) of the surface over places (..., 2)."""
     flat = np.concatenate((place, np.zeros((*place.shape[:-1], 1))), axis=-1)
     flat[..., 2] = -field.level(flat)

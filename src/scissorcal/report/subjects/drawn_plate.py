@@ -21,7 +21,7 @@ def drawn_plate_panel(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> Panel:
         ID,
         PART,
         TITLE,
-        plate_sentence(recipe, pieces),
+        plate_sentence(recipe.plate, recipe.material.name, recipe.material.thickness_mm, pieces),
         tuple(_row(index, piece) for index, piece in enumerate(pieces, 1)),
         (_chart(pieces),),
         notes=(

@@ -53,4 +53,5 @@ def stated_edge_panel(recipe: Recipe) -> Panel:
         ),
         CAPTIONS[recipe.rig.edge.source],
     )
-    return Panel(ID, PART, TITLE, edge_sentence(recipe), (row,), (chart,))
+    said = edge_sentence(recipe.rig.edge, recipe.rig.joint)
+    return Panel(ID, PART, TITLE, said, (row,), (chart,))

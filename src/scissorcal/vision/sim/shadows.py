@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,10 +9,6 @@ from scissorcal.aliases import Array
 from scissorcal.vision.sim.coverage import coverage
 from scissorcal.vision.sim.lens import Lens, Pose
 from scissorcal.vision.sim.looks import Picture
-
-if TYPE_CHECKING:
-    from scissorcal.vision.sim.photograph import Layer
-
 
 _SAMPLES = 24
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
@@ -45,11 +40,15 @@ class CastShadow:
 
     @classmethod
     def of(
-        cls, layers: "Sequence[Layer]", height_m: Callable[[Array], Array], lamp: Lamp
+        cls,
+        outlines_m: Sequence[Array],
+        height_m: Callable[[Array], Array],
+        pose: Pose,
+        lamp: Lamp,
     ) -> "CastShadow":
-        """The common shadow of layers of one plane; ``height_m`` of points (n, 2)."""
-        outlines = [_dense(np.asarray(o)) for layer in layers for o in layer.outlines_m]
-        return cls(outlines, [height_m(outline) for outline in outlines], layers[0].pose, lamp)
+        """The common shadow of outlines in one plane; ``height_m`` of points (n, 2)."""
+        dense = [_dense(np.asarray(outline)) for outline in outlines_m]
+        return cls(dense, [height_m(outline) for outline in dense], pose, lamp)
 
 
 def cast(radiance: Picture, shadow: CastShadow, lens: Lens) -> None:

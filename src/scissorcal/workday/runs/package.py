@@ -102,7 +102,7 @@ def build_workspace_package(
         np.random.default_rng(seed),
         review=review,
         plate=fits["plate"],
-        drawn=plate_pieces(engine.recipe, engine.workspace.root),
+        drawn=plate_pieces(engine.recipe.plate, engine.workspace.root),
         rig=recorded_rig(engine.workspace.captures_dir, fits),
         inputs_hash=engine.identity("package build"),
         allow_failed=allow_failed,
@@ -137,7 +137,7 @@ def recorded_rig(captures: Path, fits: Mapping[str, Any]) -> "RigRecord | None":
     """
     from scissorcal.device.rig_record import identity_of
     from scissorcal.package.manifest import RigRecord
-    from scissorcal.recording.header import read_header
+    from scissorcal.recording.header_reader import read_header
 
     sources = [name for what in ("friction", "cut") if fits[what] for name in fits[what].sources]
     for source in sources:

@@ -84,13 +84,13 @@ def workspace_plate(workspace: Workspace) -> "DrawnPlate | None":
     None, too, where a file is gone or wrong: the page then says what it cannot draw.
     """
     from scissorcal.prototype.drawn_plate import drawn_plate
-    from scissorcal.recipe.plate_layers import drawings, drawn_layers
+    from scissorcal.recipe.plate_layers import drawn_layers
 
     recipe = workspace.recipe()
-    if not drawings(recipe):
+    if not recipe.plate.drawings:
         return None
     try:
-        layers = drawn_layers(recipe, workspace.root)
+        layers = drawn_layers(recipe.plate, workspace.root)
     except InputError:
         return None
     return drawn_plate(recipe.plate.cut_line_mm, layers)

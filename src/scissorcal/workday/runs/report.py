@@ -72,7 +72,7 @@ def write_workspace_report(
             inputs_hash=engine.identity("report"),
             completeness=[cell for what in RIG if what in fits for cell in _cells(engine, what)],
             choice=_choice(engine),
-            pieces=plate_pieces(engine.recipe, workspace.root),
+            pieces=plate_pieces(engine.recipe.plate, workspace.root),
         )
         engine.refresh()
     verdicts = [v for found in geometry.fits.values() for v in found.verdicts]
