@@ -20,7 +20,9 @@ SURFACES: dict[str, Surface] = {
     "cylinder 30 mm": Cylinder(30e-3),
     "sphere 30 mm": Sphere(30e-3),
 }
-OUTSIDE = {"numpy", "scipy", "cv2", "math", "dataclasses", "collections"}
+ALIASES = "scissorcal.aliases"
+"""Names of types, without code."""
+OUTSIDE = {"numpy", "scipy", "cv2", "math", "dataclasses", "collections", ALIASES}
 
 
 def imported(path: Path) -> set[str]:
@@ -30,7 +32,9 @@ def imported(path: Path) -> set[str]:
         if isinstance(node, ast.Import):
             found |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            found.add("." if node.level else (node.module or "").split(".")[0])
+            module = node.module or ""
+            package = module if module == ALIASES else module.split(".")[0]
+            found.add("." if node.level else package)
     return found
 
 
