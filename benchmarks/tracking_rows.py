@@ -76,8 +76,8 @@ def _line(
     yardstick: Callable[[], None],
     between: Callable[[], None] | None = None,
 ) -> str:
-    found = [(_seconds(row, between), _seconds(yardstick, None)) for _ in range(TURNS)]
-    took, plain = (float(np.median(part)) for part in zip(*found, strict=True))
+    timed = [(_seconds(row, between), _seconds(yardstick, None)) for _ in range(TURNS)]
+    took, plain = (float(np.median(part)) for part in zip(*timed, strict=True))
     return f"| {name} | {1e6 * took:.0f} | {took / plain:.1f} |"
 
 

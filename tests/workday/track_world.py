@@ -109,17 +109,17 @@ def run_rig(
 
 def score(session: TrackSession, world: SimWorld, host_s: float) -> tuple[float, Array]:
     """NEES and error (6,) of the pose at the last row, against the world's truth."""
-    found = session.follower.tracker.estimate()
+    estimate = session.follower.tracker.estimate()
     clock = session.follower.rig
     if clock is not None:
-        at = clock.fit.host(found.time_s)
+        at = clock.fit.host(estimate.time_s)
     else:
         from scissorcal.workday.tracking.sim_world import CAMERA_DRIFT, CAMERA_OFFSET_S
 
         delay = 1e-3 * session.about.camera_delay_ms
-        at = (found.time_s + delay - CAMERA_OFFSET_S) / (1.0 + CAMERA_DRIFT)
-    error = pose_error(found.rotation, found.place_m, *world.truth(at))
-    return nees(error, found.covariance), error
+        at = (estimate.time_s + delay - CAMERA_OFFSET_S) / (1.0 + CAMERA_DRIFT)
+    error = pose_error(estimate.rotation, estimate.place_m, *world.truth(at))
+    return nees(error, estimate.covariance), error
 
 
 def recorder_at(path: Path) -> TrackRecorder:
