@@ -347,9 +347,9 @@ def meaning_of(scope: str, check: str) -> tuple[Limit, str]:
     """
     parts = scope.split(".")
     for count in range(len(parts), 0, -1):
-        found = MEANINGS.get(f"{'.'.join(parts[:count])} {check}")
-        if found is not None:
-            return found
+        meaning = MEANINGS.get(f"{'.'.join(parts[:count])} {check}")
+        if meaning is not None:
+            return meaning
     return "", ""
 
 
