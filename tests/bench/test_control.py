@@ -1,10 +1,12 @@
 """What contact adds to a camera: a reduced run, and the tables and checks of made-up runs."""
 
 from collections.abc import Iterable
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 from benchmarks.consistency import mean_band
+from benchmarks.control import __main__ as command
 from benchmarks.control.__main__ import CONTROL_CASES, POSE_CASES, control_case, gather, pose_case
 from benchmarks.control.control_run import POSES, ControlRun
 from benchmarks.control.plates import PLATES, plate_of
@@ -76,6 +78,27 @@ def test_figures_within_their_limits_keep_them():
 )
 def test_a_figure_beyond_its_limit_does_not(change: dict[str, float], name: str):
     assert name in [check.name for check in checks(*made_up(**change)) if not check.holds]
+
+
+@pytest.mark.parametrize(("force_N", "code"), [(0.05, 0), (0.3, 1)])
+def test_the_command_prints_tables_and_ends_by_its_checks(
+    force_N: float, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    runs = iter(made_up(force_N=force_N))
+    monkeypatch.setattr(command, "gather", lambda *_: next(runs))
+    monkeypatch.setattr(command, "Pool", nullcontext)
+    monkeypatch.setattr("sys.argv", ["control"])
+    with pytest.raises(SystemExit) as ended:
+        command.main()
+    assert ended.value.code == code
+    printed = capsys.readouterr().out
+    for name in (
+        *POSE_CASES,
+        *TRAPS,
+        *CONTROL_CASES,
+        *(check.name for check in checks(*made_up())),
+    ):
+        assert f"| {name} |" in printed
 
 
 def test_a_row_has_the_figures_of_vision_and_contact():
