@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from scissorcal.library import open_fit, open_package, open_recording, open_workspace
     from scissorcal.package import OutsideCoverageWarning
 
+    __version__: str
+
 __all__ = [
     "OutsideCoverageWarning",
     "__version__",
@@ -23,15 +25,15 @@ __all__ = [
     "open_workspace",
 ]
 
-__version__ = "0.1.0"
 
-_HOMES = {"OutsideCoverageWarning": "scissorcal.package"}
+_HOMES = {"OutsideCoverageWarning": "scissorcal.package", "__version__": "scissorcal.identity"}
 
 
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'scissorcal' has no attribute {name!r}")
-    return getattr(importlib.import_module(_HOMES.get(name, "scissorcal.library")), name)
+    module = importlib.import_module(_HOMES.get(name, "scissorcal.library"))
+    return getattr(module, "VERSION" if name == "__version__" else name)
 
 
 def __dir__() -> list[str]:

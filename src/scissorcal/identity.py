@@ -1,9 +1,11 @@
-"""Identity of content: the SHA-256 of facts, of bytes, of a file."""
+"""Identity: the version of this program; the SHA-256 of facts, of bytes, of a file."""
 
 import hashlib
 import json
 from pathlib import Path
 from typing import Any
+
+VERSION = "0.1.0"
 
 
 def digest(facts: Any) -> str:

@@ -76,7 +76,6 @@ def summarise(
 
     import numpy as np
 
-    import scissorcal
     from scissorcal.calibration.signals.survey import survey
     from scissorcal.calibration.summary import (
         common_places,
@@ -90,8 +89,10 @@ def summarise(
         summarise as sum_up,
     )
     from scissorcal.files import replacing
+    from scissorcal.identity import VERSION
     from scissorcal.recording import Joint, import_table, read_recording
-    from scissorcal.recording.table import column_of, refuse_no_table
+    from scissorcal.recording.table import column_of
+    from scissorcal.recording.table_file import refuse_no_table
     from scissorcal.report.summary import Shown, summary_page, summary_panels
     from scissorcal.report.text import panels_text
 
@@ -165,7 +166,7 @@ def summarise(
         place=recording.joint.position_unit,
         cut_length_m=cut_length_mm * 1e-3 if cut_length_mm else None,
         created=datetime.now(UTC),
-        version=scissorcal.__version__,
+        version=VERSION,
         notes=notes,
     )
     panels = summary_panels(shown)

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-import scissorcal
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
-from scissorcal.identity import bytes_digest
+from scissorcal.identity import VERSION, bytes_digest
 from scissorcal.package.archive import member_of, write_archive
 from scissorcal.package.compile import scene_ranges
 from scissorcal.package.drawn_plate import piece_records
@@ -281,7 +280,7 @@ def _provenance(
 ) -> Provenance:
     text = canonical(json.loads(recipe.model_dump_json()))
     return Provenance(
-        scissorcal_version=scissorcal.__version__,
+        scissorcal_version=VERSION,
         recipe=text.decode("utf-8"),
         recipe_sha256=bytes_digest(text),
         inputs_hash=inputs_hash,

@@ -5,7 +5,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal import __version__
+from scissorcal.identity import VERSION
 from scissorcal.recording import layout
 from scissorcal.recording.header import METADATA_NAME, NOTE_NAME
 from scissorcal.recording.mcapfile import McapFile
@@ -29,7 +29,7 @@ class SampleFile:
 
     def __init__(self, stream: IO[bytes], metadata: RecordingMetadata) -> None:
         self._entries = to_entries(metadata)
-        self._mcap = McapFile(stream, f"scissorcal {__version__}", CHUNK_BYTES)
+        self._mcap = McapFile(stream, f"scissorcal {VERSION}", CHUNK_BYTES)
         self._mcap.add_metadata(METADATA_NAME, self._entries)
         self._mcap.begin_channel(
             layout.SCHEMA_NAME,

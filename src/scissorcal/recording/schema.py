@@ -148,10 +148,10 @@ def versions() -> dict[str, str]:
     import mcap
     import numpy as np
 
-    from scissorcal import __version__
+    from scissorcal.identity import VERSION
 
     return {
-        "scissorcal": __version__,
+        "scissorcal": VERSION,
         "python": platform.python_version(),
         "numpy": np.__version__,
         "mcap": mcap.__version__,

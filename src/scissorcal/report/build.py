@@ -9,14 +9,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal import __version__
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError, file_error
 from scissorcal.files import replacing
 from scissorcal.foreign import read_foreign, read_foreign_text
 from scissorcal.foreign.formats import PAGE, REPORT, SIGNATURE
-from scissorcal.identity import bytes_digest
+from scissorcal.identity import VERSION, bytes_digest
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN, Review
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
@@ -107,7 +106,7 @@ def build_report(
         sheets,
         recipe_text=recipe_text,
         created=created,
-        version=__version__,
+        version=VERSION,
     )
     document = replace(document, inputs_hash=inputs_hash)
     files = ReportFiles(
@@ -125,12 +124,12 @@ def build_report(
 def document_of(recipe: Recipe, fits: Sequence[FitResult]) -> ReportDocument:
     """What a report of these fits would say, without recordings."""
     now = datetime.now(UTC)
-    return compose(recipe, fits, Evidence(), (), recipe_text="", created=now, version=__version__)
+    return compose(recipe, fits, Evidence(), (), recipe_text="", created=now, version=VERSION)
 
 
 def document_of_fit(fit: FitResult, recipe: Recipe | None) -> ReportDocument:
     """A fit alone, as one side of a comparison; ``recipe`` says what it is of, if known."""
-    return compose_fit(fit, recipe, created=datetime.now(UTC), version=__version__)
+    return compose_fit(fit, recipe, created=datetime.now(UTC), version=VERSION)
 
 
 def write_comparison(found: Comparison, output_dir: str | os.PathLike[str]) -> ReportFiles:

@@ -10,10 +10,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import scissorcal
 from scissorcal.aliases import Progress
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
+from scissorcal.identity import VERSION
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.pool import Pool, open_pool
 from scissorcal.workday.records import Record, RecordFile
@@ -358,7 +358,7 @@ class _Run:
         return Trade(
             format=FORMAT,
             created=datetime.now(UTC),
-            scissorcal_version=scissorcal.__version__,
+            scissorcal_version=VERSION,
             recipe_name=engine.recipe.name,
             material=engine.recipe.material.name,
             simulated=self._case.simulated,

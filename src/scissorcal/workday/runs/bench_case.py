@@ -7,9 +7,8 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import scissorcal
 from scissorcal.errors import InputError
-from scissorcal.identity import digest
+from scissorcal.identity import VERSION, digest
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.envelope import plain
 from scissorcal.workday.recordings import used_recordings
@@ -150,7 +149,7 @@ def inputs_hash(engine: Engine, case: "Case") -> str:
     return digest(
         {
             "algorithm": ALGORITHM,
-            "version": scissorcal.__version__,
+            "version": VERSION,
             "case": {**by_content, **{name: plain(getattr(case, name)) for name in others}},
             "machine": machine(),
         }

@@ -5,9 +5,9 @@ import time
 from datetime import UTC, datetime
 from pathlib import Path
 
-import scissorcal
 from scissorcal.bench.run import Run
 from scissorcal.files import replacing
+from scissorcal.identity import VERSION
 
 
 def run_facts(
@@ -16,7 +16,7 @@ def run_facts(
     """Facts of a run that began at ``began`` (s, of the monotonic clock) and ends now."""
     return Run(
         created=datetime.now(UTC),
-        version=scissorcal.__version__,
+        version=VERSION,
         machine=f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}",
         workers=workers,
         seed=seed,

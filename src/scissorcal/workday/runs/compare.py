@@ -5,10 +5,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import scissorcal
 from scissorcal.errors import MissingError
 from scissorcal.foreign import read_foreign, reading
 from scissorcal.foreign.formats import REPORT
+from scissorcal.identity import VERSION
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.workspace import RECIPE_FILE, Workspace, find_workspace
@@ -37,7 +37,7 @@ def compare_runs(
     from scissorcal.report import compare, write_comparison
 
     sides = [load_side(path) for path in (first, second)]
-    found = compare(*sides, created=now or datetime.now(UTC), version=scissorcal.__version__)
+    found = compare(*sides, created=now or datetime.now(UTC), version=VERSION)
     files = write_comparison(found, folder)
     return Compared(found, files.html, files.json)
 

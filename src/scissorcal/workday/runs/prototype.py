@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import scissorcal
 from scissorcal.errors import InputError, MissingError, needs_extra
+from scissorcal.identity import VERSION
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM
@@ -66,7 +66,7 @@ def workspace_scene(
     return scene_of(
         package,
         made_utc=(now or datetime.now(UTC)).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        version=scissorcal.__version__,
+        version=VERSION,
         fits=fits,
         hands=workspace_hands(workspace),
         warnings=[
