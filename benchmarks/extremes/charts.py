@@ -6,7 +6,7 @@ from benchmarks.extremes.quantities import QUANTITIES
 
 from scissorcal.bench.extremes.compare import Judgement, Outcome
 from scissorcal.bench.extremes.states import State
-from scissorcal.report.extremes import LEAST_ERROR, WRONG, error_of
+from scissorcal.report.extremes import LEAST_ERROR, WRONG_LOOK, error_of
 from scissorcal.report.panel import Axis, Chart, Look, Series
 
 LOOKS: dict[str, Look] = {"model": "blue", "kernel": "vermillion", "tables": "green"}
@@ -49,7 +49,7 @@ def sweep_chart(name: str, answers: list[tuple[State, Judgement]]) -> Chart:
                     "points",
                     tuple(place(value) for value in marked),
                     (height,) * len(marked),
-                    look=WRONG if is_wrong else look,
+                    look=WRONG_LOOK if is_wrong else look,
                     style="full" if is_wrong else "open",
                 )
             )

@@ -12,7 +12,7 @@ import numpy as np
 from scissorcal.report.html import panel_section, parts_nav, prose, whole_page
 from scissorcal.report.numbers import short
 from scissorcal.report.panel import Axis, Chart, Look, Panel, Row, Series, count, number, words
-from scissorcal.verdicts import judge
+from scissorcal.verdicts import Check
 
 if TYPE_CHECKING:
     from scissorcal.bench.extremes.compare import Judgement
@@ -21,10 +21,11 @@ if TYPE_CHECKING:
     Tried = Sequence[tuple[State, Sequence[Judgement]]]
     Answers = Sequence[tuple[State, Judgement]]
 
+WRONG = Check("bench wrong", "answers that are neither right nor refused", at_most=0.0)
 PART = "extremes"
 OUTCOMES = ("right", "refused", "flagged", "not compared", "wrong")
 LOOKS: Mapping[str, Look] = {"model": "blue", "kernel": "vermillion", "package": "green"}
-WRONG: Look = "purple"
+WRONG_LOOK: Look = "purple"
 """How states are drawn at which something is wrong."""
 LEAST_ERROR = 1e-17
 """Errors below are drawn here: no float64 number is closer."""
@@ -69,7 +70,7 @@ def totals_panel(answers: Answers, outcomes: Sequence[str] = ()) -> Panel:
     return Panel(
         "totals", PART, "Largest errors", sentence,
         tuple(_total(name, group) for name, group in groups.items()),
-        verdicts=(judge("bench", "wrong", of["wrong"], 0.0, sentence, remedy),),
+        verdicts=(WRONG.judge(of["wrong"], sentence, remedy),),
         caption="Largest errors over the states that were right, by output. Near the first contact "
         "a torque is a difference of nearly equal lengths, so its relative error grows without "
         "limit while it is right for a plate that stands a few roundings elsewhere. Roundings: the "
@@ -110,7 +111,7 @@ def map_chart(answers: Answers) -> Chart:
     """Decimal logarithm of the torque's relative error over a pair; dots where it has none."""
     pair, subject = answers[0][0].swept, answers[0][1].subject
     axes = [sorted({state.values[name] for state, _ in answers}) for name in pair]
-    kinds: tuple[tuple[str, Look], ...] = (("refused", "muted"), ("wrong", WRONG))
+    kinds: tuple[tuple[str, Look], ...] = (("refused", "muted"), ("wrong", WRONG_LOOK))
     chosen = {name: [a for a in answers if a[1].outcome == name] for name, _ in kinds}
     chosen["log10 of the relative error"] = [a for a in answers if error_of(a[1]) is not None]
     series = []

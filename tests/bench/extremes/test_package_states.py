@@ -20,7 +20,7 @@ from scissorcal.bench.extremes.states import QUANTITIES, State, blade_of_law, pa
 from scissorcal.kernel import Kernel
 from scissorcal.model import Edge, Response
 from scissorcal.package import open_package
-from scissorcal.report.extremes import WRONG, extremes_panels, map_chart, refusals_panel
+from scissorcal.report.extremes import WRONG_LOOK, extremes_panels, map_chart, refusals_panel
 from tests.package.conftest import pad as pad
 from tests.package.conftest import paper as paper
 
@@ -182,6 +182,6 @@ def test_a_map_marks_refused_and_wrong_states_apart(packages):
     ]
     drawn = {series.name: series for series in map_chart(answers).series}
     assert (drawn["refused"].y, drawn["wrong"].y) == ((0.0,), (1.0,))
-    assert drawn["wrong"].look == WRONG != drawn["refused"].look
+    assert drawn["wrong"].look == WRONG_LOOK != drawn["refused"].look
     assert drawn["log10 of the relative error"].value == pytest.approx((-6.0,))
     assert refusals_panel(answers).rows[0].marked

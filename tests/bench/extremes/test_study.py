@@ -24,7 +24,7 @@ from scissorcal.bench.extremes.compare import Judgement, compare_kernel, compare
 from scissorcal.bench.extremes.states import State
 from scissorcal.errors import InputError
 from scissorcal.package.exact import ExactModel
-from scissorcal.report.extremes import WRONG
+from scissorcal.report.extremes import WRONG_LOOK
 
 SMALL = Extent(values=3, repeats=1, grid=3, random=5, everyday=5, slow=False)
 
@@ -173,5 +173,5 @@ def test_wrong_states_have_marks_of_their_own():
     drawn = {series.name: series for series in sweep_chart("force", answers).series}
     assert drawn["some refused or marked"].x == (1.0,)
     assert drawn["model, some wrong"].x == (2.0,)
-    assert drawn["model, some wrong"].look == WRONG
-    assert WRONG not in LOOKS.values()
+    assert drawn["model, some wrong"].look == WRONG_LOOK
+    assert WRONG_LOOK not in LOOKS.values()

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.aliases import Progress
+from scissorcal.files import replacing
 from scissorcal.identity import VERSION
-from scissorcal.workday.runs.bench_files import write_page_and_twin
 
 if TYPE_CHECKING:
     from scissorcal.package import ModelPackage
@@ -54,4 +54,9 @@ def run_extremes(
     )
     plain = TypeAdapter(list[Panel]).dump_python(panels, mode="json", exclude_defaults=True)
     twin = json.dumps(facts | {"panels": plain}, ensure_ascii=False, allow_nan=False) + "\n"
-    return panels, write_page_and_twin(folder, "extremes", extremes_page(panels, said), twin)
+    folder.mkdir(parents=True, exist_ok=True)
+    html, twin_path = folder / "extremes.html", folder / "extremes.json"
+    for path, text in ((twin_path, twin), (html, extremes_page(panels, said))):
+        with replacing(path) as part:
+            part.write_text(text, encoding="utf-8")
+    return panels, (html, twin_path)
