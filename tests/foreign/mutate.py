@@ -2,6 +2,7 @@
 
 python -m tests.foreign.mutate --count 2000
 python -m tests.foreign.mutate --count 300 "recording MCAP" PNG
+python -m tests.foreign.mutate --count 300 --commands
 """
 
 import argparse
@@ -15,6 +16,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any, Self
 
+from tests.foreign.commands import COMMANDS
 from tests.foreign.samples import SAMPLES
 
 HANG_S = 180.0
@@ -45,7 +47,7 @@ class Tally:
         return (
             self.name,
             str(self.count),
-            *(str(self.codes[code]) for code in (0, 2, 5)),
+            *(str(self.codes[code]) for code in (0, 2, 3, 5)),
             str(len(self.faults)),
             f"{self.worst_s:.2f}",
             f"{self.worst_megabytes:.0f}",
@@ -53,13 +55,25 @@ class Tally:
         )
 
 
-HEAD = ("format", "mutants", "exit 0", "2", "5", "faults", "worst s", "worst MB", "crashes, hangs")
+HEAD = (
+    "format",
+    "mutants",
+    "exit 0",
+    "2",
+    "3",
+    "5",
+    "faults",
+    "worst s",
+    "worst MB",
+    "crashes, hangs",
+)
 
 
 class Reader:
     """A process that reads mutants; one that died or hung is replaced by the next."""
 
-    def __init__(self) -> None:
+    def __init__(self, by_commands: bool = False) -> None:
+        self._words = ("commands",) if by_commands else ()
         self._folder = tempfile.TemporaryDirectory()
         self._process: subprocess.Popen[str] | None = None
 
@@ -92,6 +106,7 @@ class Reader:
     def _started(self) -> "subprocess.Popen[str]":
         if self._process is None:
             command = [sys.executable, "-m", "tests.foreign.worker", self._folder.name]
+            command += self._words
             self._process = subprocess.Popen(command, stdin=-1, stdout=-1, text=True, bufsize=1)
         return self._process
 
@@ -130,12 +145,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--first", type=int, default=0, help="number of the first mutant")
+    parser.add_argument("--commands", action="store_true", help="through whole commands")
     parser.add_argument("formats", nargs="*", help="all where none is named")
     given = parser.parse_args()
     print(" | ".join(HEAD), flush=True)
     faults = []
-    with Reader() as reader:
-        for name in given.formats or SAMPLES:
+    with Reader(given.commands) as reader:
+        for name in given.formats or (COMMANDS if given.commands else SAMPLES):
             tally = run(reader, name, given.count, given.first)
             print(" | ".join(tally.row), flush=True)
             faults += tally.faults

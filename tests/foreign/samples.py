@@ -20,6 +20,7 @@ from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.foreign.formats import PHOTO_INDEX
 from scissorcal.identity import bytes_digest
 from scissorcal.inference.checkpoint import Walk, load_walks, save_walks
+from scissorcal.package.keys import holds, read_public_keys, signer
 from scissorcal.package.review import Review
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import load_recipe, parse_recipe
@@ -260,6 +261,31 @@ def _read_signature(path: Path) -> None:
     assert facts.signature(path)["label"]
 
 
+def _private_key(path: Path) -> None:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+    from cryptography.hazmat.primitives.serialization import (
+        Encoding,
+        NoEncryption,
+        PrivateFormat,
+    )
+
+    key = Ed25519PrivateKey.from_private_bytes(bytes(range(32)))
+    path.write_bytes(key.private_bytes(Encoding.PEM, PrivateFormat.OpenSSH, NoEncryption()))
+    path.chmod(0o600)
+
+
+def _read_private_key(path: Path) -> None:
+    text = "a text"
+    path.chmod(0o600)
+    assert holds(signer(path)(text), text)
+
+
+def _public_keys(path: Path) -> None:
+    private = path.with_name("of-it")
+    _private_key(private)
+    path.write_text(f"# of the laboratory\n{signer(private)('a text').public_key} lab\n")
+
+
 def _photo_index(path: Path) -> None:
     one = {"file": "a.jpg", "source": "a.jpg", "sha256": "0" * 64, "ids": [1], "pixels": [[1, 2]]}
     one |= {"width": 640, "height": 480}
@@ -387,6 +413,8 @@ SAMPLES: dict[str, Sample] = {
     "MATLAB 7.3": Sample("log73.mat", written_mat73, _log(MAT_COLUMNS, MAT_UNITS)),
     "recording MCAP": Sample("a.mcap", _recording, _read_recording, sealed_recording),
     "fit netCDF": Sample("plate.nc", _fit("plate"), _read_fit("plate"), sealed_fit),
+    "fit of friction": Sample("friction.nc", _fit("friction"), _read_fit("friction"), sealed_fit),
+    "fit of a camera": Sample("camera.nc", _fit("camera"), _read_fit("camera"), sealed_fit),
     "trust check": Sample("cut.verify.json", _trust_check, _read_trust_check),
     "OpenCV YAML": Sample("camera.yml", _opencv, _read_camera),
     "OpenCV YAML 1.0": Sample("camera1.yml", _camera(OPENCV_1), _read_camera),
@@ -404,6 +432,8 @@ SAMPLES: dict[str, Sample] = {
     "model package": Sample("paper.zip", _package, _read_package, sealed_package),
     "report.json": Sample("report.json", _report, _read_report),
     "signature.json": Sample("signature.json", _signature, _read_signature),
+    "private key": Sample("key", _private_key, _read_private_key),
+    "public keys": Sample("keys.pub", _public_keys, read_public_keys),
     "capture.json": Sample("capture.json", _photo_index, _read_photo_index),
     "path CSV": Sample("path.csv", _path, _read_path),
     "drawing SVG": Sample("plate.svg", _drawing, _read_drawing),

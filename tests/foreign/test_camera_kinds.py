@@ -458,6 +458,10 @@ def test_what_the_file_leaves_open_is_noted(tmp_path: Path) -> None:
         (written(KALIBR).replace("radtan", "equidistant"), "pinhole-equidistant"),
         (written(VINS).replace("PINHOLE", "MEI"), "has the model MEI (model_type)"),
         (ORB.replace("PinHole", "KannalaBrandt8"), "has the model KannalaBrandt8 (Camera.type)"),
+        ("[LEFT_CAM_HD]\nfx=700.1\nfy=700.1\n", "a text of assignments"),
+        ("% Caltech\n\nfc = [ 657.4 ; 657.8 ];\n", "a text of assignments"),
+        (json.dumps(PLAIN | {"LENS_DISTORTION": BEND}), "order is k1, k2, k3, p1, p2"),
+        (json.dumps({"intrinsics": [{"key": 0, "value": {}}]}), "the keys intrinsics"),
         (ORB + "Camera2.fx: 1.0\n", "has a second camera (Camera2.fx)"),
         (ORB + "Camera.bFishEye: 1\n", "the camera has a fisheye model"),
         (json.dumps(REALSENSE | {"model": "distortion.inverse_brown_conrady"}), "inverse"),
@@ -477,6 +481,14 @@ def test_an_unused_inverse_model_is_a_pinhole(tmp_path: Path) -> None:
     found = read(tmp_path, unused)
     assert not any(found.camera.distortion)
     assert not found.notes
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(-3, -3), (1.5, 6), (-1, -9), (0, 9)])
+def test_a_matrix_of_impossible_sides_is_refused(
+    tmp_path: Path, rows: float, columns: float
+) -> None:
+    matrix = {"rows": rows, "cols": columns, "data": FLAT}
+    assert "with 9 numbers" in refusal(tmp_path, PLAIN | {"camera_matrix": matrix})
 
 
 def test_thousands_of_unknown_keys_give_a_short_sentence(tmp_path: Path) -> None:

@@ -10,10 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scissorcal.aliases import Array
+from scissorcal.calibration.signals.sensors import channels_of
 from scissorcal.calibration.signals.survey import survey
 from scissorcal.errors import InputError
-from scissorcal.recording import Recording, import_table
+from scissorcal.recording import Joint, Recording, import_table
+from scissorcal.recording.layout import empty_samples
 from scissorcal.recording.marks import lone_excursion, marks_in
+from scissorcal.recording.plausible import size_note
 from scissorcal.recording.wraps import continued_clock, jumps_in, overflows
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "logs"
@@ -32,12 +35,12 @@ def texts(values: Array, digits: int = 4) -> list[str]:
 
 def read(
     folder: Path,
-    columns: Sequence[Sequence[str]],
+    cells: Sequence[Sequence[str]],
     head: Sequence[str] = HEAD,
     delimiter: str = ",",
     **options: object,
 ) -> Recording:
-    rows = [delimiter.join(row) for row in (head, *zip(*columns, strict=True))]
+    rows = [delimiter.join(row) for row in (head, *zip(*cells, strict=True))]
     path = folder / "log.csv"
     path.write_text("\n".join([*rows, ""]), encoding="utf-8")
     chosen = {"columns": {"time": 0, "opening": 1, "handle_force": 2}, "handle_radius_m": 0.06}
@@ -272,3 +275,126 @@ def test_a_heading_of_any_length_is_read_at_once(tmp_path: Path, heading: str) -
     with pytest.raises(InputError, match="its unit is not known") as refused:
         read(tmp_path, columns, ("time_s", heading, "force_N"))
     assert len(str(refused.value)) < 400
+
+
+BY_NAME = {"columns": {"time": "time_s", "opening": "angle_deg", "handle_force": "force_N"}}
+
+
+@pytest.mark.parametrize("spoil", ["rows", "headings", "sep=", "quoted commas"])
+def test_delimiters_that_mean_nothing_are_read(tmp_path: Path, spoil: str) -> None:
+    """Behind the last cell, in the first line for Excel, or as decimal commas in quoted cells."""
+    time, angle, force = texts(TIME), texts(ANGLE), texts(FORCE)
+    head = list(HEAD)
+    if spoil == "rows":
+        force = [f"{cell}," for cell in force]
+    elif spoil == "headings":
+        head.append("")
+    elif spoil == "sep=":
+        head[0] = f"sep=,\n{head[0]}"
+    else:
+        time, angle, force = (
+            [f'"{cell.replace(".", ",")}"' for cell in cells] for cells in (time, angle, force)
+        )
+    recording = read(tmp_path, (time, angle, force), head, **BY_NAME)
+    assert np.degrees(recording.samples["opening"]) == pytest.approx(ANGLE, abs=1e-4)
+    assert recording.samples["handle_force"] == pytest.approx(FORCE, abs=1e-4)
+
+
+def test_quoted_thousands_between_commas_are_refused(tmp_path: Path) -> None:
+    force = [f'"{1e6 * value:,.1f}"' for value in FORCE]
+    with pytest.raises(InputError, match="thousands separators are not read"):
+        read(tmp_path, (texts(TIME), texts(ANGLE), force))
+
+
+@pytest.mark.parametrize("names", ["{}", '"{}"', '"row {}"'])
+@pytest.mark.parametrize("by_name", [True, False])
+def test_row_names_without_a_heading_are_refused(tmp_path: Path, names: str, by_name: bool) -> None:
+    """As R's write.table leaves them: each heading stands over the column to its right."""
+    rows = [names.format(index + 1) for index in range(COUNT)]
+    with pytest.raises(InputError, match="line 2 has 4 cells, and line 1 has 3 headings"):
+        read(
+            tmp_path,
+            (rows, texts(TIME), texts(ANGLE), texts(FORCE)),
+            units={"time": "s", "opening": "deg", "handle_force": "N"},
+            **(BY_NAME if by_name else {}),
+        )
+
+
+def test_an_interval_is_no_time(tmp_path: Path) -> None:
+    for cell, said in (("0.005", "--rate-hz 200"), ("1.7e9", "is repeated"), ("0", "is repeated")):
+        with pytest.raises(InputError, match=said):
+            read(tmp_path, ([cell] * COUNT, texts(ANGLE), texts(FORCE)))
+
+
+def test_groups_of_two_digits_and_other_digits_are_named(tmp_path: Path) -> None:
+    indian = [f"{int(value)},{int(1e5 * value) % 100000:05d}" for value in FORCE]
+    indian = [f"{cell[:-3]},{cell[-3:]}.5" for cell in indian]
+    with pytest.raises(InputError, match="thousands separators are not read"):
+        read(tmp_path, (texts(TIME), texts(ANGLE), indian), delimiter=";")
+    arabic = str.maketrans("0123456789", "٠١٢٣٤٥٦٧٨٩")
+    with pytest.raises(InputError, match=r"line 2, column 'force_N': .* is not a number"):
+        read(tmp_path, (texts(TIME), texts(ANGLE), [one.translate(arabic) for one in texts(FORCE)]))
+
+
+@pytest.mark.parametrize(
+    ("head", "factor", "said"),
+    [
+        (("time_s", "angle_rad", "force_N"), 1.0, "-u opening=deg"),
+        (("time_s", "angle_deg", "force_N"), 1e3, "-u handle_force=mN"),
+    ],
+)
+def test_numbers_of_a_smaller_unit_are_named(
+    tmp_path: Path, head: Sequence[str], factor: float, said: str
+) -> None:
+    recording = read(tmp_path, (texts(TIME), texts(ANGLE), texts(factor * FORCE)), head)
+    (note,) = recording.particular
+    assert said in note
+
+
+@given(low=st.floats(-3.0, 3.0), range_rad=st.floats(0.01, 6.2), newtons=st.floats(0.01, 1000.0))
+def test_what_scissors_have_is_not_of_another_unit(
+    low: float, range_rad: float, newtons: float
+) -> None:
+    """Any opening within a turn, and any force of fingers within a factor of 10."""
+    share = np.linspace(0.0, 1.0, 100)
+    assert size_note("opening", low + range_rad * share, Joint()) == ""
+    assert size_note("handle_force", newtons * share, Joint()) == ""
+
+
+def test_two_sensors_in_one_column_are_named(tmp_path: Path) -> None:
+    angle = np.where(np.arange(COUNT) % 2, ANGLE, ANGLE + 15.0)
+    recording = read(tmp_path, (texts(TIME), texts(angle), texts(FORCE)))
+    assert "goes to and fro by" in " ".join(recording.particular)
+
+
+@pytest.mark.parametrize("lasting", [40, 420])
+def test_a_force_that_stands_still_is_named(tmp_path: Path, lasting: int) -> None:
+    force = texts(FORCE)
+    force[450 : 450 + lasting] = [force[450]] * lasting
+    said = told(read(tmp_path, (texts(TIME), texts(ANGLE), force)))
+    assert f"from 2.25 to {2.245 + lasting / 200.0:.6g} s ({lasting} samples)" in said
+
+
+@given(seed=st.integers(0, 2**32 - 1), step=st.sampled_from([1e-4, 0.005, 0.02, 0.05]))
+@settings(max_examples=60)
+def test_noise_of_any_step_does_not_stand_still(seed: int, step: float) -> None:
+    rng = np.random.default_rng(seed)
+    force = np.rint((2.0 - 0.8 * np.tanh(5.0 * SWING) + rng.normal(0.0, 0.02, COUNT)) / step) * step
+    recording = recording_of(np.radians(ANGLE), force)
+    assert channels_of(recording, ["handle_force"])[0].held is None
+
+
+def recording_of(opening: Array, force: Array) -> Recording:
+    samples = empty_samples(len(opening))
+    samples["opening"], samples["handle_force"] = opening, force
+    samples["device_time_us"] = np.rint(1e6 * TIME)
+    return Recording("friction", samples)
+
+
+def test_notes_of_one_log_are_those_that_not_all_have(tmp_path: Path) -> None:
+    plain = read(tmp_path, (texts(TIME), texts(ANGLE), texts(FORCE)))
+    assert plain.particular == ()
+    turned = read(tmp_path, (texts(TIME), texts(np.mod(ANGLE - 30.0, 360.0)), texts(FORCE)))
+    (note,) = turned.particular
+    assert "begins again" in note
+    assert note in turned.notes

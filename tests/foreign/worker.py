@@ -1,9 +1,9 @@
 """A process that reads mutants, one after the other, and says of each how it ended.
 
-    python -m tests.foreign.worker FOLDER
+    python -m tests.foreign.worker FOLDER [commands]
 
 A line on standard input is the number of a mutant and the name of its format; the answer is a line
-of JSON.
+of JSON. With "commands" whole commands read the mutants, else the readers alone.
 """
 
 import json
@@ -13,20 +13,23 @@ import sys
 import time
 import traceback
 import warnings
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from scissorcal.cli.failures import user_error
 from scissorcal.foreign import isolated
+from tests.foreign.commands import Commands
 from tests.foreign.mutations import mutate
 from tests.foreign.samples import SAMPLES, Sample
 
 MOST_MEMORY = 3_000_000_000
 
 
-def serve(folder: Path) -> None:
+def serve(folder: Path, by_commands: bool = False) -> None:
     """Answer until the input ends."""
+    commands = Commands(folder) if by_commands else None
     whole: dict[str, bytes] = {}
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
@@ -42,8 +45,12 @@ def serve(folder: Path) -> None:
             sample.make(path)
             whole[name] = path.read_bytes()
             sample.read(path)
-        path.write_bytes(mutant(sample, name, whole[name], int(number)))
-        print(json.dumps(_outcome(sample, path)), file=answers)
+        data = mutant(sample, name, whole[name], int(number))
+        path.write_bytes(data)
+        found = _measured(
+            partial(commands.outcome, name, data) if commands else partial(_outcome, sample, path)
+        )
+        print(json.dumps(found), file=answers)
 
 
 def mutant(sample: Sample, name: str, data: bytes, number: int) -> bytes:
@@ -52,9 +59,16 @@ def mutant(sample: Sample, name: str, data: bytes, number: int) -> bytes:
     return sample.seal(data, change) if sample.seal and number % 2 else change(data)
 
 
-def _outcome(sample: Sample, path: Path) -> dict[str, Any]:
+def _measured(outcome: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     before = _reset_peaks()
     began = time.perf_counter()
+    found = outcome()
+    found["seconds"] = time.perf_counter() - began
+    found["megabytes"] = max(_peak(pid) - start for pid, start in before.items()) / 1e3
+    return found
+
+
+def _outcome(sample: Sample, path: Path) -> dict[str, Any]:
     found: dict[str, Any] = {"code": 0, "said": "", "fault": ""}
     try:
         sample.read(path)
@@ -70,8 +84,6 @@ def _outcome(sample: Sample, path: Path) -> dict[str, Any]:
         elif "\n" in said and path.suffix != ".toml":
             fault = f"more than one line: {said[:200]}"
         found = {"code": code, "said": said[:300], "fault": fault}
-    found["seconds"] = time.perf_counter() - began
-    found["megabytes"] = max(_peak(pid) - start for pid, start in before.items()) / 1e3
     return found
 
 
@@ -98,4 +110,4 @@ def _peak(pid: str) -> float:
 
 
 if __name__ == "__main__":
-    serve(Path(sys.argv[1]))
+    serve(Path(sys.argv[1]), "commands" in sys.argv[2:])

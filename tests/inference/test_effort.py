@@ -1,5 +1,6 @@
 """Each rung of effort against known densities, and what it says where there is none."""
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -302,6 +303,18 @@ def test_a_checkpoint_of_another_posterior_is_refused_and_kept(tmp_path: Path) -
     path.write_bytes(before[: len(before) // 2])
     with pytest.raises(ValueError, match=r"walks\.npz: not a readable checkpoint"):
         infer(problem_of(normal(np.eye(2)), [[1.0, 1.0]]), "thorough", rng, checkpoint=path)
+
+
+def test_a_checkpoint_with_a_long_header_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "walks.npz"
+    long_header = {"chain": np.zeros(1, [(f"n{k}", float) for k in range(2000)])}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # numpy names the version of so long a header
+        np.savez(path, **long_header)
+    problem = problem_of(normal(np.eye(2)), [[1.0, 1.0]])
+    with pytest.raises(ValueError, match="not a readable checkpoint") as caught:
+        infer(problem, "thorough", np.random.default_rng(0), checkpoint=path)
+    assert "\n" not in str(caught.value)
 
 
 def test_the_generator_alone_decides_what_is_drawn() -> None:

@@ -1,11 +1,18 @@
 """The C tests, strict and under the sanitizers, and a step on a Cortex-M4F where tools are here."""
 
+import importlib.util
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
+
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import c_sources, loop
 
 C_TESTS = Path(__file__).parent.parent / "c"
 BUILD = Path(__file__).parents[2] / "build" / "c-tests"
@@ -53,6 +60,26 @@ needs_compiler = pytest.mark.skipif(
 @pytest.mark.parametrize("kind", ["strict", pytest.param("sanitized", marks=pytest.mark.slow)])
 def test_c_core(kind: str) -> None:
     assert make(kind, BUILD).count(" 0 failed") == len(list(C_TESTS.glob("test_*.c")))
+
+
+@pytest.mark.skipif(not importlib.util.find_spec("ziglang"), reason="no Zig here")
+@pytest.mark.parametrize("target", ["x86_64-windows-gnu", "aarch64-macos"])
+def test_files_that_ask_a_system_compile_for_others(tmp_path: Path, target: str) -> None:
+    """The loop and its rights, which on Windows do nothing; the rest is portable."""
+    flags = ("-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-O1")
+    for name in ("sc_loop", "sc_rights"):
+        source = c_sources() / f"{name}.c"
+        command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags, "-c"]
+        made = [*command, str(source), "-o", str(tmp_path / f"{name}.o")]
+        ran = subprocess.run(made, capture_output=True, text=True, check=False, timeout=300)
+        assert ran.returncode == 0, ran.stderr
+
+
+def test_a_system_without_the_loop_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On Windows the loop gives no reason of a stop; here a library that does so stands in."""
+    monkeypatch.setattr(loop, "lib", SimpleNamespace(sc_loop_run=lambda fd, block: 0))
+    with pytest.raises(DeviceError, match=r"^The loop at a port needs a Unix terminal"):
+        loop.run_loop(0, cast(loop.LoopBlock, SimpleNamespace(pointer=None)))
 
 
 @pytest.mark.slow

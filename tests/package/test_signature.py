@@ -3,6 +3,7 @@
 import copy
 import json
 import random
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -188,6 +189,19 @@ def wider_limits(facts: Facts, content: Members) -> None:
         recipe_value(f"limits.{key}", recipe["limits"][key] * 10.0)(facts, content)
 
 
+def exchanged_names(facts: Facts, _: Members) -> None:
+    one, other = facts["provenance"]["cut"]["parameters"][:2]
+    one["name"], other["name"] = other["name"], one["name"]
+
+
+def exchanged_tables(facts: Facts, content: Members) -> None:
+    """The friction of closing under the name of opening, and the reverse, with right hashes."""
+    one, other = (f"tables/friction_{part}.npy" for part in ("opening", "closing"))
+    content[one], content[other] = content[other], content[one]
+    for entry in facts["members"]:
+        entry["file"] = {one: other, other: one}.get(entry["file"], entry["file"])
+
+
 ROOM = "provenance.cut.parameters.0"
 
 REACH = {"tolerance": 0.07, "crossed_share": 0.0, "through_share": 0.0} | dict.fromkeys(
@@ -244,6 +258,12 @@ FORGERIES: dict[str, Forge] = {
     "reach": put("reach", REACH),
     "simplification": put("simplification", None),
     "name": put("name", "another"),
+    "unit of torque": put("units.torque", "N mm"),
+    "left out": put("provenance.cut.left_out", ["nothing"]),
+    "points of the bound": put("bound.points", 1),
+    "friction alike in both ways": put("provenance.friction.structure.symmetric", False),
+    "parameters' names exchanged": exchanged_names,
+    "friction tables exchanged": exchanged_tables,
 }
 """Changes of what a key signed; the content hash is right again after each."""
 
@@ -405,3 +425,36 @@ def test_a_changed_package_is_judged_as_forged_without_a_trusted_key_too(
     (verdict,) = [one for one in check_package(path) if one.check == "signature"]
     assert verdict.status == "fail"
     assert "not of this package" in verdict.why
+
+
+def test_units_that_are_not_those_of_the_package_are_refused_without_a_key(
+    signed: Signed, tmp_path: Path
+) -> None:
+    path = forged(signed, tmp_path / "forged.zip", put("units.torque", "N mm"))
+    with pytest.raises(InputError, match=r"units\.torque is 'N mm', .* give 'N m'"):
+        open_package(path, warn=False)
+
+
+def test_a_manifest_with_a_key_twice_is_the_one_that_is_hashed(
+    signed: Signed, tmp_path: Path
+) -> None:
+    """Of two values under one key the last counts for the hash, and for what is used."""
+    limits = json.dumps(signed.facts["limits"] | {"torque_Nm": 50.0})
+    text = signed.content["manifest.json"].decode().rstrip()
+    for twice in (f'{text[:-1]}, "limits": {limits}}}', f'{{"limits": {limits}, {text[1:]}'):
+        pack(tmp_path / "forged.zip", {**signed.content, "manifest.json": twice.encode()})
+        if accepted(signed, tmp_path / "forged.zip"):
+            package = open_package(tmp_path / "forged.zip", warn=False)
+            assert package.manifest.limits.torque_Nm == signed.facts["limits"]["torque_Nm"]
+        else:
+            assert twice.startswith(text[:-1])
+
+
+def test_a_signed_package_in_the_comment_of_a_forged_one(signed: Signed, tmp_path: Path) -> None:
+    """Two packages in one file: what is read has to be what is signed."""
+    path = forged(signed, tmp_path / "forged.zip", times("limits.torque_Nm", 9.0))
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.comment = signed.path.read_bytes()[-60_000:]
+    if accepted(signed, path):
+        package = open_package(path, warn=False)
+        assert package.manifest.limits.torque_Nm == signed.facts["limits"]["torque_Nm"]

@@ -133,14 +133,13 @@ def test_stretches_of_random_outlines_are_where_points_are_inside(bed: Bed) -> N
 
 SVG = """<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"
  width="100mm" height="50mm" viewBox="0 0 200 100">
- <script>window.hacked = 1</script><image xlink:href="http://example.org/a.png"/>
- <defs><rect id="kept" width="9" height="9"/></defs><use href="#kept"/>
- <g transform="translate(20 10) scale(2)" onload="window.hacked = 1">
-  <path id="plate" d="m0 0h40v20h-40z"/><circle cx="20" cy="10" r="4"/></g>
- <style>@import "http://example.org/b.css";</style></svg>"""
+ <image xlink:href="data:image/png;base64,AAAA"/>
+ <defs><rect id="kept" width="9" height="9"/></defs>
+ <g transform="translate(20 10) scale(2)">
+  <path id="plate" d="m0 0h40v20h-40z"/><circle cx="20" cy="10" r="4"/></g></svg>"""
 
 
-def test_an_svg_file_is_read_in_mm_and_nothing_of_it_runs(bed: Bed) -> None:
+def test_an_svg_file_is_read_in_mm(bed: Bed) -> None:
     shapes = bed.run("(text) => readSvg(text)", SVG)
     assert [shape["id"] for shape in shapes] == ["plate", ""]
     assert np.array(shapes[0]["outlines"][0]) == pytest.approx(
@@ -153,6 +152,20 @@ def test_an_svg_file_is_read_in_mm_and_nothing_of_it_runs(bed: Bed) -> None:
     assert sagitta < 0.021
     (plate,) = bed.run("(text) => drawnFromSvg(text, 0.1)", SVG)["layers"]
     assert (plate["name"], len(plate["holes"])) == ("plate", 1)
+
+
+@pytest.mark.parametrize(
+    "inner",
+    [
+        "<script>window.hacked = 1</script>",
+        '<image onerror="window.hacked = 1" href="data:image/png;base64,AAAA"/>',
+        '<image href="http://example.org/a.png"/>',
+        '<style>@import "http://example.org/b.css";</style>',
+    ],
+)
+def test_nothing_of_a_refused_svg_file_runs_or_is_fetched(bed: Bed, inner: str) -> None:
+    text = SVG.replace("</svg>", f"{inner}</svg>")
+    assert "it " in bed.run("(text) => tried(() => readSvg(text))", text)["refused"]
     assert bed.run("() => window.hacked") is None
 
 

@@ -14,6 +14,8 @@ from scissorcal.errors import InputError
 from scissorcal.recipe.drawing import read_drawing
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.plate_layers import plate_pieces
+from scissorcal.recipe.svg.elements import shown_shapes
+from tests.foreign.drawings import HEAD, MISPLACED, READ, RECT, UNREAD
 from tests.model.drawn import assert_pieces, golden_cases, golden_files, numbers, pieces_of
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design import SHEET, box, drawn, layer
@@ -99,17 +101,41 @@ def test_the_page_and_a_recipe_see_the_same_shapes_of_a_file(
     page = bed.run("(text) => tried(() => readSvg(text).map((one) => one.id))", given["text"])
     file = tmp_path / "drawing.svg"
     file.write_text(given["text"], encoding="utf-8")
-    if given["shapes"] is None:
-        assert "hides something" in page["refused"]
-    else:
-        assert page == given["shapes"]
     text = re.sub(r"/\*.*?\*/", "", given["text"], flags=re.S)
     styled = re.search(r"<style[^<]*[{;\s](display|visibility)\s*:", text)
     if given["shapes"] is None or styled:
+        assert "in a <style>, which is not read" in page["refused"]
         with pytest.raises(InputError, match=r"in a <style>, which is not read"):
             read_drawing(file)
     else:
+        assert page == given["shapes"]
         assert [name for name, _ in read_drawing(file).shapes] == given["shapes"]
+
+
+@pytest.mark.parametrize(("inner", "_why"), UNREAD)
+def test_the_page_refuses_what_a_recipe_refuses(bed: Bed, inner: str, _why: str) -> None:
+    found = bed.run("(text) => tried(() => readSvg(text))", f"{HEAD}{inner}</svg>")
+    assert "refused" in found
+    with pytest.raises(ValueError, match=r"^it") as recipe:
+        shown_shapes(f"{HEAD}{inner}</svg>".encode())
+    if " is not read" in str(recipe.value) or "it has <" in str(recipe.value):
+        assert str(recipe.value) in found["refused"]
+
+
+@pytest.mark.parametrize(("head", "_why"), MISPLACED)
+def test_the_page_refuses_what_would_place_a_whole_drawing_otherwise(
+    bed: Bed, head: str, _why: str
+) -> None:
+    found = bed.run("(text) => tried(() => readSvg(text))", f"{head}{RECT}</svg>")
+    assert "refused" in found or '"100px"' in head  # the page takes pixels
+
+
+@pytest.mark.parametrize(("inner", "box_mm"), READ)
+def test_the_page_reads_what_a_recipe_reads(bed: Bed, inner: str, box_mm: list[float]) -> None:
+    (shape,) = bed.run("(text) => readSvg(text)", f"{HEAD}{inner}</svg>")
+    corners = np.concatenate([np.array(one) for one in shape["outlines"]]) * [1, -1]
+    found = [*corners.min(axis=0), *corners.max(axis=0)]
+    assert found == pytest.approx(box_mm, abs=0.05)
 
 
 def test_a_saved_recipe_is_taken_and_has_the_same_pieces(bed: Bed, tmp_path: Path) -> None:

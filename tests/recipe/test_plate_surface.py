@@ -134,7 +134,7 @@ def test_a_missing_file_a_folder_and_bytes_that_are_no_text(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         plate_surface(settings, tmp_path)
     (tmp_path / "heights.csv").rmdir()
-    (tmp_path / "heights.csv").write_bytes(b"\xff\xfe\x00x")
+    (tmp_path / "heights.csv").write_bytes(b"\x80\x00x")
     with pytest.raises(InputError, match="byte 0: this is not UTF-8"):
         plate_surface(settings, tmp_path)
     (tmp_path / "heights.csv").write_bytes(b"1" * 5_000_001)

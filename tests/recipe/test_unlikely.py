@@ -43,9 +43,11 @@ SLIPS = [
     ("_per_s = [0.05, 1.0]", "_per_s = [3.0, 60.0]", "= [0.0523599, 1.0472]."),
     ("tolerance_percent = 7.0", "tolerance_percent = 0.07", "tolerance_percent = 7."),
     ("contact_mm = [15.0, 60.0]", "contact_mm = [0.015, 0.06]", "contact_mm = [15, 60]."),
+    ("contact_mm = [15.0, 60.0]", "contact_mm = [1.5, 6.0]", "contact_mm = [15, 60]."),
     ("offset_mm = -8.0", "offset_mm = -0.008", "offset_mm = -8."),
     ("torque_Nm = 1.0", "torque_Nm = 1000.0", "torque_Nm = 1."),
     ("force_N = 30.0", "force_N = 30000.0", "force_N = 30."),
+    ("force_N = 30.0", "force_slew_N_per_s = 5.0\nforce_N = 30.0", "force_slew_N_per_s = 5000."),
     ("= [0.05, 0.12, 0.3, 0.7, 1.5]", "= [3, 7, 17, 40, 86]", "0.698132, 1.50098]."),
     ("{ median = 5000.0, factor_90 = 10.0 }", "{ median = 5.0, factor_90 = 10.0 }",
      "toughness_J_per_m2 = { median = 5000, factor_90 = 10 }."),
@@ -85,7 +87,8 @@ def test_each_layer_of_a_plate_is_judged() -> None:
 def test_a_key_that_has_no_range_is_refused_with_the_nearest_one() -> None:
     message = refused('unusual = ["rig.handle_radius"]\n' + PAPER)
     assert 'Did you mean "rig.handle_radius_mm"?' in message
-    assert "must be a list" in refused('unusual = "rig.handle_radius_mm"\n' + PAPER)
+    message = refused('unusual = "rig.handle_radius_mm"\n' + PAPER)
+    assert 'must be a list: ["rig.handle_radius_mm"].' in message
 
 
 def test_what_a_capture_wrote_is_not_judged_again() -> None:

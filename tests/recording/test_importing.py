@@ -252,7 +252,7 @@ def test_repeated_headings(tmp_path: Path) -> None:
         ("log.csv", b"t,angle,torque\n", "no row of numbers"),
         ("log.csv", b"t,angle,torque\n0,1,2\n", "holds 1 rows"),
         ("log.csv", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "is a PNG image, not a table in text"),
-        ("log.csv", "t,angle,torque\n0,1,2\n".encode("utf-16"), "Save it as CSV in UTF-8"),
+        ("log.csv", "t,angle,torque\n0,1,2\n".encode("utf-16"), "is text in UTF-16"),
         ("log.csv", b"hello\nworld\n", "no row of numbers"),
         ("log.mat", b"hello" * 100, "is text, not a MATLAB file"),
         ("log.mat", b"MATLAB 7.3 MAT-file" + bytes(600), "is not a MATLAB file, or it is damaged"),

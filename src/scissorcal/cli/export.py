@@ -80,10 +80,13 @@ def _export_camera(
 ) -> Answer:
     from scissorcal.calibration import load
     from scissorcal.calibration.camera.result import CameraFit
-    from scissorcal.errors import InputError
+    from scissorcal.errors import InputError, OtherKindError
     from scissorcal.vision.camera_files import write_camera_file
 
-    camera = load(fit, CameraFit).camera
+    try:
+        camera = load(fit, CameraFit).camera
+    except OtherKindError as error:
+        raise OtherKindError(fit, error.found, "a recording or a camera fit") from None
     if file.exists() and not overwrite:
         raise InputError(f"{file} already exists: name another file, or give --overwrite.")
     write_camera_file(camera, file, style)

@@ -190,7 +190,8 @@ def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]"
             answer = _answer(imported)
             first, *_ = answer.text.splitlines()
             lines.append(f"{file.name}: {first}")
-            lines += [f"  note: {said}" for said in answer.result["notes"] if not _expected(said)]
+            particular = (*imported.recording.particular, *answer.result["survey"].notes)
+            lines += [f"  note: {said}" for said in particular]
             facts.append(answer.result)
             paths.append(imported.path)
     if refused:
@@ -202,13 +203,6 @@ def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]"
         raise told
     lines.append(f"{len(paths)} logs imported; 'scissorcal recording list' shows them")
     return Answer({"imported": facts}, "\n".join(lines), files=paths)
-
-
-def _expected(note: str) -> bool:
-    """Whether a note tells how a log was read, alike for all, and not what is particular in it."""
-    return note.startswith(("Imported from", "Not in the file", "The recipe has")) or (
-        "strokes were found" in note
-    )
 
 
 def _answer(imported: _Imported) -> Answer:

@@ -10,6 +10,7 @@ from scissorcal.foreign.formats import Format
 from scissorcal.foreign.isolated import parse_isolated
 from scissorcal.foreign.reading import (
     decode_text,
+    first_line,
     open_foreign,
     parse_json,
     read_foreign,
@@ -22,6 +23,7 @@ from scissorcal.foreign.reading import (
 __all__ = [
     "Format",
     "decode_text",
+    "first_line",
     "open_foreign",
     "parse_isolated",
     "parse_json",

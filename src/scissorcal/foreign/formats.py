@@ -93,7 +93,7 @@ CAMERA = Format(
     "a camera file",
     _MB,
     "Save it again from the program that wrote it.",
-    ("yaml", "json", "xml", "text"),
+    ("yaml", "json", "xml", "text", "utf16"),
 )
 """A dozen numbers and, in some, the corners of 100 photographs of 100 corners: 0.5 MB."""
 
@@ -165,7 +165,7 @@ DRAWING = Format(
     "a drawing in SVG",
     2 * _MB,
     "Save it as plain SVG, its width and height in mm.",
-    holds=("svg", "xml", "gzip", "text"),
+    holds=("svg", "xml", "gzip", "text", "utf16"),
     memory_bytes=_GB,
     processor_s=20,
     wall_s=60.0,

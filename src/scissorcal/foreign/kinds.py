@@ -35,6 +35,7 @@ class FileKind:
 
 _NAMED = "'scissorcal import' makes a recording of it, where its name ends in {}."
 _UNPACK = "Unpack it, and name what was in it."
+_OFFICE = "'scissorcal import' reads its table where it is saved as CSV in UTF-8."
 
 _MAGIC: tuple[tuple[bytes, FileKind], ...] = (
     (b"\x89MCAP0\r\n", FileKind("recording", "a recording (MCAP)")),
@@ -60,7 +61,7 @@ _MAGIC: tuple[tuple[bytes, FileKind], ...] = (
     (b"\x93NUMPY", FileKind("npy", "a NumPy array (.npy)")),
     (b"-----BEGIN ", FileKind("key", "a key or certificate")),
     (b"%YAML", FileKind("yaml", "a YAML file of OpenCV")),
-    (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", FileKind("office", "an older Office document")),
+    (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", FileKind("office", "an older Office document", _OFFICE)),
 )
 """Bytes at the beginning that no text, and no other of these formats, begins with."""
 
@@ -163,7 +164,7 @@ def _zip(head: bytes, tail: bytes) -> FileKind | None:
     if name.endswith(b".npy") and b"/" not in name:
         return FileKind("npz", "a NumPy archive (.npz)")
     if name in (b"[Content_Types].xml", b"_rels/.rels", b"mimetype"):
-        return FileKind("office", "an Office document", "Save its table as CSV in UTF-8.")
+        return FileKind("office", "an Office document", _OFFICE)
     return FileKind("zip", "a zip archive", _UNPACK)
 
 
@@ -193,6 +194,10 @@ def _tar(head: bytes, tail: bytes) -> FileKind | None:
 
 
 def _text(head: bytes, tail: bytes) -> FileKind | None:
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return FileKind("utf16", "text in UTF-16", "Save it as UTF-8.")
+    if head.startswith(b"version https://git-lfs.github.com/spec/"):
+        return FileKind("lfs", "a pointer of Git LFS to a file", "'git lfs pull' fetches the file.")
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     if own := _OWN_FORMAT.search(text):
         word = own[1].decode()

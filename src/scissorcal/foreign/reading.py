@@ -91,7 +91,7 @@ def parse_json(data: bytes | str, where: str, remedy: str) -> Any:
         text = data if isinstance(data, str) else data.decode("utf-8-sig")
         return json.loads(text, parse_int=_whole_number)
     except ValueError as error:
-        raise InputError(f"{where} is not valid JSON ({_first_line(error)}). {remedy}") from None
+        raise InputError(f"{where} is not valid JSON ({first_line(error)}). {remedy}") from None
     except RecursionError:
         raise InputError(f"{where} is nested too deeply for JSON. {remedy}") from None
 
@@ -124,7 +124,7 @@ def foreign_error(
     if isinstance(error, RecursionError):
         return InputError(f"{path} is nested too deeply for {kind.name}. {remedy}")
     return InputError(
-        f"{path} is not {kind.name}, or it is damaged ({_first_line(error)}). {remedy}"
+        f"{path} is not {kind.name}, or it is damaged ({first_line(error)}). {remedy}"
     )
 
 
@@ -168,6 +168,7 @@ def _whole_number(digits: str) -> int:
     return int(digits)
 
 
-def _first_line(error: Exception) -> str:
+def first_line(error: Exception) -> str:
+    """The first line of what an error says, at most 200 characters; its type where it is empty."""
     lines = str(error).strip().splitlines()
     return lines[0][:200] if lines else type(error).__name__

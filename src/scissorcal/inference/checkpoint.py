@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
-from scissorcal.foreign import open_foreign
+from scissorcal.foreign import first_line, open_foreign
 from scissorcal.foreign.formats import CHECKPOINT
 
 RandomState = tuple[str, NDArray[np.uint32], int, int, float]
@@ -107,6 +107,6 @@ def _read(path: Path) -> list[Walk]:
             ]
     except Exception as error:
         raise CheckpointError(
-            f"{path}: not a readable checkpoint ({error}); move it away, or name another file, to "
-            "start afresh."
+            f"{path}: not a readable checkpoint ({first_line(error)}); move it away, or name "
+            "another file, to start afresh."
         ) from error

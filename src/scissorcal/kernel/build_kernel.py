@@ -4,6 +4,7 @@ The declarations that cffi needs are the headers themselves, less their preproce
 nothing is declared twice.
 """
 
+import sys
 from pathlib import Path
 
 from cffi import FFI
@@ -53,7 +54,7 @@ builder.set_source(
     sources=[str(source) for source in sorted(C.glob("*.c"))],
     depends=[str(header) for header in sorted(C.glob("*.h"))],
     include_dirs=[str(C)],
-    libraries=["m"],
+    libraries=[] if sys.platform == "win32" else ["m"],  # there it is part of the C library
     # without contraction every computer, and a browser, computes the same bits
     extra_compile_args=[
         *("-std=c99", "-O3", "-fno-math-errno", "-ffp-contract=off", "-Wall", "-Wextra"),

@@ -16,6 +16,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.errors import needs_unix
 from scissorcal.kernel._kernel import ffi, lib
 from scissorcal.kernel.control import ControlBlock, ControlConfig, path_arrays
 from scissorcal.kernel.layout import fill_struct
@@ -38,9 +39,12 @@ def run_loop(fd: int, block: "LoopBlock") -> StopReason:
     """Run the loop on ``fd`` until a stop, a hangup, silence or an error; return which.
 
     Runs in C with the GIL released. ``fd`` stays open, and is non-blocking meanwhile. A block is
-    run once; make a new one to start again.
+    run once; make a new one to start again. Raises DeviceError where this system has no such loop.
     """
-    return StopReason(lib.sc_loop_run(fd, block.pointer))
+    reason = StopReason(lib.sc_loop_run(fd, block.pointer))
+    if reason is StopReason.NONE:  # a loop that ran ends with a reason
+        raise needs_unix("The loop at a port")
+    return reason
 
 
 def lock_memory() -> bool:

@@ -22,7 +22,7 @@ def check_name(what: str, given: object, names: Iterable[str]) -> None:
 There are: power, exponential.
     """
     known = tuple(names)
-    if given in known:
+    if isinstance(given, str) and given in known:
         return
     import difflib  # loads three modules, for a message alone
 
@@ -57,9 +57,9 @@ def check_numbers(what: str, value: Any, low: float = -LARGEST, high: float = LA
     raise ModelError(said[0].upper() + said[1:])
 
 
-def check_moving_blades(count: object) -> None:
+def check_moving_blades(count: Any) -> None:
     """ModelError unless one blade moves, or both."""
-    if count not in (1, 2):
+    if np.ndim(count) or count not in (1, 2):
         raise ModelError(f"1 or 2 blades move, not {str(count)[:60]}.")
 
 

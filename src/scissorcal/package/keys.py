@@ -100,6 +100,11 @@ def _private_key(path: Path, passphrase: Callable[[], str]) -> "Ed25519PrivateKe
     from cryptography.hazmat.primitives.serialization import load_ssh_private_key
 
     data = read_foreign(path, KEY)
+    if data.startswith((b"ssh-", b"ecdsa-")):
+        raise InputError(
+            f"{path} is a public key, which signs nothing: name the private one, the file of the "
+            "same name without .pub."
+        )
     if os.name == "posix" and path.stat().st_mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise InputError(
             f"Others may read the private key {path}: run 'chmod 600 {path}', and make a new key "

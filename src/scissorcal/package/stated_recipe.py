@@ -16,7 +16,7 @@ from scissorcal.identity import bytes_digest
 from scissorcal.package.bound import SHARE_OF_TOLERANCE
 from scissorcal.package.compile import scene_mechanics, scene_ranges
 from scissorcal.package.exact import ExactModel
-from scissorcal.package.manifest import Limits, Manifest, Provenance
+from scissorcal.package.manifest import Limits, Manifest, Provenance, units_of
 from scissorcal.recipe.schema import Recipe
 
 ROUNDING = 1e-9
@@ -60,6 +60,7 @@ def _pairs(manifest: Manifest, recipe: Recipe, model: ExactModel) -> Iterator[tu
     """Place in the manifest, what stands there, and what recipe and parameters give."""
     scene, share = recipe.scene, recipe.scene.tolerance_percent / 100.0
     yield "name", manifest.name, recipe.name
+    yield "units", manifest.units, units_of(manifest.mechanics)
     yield "ranges", manifest.ranges, scene_ranges(recipe)
     yield "limits", manifest.limits, {key: getattr(recipe.limits, key) for key in _LIMITS}
     yield "mechanics", manifest.mechanics, scene_mechanics(model, recipe)

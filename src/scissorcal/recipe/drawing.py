@@ -46,8 +46,9 @@ def read_drawing(path: Path) -> Drawing:
 
     Lengths come from the file's width and height, which need a unit, and its viewBox. Taken are
     path, rect, circle, ellipse, polygon and polyline with their transforms; curves are flattened
-    to 0.01 mm, open contours closed. Text, pictures, single lines and colours are passed over, and
-    what display or visibility hides. The file may be compressed (svgz).
+    to 0.01 mm, open contours closed. Text, pictures, single lines and colours are passed over (a
+    shape without fill and line is a shape), and what display or visibility hides. The file may be
+    compressed (svgz).
 
     Raises InputError where it is no such file, has entities, a script or a clone, or refers to
     another file; and, by its name, for any element, attribute or property that is not known to

@@ -107,7 +107,7 @@ class EulerAngles:
     @property
     def words(self) -> str:
         """The angles as they are printed."""
-        yaw, pitch, roll = (_printed(value) for value in self._degrees)
+        yaw, pitch, roll = self.printed
         return f"yaw {yaw}, pitch {pitch}, roll {roll} deg"
 
     @property

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from scissorcal.recipe.locate import key_lines
-from scissorcal.recipe.units import conversion, split_unit
+from scissorcal.recipe.units import conversion, converted, split_unit
 from scissorcal.recipe.unlikely import Unlikely
 
 Path = tuple[str | int, ...]
@@ -161,6 +161,8 @@ def _wrong_value(item: Any, fields: Sequence[str]) -> str:
         bound = context.get("max_length", context.get("min_length"))
         words = "at most" if kind == "too_long" else "at least"
         return f"{given} has {context['actual_length']} items, but {words} {bound} are allowed."
+    if kind == "tuple_type" and isinstance(item["input"], str):
+        return f"{given} is text, but this must be a list: [{given}]."
     expected = _EXPECTED.get(kind)
     if kind == "model_type" and fields:
         expected = f"a table with the keys {', '.join(fields)}"
@@ -240,23 +242,8 @@ def _conversion_hint(key: str, meant: str, value: Any) -> str:
     if factor is None or factor == 1.0:
         return ""
     hint = f" 1 {source.label} = {factor:.6g} {target.label}"
-    converted = _converted(value, factor)
-    return hint + (f", so write {meant} = {converted}." if converted else ".")
-
-
-def _converted(value: Any, factor: float) -> str | None:
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
-        return f"{value * factor:.6g}"
-    if isinstance(value, list) and value:
-        parts = [_converted(item, factor) for item in value]
-        return None if None in parts else f"[{', '.join(str(part) for part in parts)}]"
-    if isinstance(value, Mapping) and "median" in value:
-        parts = [
-            _converted(item, factor if key == "median" else 1.0) for key, item in value.items()
-        ]
-        pairs = ", ".join(f"{key} = {part}" for key, part in zip(value, parts, strict=True))
-        return None if None in parts else f"{{ {pairs} }}"
-    return None
+    number = converted(value, factor)
+    return hint + (f", so write {meant} = {number}." if number else ".")
 
 
 def _fields(model: type[BaseModel], table: Path) -> list[str]:

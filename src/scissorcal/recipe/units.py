@@ -6,7 +6,9 @@ columns to SI.
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 _BASE: dict[str, tuple[str, float]] = {
     "m": ("m", 1.0),
@@ -119,6 +121,26 @@ def conversion(source: Unit, target: Unit) -> float | None:
     if source.dimension != target.dimension:
         return None
     return float(f"{source.factor / target.factor:.15g}")
+
+
+def converted(value: Any, factor: float) -> str | None:
+    """A value of TOML with its numbers times ``factor``; of a prior the median alone.
+
+    None where a part is no finite number.
+
+    >>> converted([1.5, 6.0], 10.0), converted({"median": 5.0, "factor_90": 10.0}, 1e3)
+    ('[15, 60]', '{ median = 5000, factor_90 = 10 }')
+    """
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+        return f"{value * factor:.6g}"
+    if isinstance(value, list) and value:
+        parts = [converted(item, factor) for item in value]
+        return None if None in parts else f"[{', '.join(str(part) for part in parts)}]"
+    if isinstance(value, Mapping) and "median" in value:
+        parts = [converted(item, factor if key == "median" else 1.0) for key, item in value.items()]
+        pairs = ", ".join(f"{key} = {part}" for key, part in zip(value, parts, strict=True))
+        return None if None in parts else f"{{ {pairs} }}"
+    return None
 
 
 def _symbol(symbol: str) -> tuple[str, float] | None:

@@ -2,8 +2,9 @@
 
 A number is refused where it lies within a factor of 1.5 of an everyday value that is written in
 another unit, or farther out: then a wrong unit explains it better than an uncommon rig. Of the
-other units only those count whose everyday values stay clear of the everyday range by that factor
-on both sides, so that no number within a factor of 1.5 of the everyday range is ever refused.
+other units only those count whose everyday values lie outside the everyday range (where that holds
+0, clear of it by 1.5 on both sides), and no number within a factor of 1.5 of the everyday range is
+ever refused.
 """
 
 import difflib
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from scissorcal.recipe.everyday import EVERYDAY, Everyday
-from scissorcal.recipe.units import Unit, parse_unit, split_unit
+from scissorcal.recipe.units import Unit, converted, parse_unit, split_unit
 
 Path = tuple[str | int, ...]
 
@@ -75,8 +76,8 @@ _SLIPS = (
     ("ms", "s"),
     ("mN", "N"),
     ("mNm", "Nm"),
-    ("mN_per_s", "N_per_s"),
-    ("mNm_per_s", "Nm_per_s"),
+    ("mN_per_s", "N_per_s", "N_per_ms"),
+    ("mNm_per_s", "Nm_per_s", "Nm_per_ms"),
     ("N_per_m", "N_per_mm"),
     ("N_s_per_m", "N_s_per_mm"),
     ("s_per_m", "s_per_mm"),
@@ -134,15 +135,16 @@ def bounds(key: str) -> tuple[float, float]:
     """
     unit = _unit(key)
     low, high = _everyday(key, unit)
+    apart = MARGIN**2 if EVERYDAY[QUANTITY_OF[key]].least else 1.0  # a range with 0 has no low end
     least, most = 0.0, math.inf
     for other in _others(unit):
         slip = other.factor / unit.factor
-        if low <= 0.0 or max(slip, 1.0 / slip) < MARGIN**2 * high / low:
+        if low <= 0.0 or max(slip, 1.0 / slip) < apart * high / low:
             continue
         if slip > 1.0:
-            least = max(least, MARGIN * high / slip)
+            least = max(least, min(MARGIN * high / slip, low / MARGIN))
         else:
-            most = min(most, low / slip / MARGIN)
+            most = min(most, max(low / slip / MARGIN, MARGIN * high))
     return least, most
 
 
@@ -177,8 +179,9 @@ def _judged(key: str, path: Path, value: Any) -> list[Unlikely]:
         factor = float(f"{other.factor / unit.factor:.15g}")
         given = "" if other is _SHARE else f" {_label(other)}"
         asked = "a share of 1" if other is _SHARE else f"in{given}"
-        written = f"{path[-1]} = {_written(value, factor)}"
-        so = f", so write {written}" if len(written) <= 100 else ""
+        number = converted(value, factor)
+        written = f"{path[-1]} = {number}"
+        so = f", so write {written}" if number and len(written) <= 100 else ""
         slip = f"Was it {asked}? {size:g}{given} = {size * factor:.4g} {_label(unit)}{so}."
     kept_by = f'If it is meant, add unusual = ["{key}"] above the first [table].'
     return [Unlikely(path, sentence, slip, kept_by)]
@@ -239,14 +242,3 @@ def _largest(value: Any) -> float | None:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         return None
     return abs(float(value))
-
-
-def _written(value: Any, factor: float) -> str:
-    """A value of TOML with its numbers times ``factor``; of a prior only the median."""
-    if isinstance(value, Mapping):
-        pairs = ((k, _written(v, factor if k == "median" else 1.0)) for k, v in value.items())
-        return "{ " + ", ".join(f"{k} = {v}" for k, v in pairs) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(_written(one, factor) for one in value) + "]"
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return f"{value * factor:.6g}" if number else str(value)

@@ -8,9 +8,11 @@ import numpy as np
 from scissorcal.aliases import Array
 
 GROUPED = re.compile(
-    r"[+-]?\d{1,3}(?P<mark>[.,'’_ \u00a0\u202f])\d{3}(?:(?P=mark)\d{3})*(?:[.,]\d*)?"
+    r"[+-]?\d{1,3}(?P<mark>[.,'’_ \u00a0\u202f])(?:\d{2}(?P=mark))*\d{3}(?:(?P=mark)\d{3})*"
+    r"(?:[.,]\d*)?"
 )
-"""Digits in groups of three behind one mark, and perhaps a decimal mark after them."""
+"""Digits in groups of three, or as in India of two and a last one of three, behind one mark, and
+perhaps a decimal mark after them."""
 ONE_GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 """What may be a number of thousands, or one of three decimals."""
 DECIMAL = re.compile(r"[+-]?\d*[.,]\d+(?:[eE][+-]?\d+)?")
@@ -26,9 +28,9 @@ CLOSER = 10.0
 
 
 def is_grouped(cell: str) -> bool:
-    """Whether a cell can only be a number in groups of three digits.
+    """Whether a cell can only be a number in groups of digits.
 
-    >>> [is_grouped(cell) for cell in ("1.234,5", "1,234.5", "1 234", "1.234.567", "1.234")]
+    >>> [is_grouped(cell) for cell in ("1.234,5", "1 234", "1.234.567", "1,23,456.7", "1.234")]
     [True, True, True, True, False]
     """
     return bool(GROUPED.fullmatch(cell)) and not DECIMAL.fullmatch(cell)

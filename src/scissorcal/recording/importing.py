@@ -13,13 +13,22 @@ from numpy.typing import NDArray
 from scissorcal.errors import InputError
 from scissorcal.recording.layout import MEASURED, empty_samples
 from scissorcal.recording.marks import lone_excursion, marks_in
+from scissorcal.recording.plausible import size_note
 from scissorcal.recording.quantities import Quantity, describe, quantity
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
-from scissorcal.recording.resolution import GAP_FACTOR, StrokeThreshold, stroke_threshold
+from scissorcal.recording.resolution import (
+    GAP_FACTOR,
+    MOST_NOISE_SHARE,
+    NOISE_OF_STROKE,
+    StrokeThreshold,
+    noise_of,
+    stroke_threshold,
+)
 from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_cost, gap_note
-from scissorcal.recording.table import Table, read_table, refuse_no_table, shortened
+from scissorcal.recording.table import Table, shortened
+from scissorcal.recording.table_file import read_table, refuse_no_table
 from scissorcal.recording.wraps import (
     COUNTERS,
     continued,
@@ -30,6 +39,8 @@ from scissorcal.recording.wraps import (
 
 MOST_PLACES = 3
 """Places that a note lists."""
+LONGEST_S = 1e9
+"""31 years: no log lasts so long."""
 SHORT_SHARE, MANY = 0.25, 20
 """More strokes than MANY, half of them shorter than this share of the range, are worth a note."""
 
@@ -105,9 +116,11 @@ def import_table(
         said += wrapped
         _set_clock(samples, table, quantities["time"].factor, allow_gaps=allow_gaps)
     said += _told_of_jumps(samples, table, joint)
-    strokes, found = _label(samples, joint, min_travel)
-    said += found
+    strokes, found, odd = _label(samples, joint, min_travel)
+    said += [*odd, *_sizes(samples, quantities, joint)]
     digest = content_hash(path)
+    source = f"{path.name} (sha256:{digest[:16]})"
+    particular = _particular(quantities, samples, said)
     return Recording(
         kind=kind,
         samples=samples,
@@ -116,7 +129,8 @@ def import_table(
         handle_radius_m=handle_radius_m,
         source=str(path),
         content_hash=digest,
-        notes=_notes(f"{path.name} (sha256:{digest[:16]})", columns, quantities, samples, said),
+        notes=(*_general(source, columns, quantities), found, *particular),
+        particular=particular,
     )
 
 
@@ -171,7 +185,7 @@ def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_
     """Set clocks and sequence from the time column; InputError if it repeats, falls or has gaps."""
     values = table.columns["time"].values
     seconds = (values - values[0]) * factor
-    if not np.abs(seconds).max() < 1e9:
+    if not np.abs(seconds).max() < LONGEST_S:
         heading = shortened(table.columns["time"].heading)
         raise InputError(
             f"{table.path}, column {heading!r} spans more than 30 years. Check the unit of time."
@@ -199,6 +213,12 @@ def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_
 
 def _not_a_clock(table: Table, seconds: NDArray[np.float64], row: int) -> str:
     before, here = seconds[row - 1], seconds[row]
+    if 0.0 < here * len(seconds) < LONGEST_S and np.all(seconds == here):
+        return (
+            f"{table.place(row, 'time')}: {here:.9g} s stands in every row, so the column has the "
+            "time from one row to the next. Leave the column out and give the rate: "
+            f"--rate-hz {1.0 / here:.6g}."
+        )
     if here < before:
         return (
             f"{table.place(row, 'time')}: time decreases from {before:.9g} s to {here:.9g} s. "
@@ -306,8 +326,8 @@ def _listed(table: Table, places: Sequence[int] | NDArray[np.int64]) -> str:
 
 def _label(
     samples: NDArray[np.void], joint: Joint, min_travel: float | None
-) -> tuple[tuple[Stroke, ...], list[str]]:
-    """Label the strokes; give them, and sentences on how they were found."""
+) -> tuple[tuple[Stroke, ...], str, list[str]]:
+    """Label the strokes; give them, how they were found, and sentences on what is odd in them."""
     opening = np.asarray(samples["opening"], dtype=np.float64)
     chosen = stroke_threshold(opening, joint)
     if min_travel is not None:
@@ -316,11 +336,17 @@ def _label(
     samples["stroke"] = labels.stroke_of_sample
     counts = Counter(stroke.kind for stroke in labels.strokes)
     unit = joint.position_unit
-    said = [
+    found = (
         f"{counts['closing']} closing and {counts['opening']} opening strokes were found, of at "
         f"least {chosen.travel:.3g} {unit} ({chosen.reason})."
-    ]
-    span = float(np.ptp(opening))
+    )
+    said, span, noise = [], float(np.ptp(opening)), noise_of(opening)
+    if NOISE_OF_STROKE * noise > max(MOST_NOISE_SHARE * span, chosen.travel):
+        said.append(
+            f"The opening goes to and fro by {noise:.3g} {unit} (standard deviation) from sample "
+            f"to sample, in a range of {span:.3g} {unit}: strokes found in it may be noise. Check "
+            "that the column is of one sensor."
+        )
     travels = [np.ptp(opening[labels.stroke_of_sample == one.index]) for one in labels.strokes]
     if len(travels) > MANY and np.median(travels) < SHORT_SHARE * span:
         said.append(
@@ -328,21 +354,34 @@ def _label(
             f"where the range is {span:.3g} {unit}: if these are no strokes of yours, give a "
             "larger --min-travel."
         )
-    return labels.strokes, said
+    return labels.strokes, found, said
 
 
-def _notes(
-    source: str,
-    columns: Mapping[str, str | int],
-    quantities: Mapping[str, Quantity],
-    samples: NDArray[np.void],
-    said: Sequence[str],
-) -> tuple[str, ...]:
+def _sizes(
+    samples: NDArray[np.void], quantities: Mapping[str, Quantity], joint: Joint
+) -> list[str]:
+    """Sentences on channels whose numbers look as in another unit."""
+    values = {
+        name: np.asarray(samples[name], dtype=np.float64) for name in {*quantities} - {"time"}
+    }
+    notes = (size_note(name, values[name], joint) for name in sorted(values))
+    return [note for note in notes if note]
+
+
+def _general(
+    source: str, columns: Mapping[str, str | int], quantities: Mapping[str, Quantity]
+) -> list[str]:
+    """How a log was read, alike for all that are read so."""
     missing = [channel for channel in MEASURED if channel not in columns]
     notes = [f"Imported from {source}: {describe(quantities)}."]
-    notes += [f"Not in the file, and set to 0: {', '.join(missing)}."] if missing else []
-    notes += [entry.note for entry in quantities.values() if entry.note]
-    notes += said
+    return notes + ([f"Not in the file, and set to 0: {', '.join(missing)}."] if missing else [])
+
+
+def _particular(
+    quantities: Mapping[str, Quantity], samples: NDArray[np.void], said: Sequence[str]
+) -> tuple[str, ...]:
+    """What is particular in a log."""
+    notes = [*(entry.note for entry in quantities.values() if entry.note), *said]
     if samples["stroke"].max() < 0:
         notes.append("No stroke was found: the joint moves less than the least travel.")
     gaps = gap_note(samples)

@@ -28,9 +28,10 @@ class Recording:
     ``motor_torque`` newtons, as ``joint`` says. ``device`` is the identity that the rig stated
     (empty for imports), ``recipe_toml`` the recipe's text at capture, ``content_hash`` the
     SHA-256 of the file it was read from. ``notes`` are sentences on the capture and on what reading
-    it found (recovered end, garbled frames, gaps), for the report. ``marks`` are facts by name, as
-    the capture wrote them; see ``stop`` and ``unloaded``. ``beside`` is how many rows each channel
-    beside the samples has, by its topic (``read_telemetry`` reads them).
+    it found (recovered end, garbled frames, gaps), for the report; ``particular`` are those of an
+    import that are of this log and not of how all are read (not stored). ``marks`` are facts by
+    name, as the capture wrote them; see ``stop`` and ``unloaded``. ``beside`` is how many rows each
+    channel beside the samples has, by its topic (``read_telemetry`` reads them).
     """
 
     kind: Kind
@@ -43,6 +44,7 @@ class Recording:
     source: str = ""
     content_hash: str = ""
     notes: tuple[str, ...] = ()
+    particular: tuple[str, ...] = ()
     marks: tuple[tuple[str, str], ...] = ()
     beside: Mapping[str, int] = field(default_factory=dict)
 

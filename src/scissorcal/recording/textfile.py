@@ -1,6 +1,7 @@
 """Tables in text: delimiter, comments and headings are detected; every error names its line."""
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,6 +23,8 @@ from scissorcal.recording.table import Column, Table, Wanted, find_column, short
 COMMENT_MARKS = ("%", "#")
 DELIMITERS = (",", ";", "\t", "|", None)
 """Tried in this order, the first of equals wins; None is white space."""
+SEPARATOR_LINE = re.compile('"?sep=."?', re.IGNORECASE)
+"""First line of a table for Excel: it names the delimiter, and is no heading."""
 MOST_LINES = 10_000_000
 """2.8 hours at 1 kHz; each takes some 150 bytes of memory beside its text."""
 
@@ -62,9 +65,10 @@ def read_text(
     if drop_last_line and why and len(rows) > 1:
         rows, notes = rows[:-1], (_dropped(rows[-1], why),)
     _check_width(path, rows, delimiter, width)
-    _refuse_torn(path, lines[:start], rows[0], delimiter, width)
+    _refuse_other_headings(path, lines[:start], rows, delimiter, wanted)
     commented = [line for line in comments if line.number < rows[0].number]
-    headings = _headings(lines[:start], commented, delimiter, width)
+    first = _cells(rows[0].text, delimiter)
+    headings = _headings(lines[:start], commented, delimiter, first)
     chosen = {c: find_column(path, headings, column, c) for c, column in wanted.items()}
     values = _numbers(path, rows, delimiter, chosen, headings)
     columns = {
@@ -75,21 +79,35 @@ def read_text(
     return Table(path, columns, lines=numbers, notes=notes)
 
 
-def _refuse_torn(
-    path: Path, before: list[Line], row: Line, delimiter: str | None, width: int
+def _refuse_other_headings(
+    path: Path, before: list[Line], rows: list[Line], delimiter: str | None, wanted: Wanted
 ) -> None:
-    """Refuse rows of more cells than headings, if commas in numbers can have made them.
+    """Refuse rows of more cells than headings, where it is not known which belong together.
 
-    Commas separate the cells, no number has a dot, and the line before has words only.
+    ``before`` are the lines before the rows, of which the last has words only. Commas that separate
+    the cells may also stand in the numbers, where those have no dot; or the first column has row
+    names and no heading, as R writes tables.
     """
     heading = _cells(before[-1].text, delimiter) if before else []
-    torn = delimiter == "," and 1 < len(heading) < width and "." not in row.text
-    if torn and all(_cells(row.text, delimiter)) and not any(map(_is_number, heading)):
+    row, cells = rows[0], _cells(rows[0].text, delimiter)
+    if not 1 < len(heading) < len(cells) or any(map(_is_number, heading)):
+        return
+    where = f"{path}, line {row.number} has {len(cells)} cells, and line {before[-1].number} has"
+    if delimiter == "," and "." not in row.text and '"' not in row.text and all(cells):
         raise InputError(
-            f"{path}, line {row.number} has {width} cells, and line {before[-1].number} has "
-            f"{len(heading)} headings: commas within numbers, as for decimals or thousands, look "
-            "like those between cells. Export the log with dots, or with semicolons."
+            f"{where} {len(heading)} headings: commas within numbers, as for decimals or "
+            "thousands, look like those between cells. Export the log with dots, or with "
+            "semicolons."
         )
+    if len(heading) == len(cells) - 1 and cells[-1]:
+        names = [_cells(line.text, delimiter)[0] for line in rows[:2]]
+        counted = all(map(str.isdecimal, names)) and int(names[-1]) - int(names[0]) == 1
+        by_name = any(isinstance(column, str) for column in wanted.values())
+        if counted or by_name or not _is_number(names[0]):
+            raise InputError(
+                f"{where} {len(heading)} headings: which column has none is not known. Give each "
+                "column a heading (where R writes the log, with row.names = FALSE)."
+            )
 
 
 def _why_incomplete(line: Line, cut: Line | None, delimiter: str | None, width: int) -> str:
@@ -135,6 +153,8 @@ def _lines(path: Path) -> tuple[list[Line], list[Line], Line | None]:
     split = text.split("\n")
     for number, raw in enumerate(split, 1):
         line = raw.strip(" ")
+        if number == 1 and SEPARATOR_LINE.fullmatch(line):
+            continue
         if line.startswith(COMMENT_MARKS):
             comments.append(Line(number, line.lstrip("".join(COMMENT_MARKS))))
         elif line.strip():
@@ -206,16 +226,23 @@ def _check_width(path: Path, rows: list[Line], delimiter: str | None, width: int
 
 
 def _headings(
-    before: list[Line], comments: list[Line], delimiter: str | None, width: int
+    before: list[Line], comments: list[Line], delimiter: str | None, row: list[str]
 ) -> list[str]:
-    """Return one heading a column; "column 3" where the file has none."""
-    rows = [cells for line in before if len(cells := _cells(line.text, delimiter)) == width]
+    """Return one heading a column; "column 3" where the file has none.
+
+    ``row`` are the cells of the first row. A delimiter behind the last cell may stand in the rows
+    alone, or in the headings alone.
+    """
+
+    def as_wide(lines: list[Line]) -> list[list[str]]:
+        found = [_cells(line.text, delimiter) for line in lines]
+        found = [cells[:-1] if cells[len(row) :] == [""] else cells for cells in found]
+        found = [[*cells, ""] if row[len(cells) :] == [""] else cells for cells in found]
+        return [cells for cells in found if len(cells) == len(row)]
+
+    rows = as_wide(before) or as_wide(comments)[-1:]
     if not rows:
-        rows = [cells for line in comments if len(cells := _cells(line.text, delimiter)) == width][
-            -1:
-        ]
-    if not rows:
-        return [f"column {number}" for number in range(width)]
+        return [f"column {number}" for number in range(len(row))]
     if len(rows) == 1:
         return rows[0]
     return [f"{name} [{unit.strip('[]()')}]" for name, unit in zip(*rows[-2:], strict=True)]
@@ -229,6 +256,7 @@ def _numbers(
     headings: list[str],
 ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """Return the chosen columns, shape (N, len(chosen)), by NumPy's parser."""
+    rows, delimiter = _without_quotes(rows, delimiter)
     texts = [line.text for line in rows]
     if delimiter != "," and any("," in text for text in texts):
         _refuse_two_marks(path, rows, delimiter, chosen, headings)
@@ -255,6 +283,18 @@ def _numbers(
     return values
 
 
+def _without_quotes(rows: list[Line], delimiter: str | None) -> tuple[list[Line], str | None]:
+    """Rows of quoted cells, some with commas in them, as rows between semicolons."""
+    if delimiter != "," or not any('"' in line.text for line in rows):
+        return rows, delimiter
+    split = [(line.number, _cells(line.text, delimiter)) for line in rows]
+    if not any("," in cell for _, cells in split for cell in cells):
+        return rows, delimiter
+    marks = str.maketrans(';"', "  ")
+    plain = [Line(number, ";".join(cell.translate(marks) for cell in row)) for number, row in split]
+    return plain, ";"
+
+
 def _refuse_two_marks(
     path: Path,
     rows: list[Line],
@@ -277,8 +317,8 @@ def _refuse_two_marks(
 def _grouped(path: Path, line: Line, heading: str, cell: str) -> str:
     return (
         f"{path}, line {line.number}, column {shortened(heading)!r}: {shortened(cell)!r} stands "
-        "where digits are in groups of three, and thousands separators are not read. Export the "
-        "log without them, and with one decimal mark."
+        "where digits are in groups, and thousands separators are not read. Export the log without "
+        "them, and with one decimal mark."
     )
 
 
@@ -298,7 +338,7 @@ def _first_fault(
             if is_grouped(written) or (delimiter == "," and "," in written):
                 return _grouped(path, line, headings[number], written)
             try:
-                float(cells[number])
+                float(cells[number].encode("ascii"))  # other digits are none to NumPy
             except ValueError:
                 what = f"{shortened(written)!r} is not a number" if written else "it is empty"
                 return (

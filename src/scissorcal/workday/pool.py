@@ -68,12 +68,14 @@ class Pool:
                     item = next(todo, _END)
                     if item is _END:
                         break
-                    running.add(self.executor.submit(asked, item))  # type: ignore[arg-type]
+                    with self._connected():
+                        running.add(self.executor.submit(asked, item))  # type: ignore[arg-type]
                 if not running:
                     return
                 done, running = wait(running, return_when=FIRST_COMPLETED)
                 for future in done:
-                    found = self._result(future)
+                    with self._connected():
+                        found = future.result()
                     finished(read_answer(found, kind) if self.remote else found)
         except BrokenProcessPool as error:
             raise ScissorcalError(
@@ -84,18 +86,38 @@ class Pool:
             for future in running:
                 future.cancel()
 
-    def _result(self, future: "Future[Any]") -> Any:
-        """What a job gave; a cluster's answers are text, so its own errors are the connection's."""
+    @contextmanager
+    def _connected(self) -> Iterator[None]:
+        """Turn what a cluster raises within into a DeviceError; its jobs' own errors are text."""
         try:
-            return future.result()
-        except (CancelledError, OSError) as error:
-            if not self.remote:
+            yield
+        except Exception as error:
+            sentence = _why_cluster_failed(error) if self.remote else ""
+            if not sentence:
                 raise
             raise DeviceError(
-                "The cluster ended while it worked: its scheduler was stopped, or the network to "
-                "it failed. Start it again, and run the same command again: 'scissorcal verify' "
-                "and 'scissorcal bench trade' go on from what was finished."
+                f"{sentence}, and run the same command again: 'scissorcal verify' and 'scissorcal "
+                "bench trade' go on from what was finished."
             ) from error
+
+
+def _why_cluster_failed(error: Exception) -> str:
+    """What of a cluster failed, and what to do first; empty where the error is of another kind.
+
+    dask is not imported for the names of its errors, which are of no common kind.
+    """
+    name = type(error).__name__
+    if name == "KilledWorker":
+        return (
+            "A job ended each worker of the cluster that it was given to, most likely for want of "
+            "memory. Start workers with more memory or fewer at a time"
+        )
+    if isinstance(error, CancelledError | OSError) or name == "ClosedClientError":
+        return (
+            "The cluster ended while it worked: its scheduler was stopped, or the network to it "
+            "failed. Start it again"
+        )
+    return ""
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scissorcal.bench.trade import frame_time
 from scissorcal.bench.trade.assemble import curve_of
 from scissorcal.bench.trade.frame_time import frame_time_s
 from scissorcal.bench.trade.knobs.rate import ALONE, IN_HAND, NO_PORT, NO_RIG, Rate
@@ -16,7 +17,7 @@ from scissorcal.bench.trade.rendered import continuous_torques, rendered_error
 from scissorcal.bench.trade.stability import known_rig, margin
 from scissorcal.bench.trade.strokes import PEAK_OVER_MEAN, Stroke, hand_strokes
 from scissorcal.bench.trade.torque import AVERAGE, WORST
-from scissorcal.errors import ScissorcalError
+from scissorcal.errors import ScissorcalError, needs_unix
 from scissorcal.kernel import estimated_rates
 from tests.bench.trade.cases import case, linear, pressing
 
@@ -38,6 +39,16 @@ def test_strokes_cover_openings_and_rates_of_the_scene():
     assert peaks == pytest.approx(np.geomspace(0.1, 1.0, 3))
     contacts = [stroke.contact_m for stroke in hand_strokes(pressing().recipe)]
     assert contacts == pytest.approx(np.linspace(*pressing().recipe.scene.contact_m, 3))
+
+
+def test_a_system_without_the_loop_gives_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise needs_unix("The loop at a port")
+
+    monkeypatch.setattr(frame_time, "run_loop", refused)
+    one = case()
+    with pytest.raises(ScissorcalError, match="this system lacks"):
+        frame_time_s(compiled(one).tables, hand_strokes(one.recipe)[0], 1000.0, one.recipe.limits)
 
 
 def test_estimated_rates_are_the_servos_low_pass_of_differences():

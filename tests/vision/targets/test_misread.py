@@ -52,6 +52,12 @@ def refusal(image: NDArray[np.uint8], named: Board) -> str:
 
 
 @needs_cases
+@pytest.mark.parametrize("words", ["chessboard:9x6:0.025", "charuco:5x7:0.04:0.02:DICT_6X6_250"])
+def test_squares_in_metres_are_refused(words: str) -> None:
+    with pytest.raises(InputError, match=r"give lengths in mm, (25|40) where that is in metres"):
+        board_from_words(words)
+
+
 def test_a_board_from_before_opencv_4_6_is_found_under_its_name() -> None:
     for path in sorted(CASES.glob("legacy_8x6_*.jpg")):
         photo = read_photo(path, colour=False)

@@ -425,3 +425,32 @@ def test_a_cluster_that_ends_is_told_as_one() -> None:
     with pytest.raises(DeviceError, match="The cluster ended while it worked"):
         Pool(Ended(), 1, remote=True).work(abs, [1, 2], found.append, int)
     assert found == []
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("ClosedClientError", "The cluster ended while it worked"),
+        ("KilledWorker", "Start workers with more memory"),
+    ],
+)
+@pytest.mark.parametrize("at_once", [True, False])
+def test_a_cluster_that_fails_is_told_as_what_failed(name: str, said: str, at_once: bool) -> None:
+    """dask's own errors, whether a job is handed in or its answer is awaited."""
+    from scissorcal.errors import DeviceError
+    from scissorcal.workday.pool import Pool
+
+    fault = type(name, (Exception,), {})("tcp://127.0.0.1:1")
+
+    class Failing(Executor):
+        def submit(self, *_: Any, **__: Any) -> Any:
+            if at_once:
+                raise fault
+            future: Future[Any] = Future()
+            future.set_exception(fault)
+            return future
+
+    with pytest.raises(DeviceError, match=said):
+        Pool(Failing(), 1, remote=True).work(abs, [1], [].append, int)
+    with pytest.raises(type(fault)):
+        Pool(Failing(), 1).work(abs, [1], [].append, int)

@@ -36,7 +36,7 @@ def frame_time_s(
     is the thread's processor time, waiting excluded: wake-up, reading, decoding, the servo with the
     model's step, encoding and writing. Frames follow each other without pause, so that processor
     caches are warm; a port's driver takes more time. Raises ScissorcalError where the loop ends
-    before the last frame.
+    before the last frame, or this system has none.
     """
     tick_us = round(1e6 / rate_Hz)
     host, device = socket.socketpair()
@@ -51,6 +51,8 @@ def frame_time_s(
             device.sendall(frame)
             _await_answer(device)
     except OSError as error:
+        if loop.refusal:
+            raise loop.refusal from None
         reason = block.stop_reason.sentence
         raise ScissorcalError(f"The loop ended early, so its time is unknown. {reason}") from error
     finally:
@@ -70,11 +72,15 @@ class _Loop(threading.Thread):
         self._host = host
         self._block = LoopBlock.attach(os.dup(block.fileno()))
         self.processor_s = float("nan")
+        self.refusal: ScissorcalError | None = None
 
     def run(self) -> None:
         before = time.thread_time()
-        run_loop(self._host.fileno(), self._block)
-        self.processor_s = time.thread_time() - before
+        try:
+            run_loop(self._host.fileno(), self._block)
+            self.processor_s = time.thread_time() - before
+        except ScissorcalError as error:
+            self.refusal = error
         with contextlib.suppress(OSError):  # the device's end may be closed
             self._host.shutdown(socket.SHUT_RDWR)
         self._block.close()

@@ -62,6 +62,8 @@ class Channel:
     ``marks`` are values in the place of a measurement (see
     :func:`~scissorcal.recording.marks.marks_in`); their samples count as saturated. ``at_ends`` is
     the share of samples at ``low`` or ``high``, whether or not the sensor is cut off there.
+    ``held`` are the first sample, and the one past the last, of the longest run of one value within
+    the range that noise does not repeat so often, while the joint moves; None where there is none.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Channel:
     high: float
     marks: tuple[float, ...] = ()
     at_ends: float = 0.0
+    held: tuple[int, int] | None = None
 
     @property
     def mostly_at_ends(self) -> bool:
@@ -146,11 +149,12 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
     if marks:
         marked = np.isin(values, marks)
         rest = _inspect(name, np.where(marked, values[~marked][0], values), moves, tick_s)
-        return replace(rest, saturated=rest.saturated | marked, marks=marks)
+        return replace(rest, saturated=rest.saturated | marked, marks=marks, held=None)
     long_run = max(FEWEST_IN_RUN, round(LONG_RUN_S / tick_s))
     fewest = max(2 * FEWEST_IN_RUN, round(FEWEST_INVALID_S / tick_s))
     hold, alike = _repetition(values)
     dead, ends = none, tuple[float, ...]()
+    held = _held_within(values, moves, step, fewest)
     if alike < NOISY:
         by_chance = _longest_by_chance(values[::hold], step)
         long_run = max(long_run, hold * max(FEWEST_IN_RUN, by_chance))
@@ -161,7 +165,27 @@ def _inspect(name: str, values: Array, moves: Mask, tick_s: float) -> Channel:
     else:
         ends = _held_ends(values, moves, step, long_run, fewest)
     cut = np.isin(values, ends)
-    return Channel(name, constant, step, cut, dead, low, high, at_ends=at_ends)
+    return Channel(name, constant, step, cut, dead, low, high, at_ends=at_ends, held=held)
+
+
+def _held_within(values: Array, moves: Mask, step: float, fewest: int) -> tuple[int, int] | None:
+    """The longest run of a value (m,) that is no end and not 0, where noise cannot have made it.
+
+    It has ``fewest`` samples while the joint moves, and what lies outside it has noise that repeats
+    a value ``UNUSUAL`` times less often.
+    """
+    first, after = _runs(values)
+    moving = np.concatenate([[0], np.cumsum(moves)])
+    count = moving[after] - moving[first]
+    count[np.isin(values[first], (0.0, values.min(), values.max()))] = 0
+    longest = int(np.argmax(count))
+    run = int(first[longest]), int(after[longest])
+    rest = np.delete(values, slice(*run))
+    if count[longest] < fewest or len(rest) < BLOCK:
+        return None
+    hold, alike = _repetition(rest)
+    by_chance = max(FEWEST_IN_RUN, _longest_by_chance(rest[::hold], step))
+    return run if alike < NOISY and count[longest] >= UNUSUAL * hold * by_chance else None
 
 
 def _longest_by_chance(values: Array, step: float) -> int:
@@ -281,6 +305,20 @@ def mark_sentence(channel: Channel, count: int, unit: str) -> str:
     return (
         f"{channel.name} is exactly {listed} {unit} in {samples}, where nothing leads from or to "
         "the other values: a mark of overflow or loss, which is left out."
+    )
+
+
+def held_sentence(channel: Channel, recording: Recording, unit: str) -> str:
+    """That a noisy channel stands still; empty where it does not."""
+    if channel.held is None:
+        return ""
+    first, after = channel.held
+    time = recording.device_time_s
+    return (
+        f"{channel.name} is exactly {recording.samples[channel.name][first]:.6g} {unit} from "
+        f"{time[first]:.6g} to {time[after - 1]:.6g} s ({after - first} samples) while the joint "
+        "moves; its noise does not repeat a value so often. If the sensor or its link stood still, "
+        "what happened then was not measured: remove those rows."
     )
 
 

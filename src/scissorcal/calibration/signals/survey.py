@@ -10,6 +10,7 @@ from scissorcal.calibration.signals.sensors import (
     Channel,
     channels_of,
     ends_sentence,
+    held_sentence,
     mark_sentence,
 )
 from scissorcal.recording.layout import unit_of
@@ -94,6 +95,8 @@ def _told(recording: Recording, channel: Channel) -> list[str]:
             f"{channel.high:.3g} {unit}) in {channel.saturated.mean():.2%} of the samples: what "
             "lies beyond was not measured. Use a sensor of larger range, or a smaller gain."
         )
+    if held := held_sentence(channel, recording, unit):
+        said.append(held)
     if channel.mostly_at_ends:
         said.append(ends_sentence(channel, unit))
     values = np.asarray(recording.samples[channel.name], dtype=np.float64)

@@ -2,6 +2,17 @@
 
 #include "sc_loop.h"
 
+#if defined(_WIN32)
+
+uint32_t sc_loop_run(int fd, sc_block *block)
+{
+    (void)fd;
+    (void)block;
+    return SC_STOP_NONE;
+}
+
+#else
+
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -349,3 +360,5 @@ uint32_t sc_loop_run(int fd, sc_block *block)
     __atomic_store_n(&block->running, 0u, __ATOMIC_RELEASE);
     return block->exit_reason;
 }
+
+#endif

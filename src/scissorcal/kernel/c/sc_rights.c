@@ -2,18 +2,30 @@
 
 #include "sc_rights.h"
 
-#include <string.h>
+#if defined(_WIN32)
+
+int sc_rights_lock_memory(void)
+{
+    return 0;
+}
+
+#else
+
 #include <sys/mman.h>
-#include <sys/resource.h>
-#include <unistd.h>
-#ifdef __linux__
-#include <sys/syscall.h>
-#endif
 
 int sc_rights_lock_memory(void)
 {
     return mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
 }
+
+#endif
+
+#if defined(__linux__)
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+#endif
 
 #if defined(__linux__) && defined(SYS_sched_setattr)
 

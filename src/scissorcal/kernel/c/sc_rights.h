@@ -1,4 +1,5 @@
-/* What a loop's process may ask of the system for the sake of its latency: POSIX and Linux. */
+/* What a loop's process may ask of the system for the sake of its latency: POSIX and Linux; elsewhere
+ * nothing is granted. */
 #ifndef SC_RIGHTS_H
 #define SC_RIGHTS_H
 

@@ -41,21 +41,17 @@ def contours_mm(shape: DrawnShape, most: int) -> list[Any]:
 
 def _flattened(path: Any, tolerance: float, room: int) -> list[Any]:
     """Corners of one contour: ends of lines, and points of curves close enough together."""
-    from svgelements import Arc, CubicBezier, Line, QuadraticBezier
+    from svgelements import Arc, CubicBezier, Move, QuadraticBezier
 
     corners: list[Any] = []
     for segment in path:
-        if segment.start is None or segment.end is None:
+        if isinstance(segment, Move) or segment.start is None or segment.end is None:
             continue
         steps = 1
         if isinstance(segment, Arc):
             steps = _arc_steps(segment, tolerance)
         elif isinstance(segment, CubicBezier | QuadraticBezier):
             steps = _bezier_steps(segment, tolerance)
-        elif not isinstance(segment, Line) and type(segment).__name__ not in ("Close", "Move"):
-            continue
-        if type(segment).__name__ == "Move":
-            continue
         if len(corners) + steps > room + 1:  # the first corner comes again at the end
             raise ValueError(TOO_MANY)
         if not corners or corners[-1] != segment.start:

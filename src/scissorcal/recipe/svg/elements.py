@@ -132,11 +132,11 @@ class _Shapes:
         """Take an element that nothing around it hides."""
         if tag in names.REFUSED_WHERE_SHOWN and not is_root:
             raise ValueError(names.REFUSED_WHERE_SHOWN[tag])
-        style = names.style_properties(attributes.get("style", ""))
-        if names.hides(style, attributes, "display") == "none":
+        style = names.style_properties(attributes.get("style", ""), is_root=is_root)
+        if names.hiding_value(style, attributes, "display") == "none":
             self._hidden[-1] = True
             return
-        visibility = names.hides(style, attributes, "visibility")
+        visibility = names.hiding_value(style, attributes, "visibility")
         self._visibility[-1] = visibility or self._visibility[-1]
         if tag in names.SHAPES and self._visibility[-1] in ("hidden", "collapse"):
             return

@@ -7,85 +7,42 @@ https://www.w3.org/TR/css-transforms-1/ and what Inkscape, Illustrator and Corel
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+_LISTS: Any = json.loads(Path(__file__).with_name("names.json").read_text("utf-8"))
+"""The names, of which the prototype's page has the same (``svg_names.ts``)."""
 
 
-def _words(text: str) -> frozenset[str]:
-    return frozenset(text.split())
+def _words(name: str) -> frozenset[str]:
+    return frozenset(_LISTS[name].split())
 
 
-SHAPES = {
-    "path": ("d",),
-    "rect": ("x", "y", "width", "height", "rx", "ry"),
-    "circle": ("cx", "cy", "r"),
-    "ellipse": ("cx", "cy", "rx", "ry"),
-    "polygon": ("points",),
-    "polyline": ("points",),
+SHAPES: Mapping[str, tuple[str, ...]] = {
+    tag: tuple(keys.split()) for tag, keys in _LISTS["shapes"].items()
 }
 """Elements that are outlines, with the attributes that draw them."""
 
-CONTAINERS = ("svg", "g", "a")
+CONTAINERS = _words("containers")
+PASSED_OVER = _words("passed_over")
+"""What holds no outline of the picture; text, flowRoot, image and line are drawn, not as outlines.
+"""
 
-PASSED_OVER = _words(
-    "defs symbol clipPath mask pattern marker metadata linearGradient radialGradient meshgradient "
-    "hatch solidcolor filter style title desc view cursor font font-face color-profile "
-    "text flowRoot image line"
-)
-"""What holds no outline of the picture; of this list the last four are drawn, not as outlines."""
+REFUSED_ANYWHERE: Mapping[str, str] = _LISTS["refused_anywhere"]
+REFUSED_WHERE_SHOWN: Mapping[str, str] = _LISTS["refused_where_shown"]
 
-_ANIMATIONS = ("animate", "animateTransform", "animateMotion", "animateColor", "set", "discard")
-REFUSED_ANYWHERE = {
-    "script": "it has a script, which no drawing of a plate needs: save it as plain SVG",
-} | {name: f"it is animated (<{name}>): remove the animation" for name in _ANIMATIONS}
-REFUSED_WHERE_SHOWN = {
-    "use": "it has clones (<use>): turn them into paths, such as with 'Unlink Clone'",
-    "foreignObject": "it has foreign objects: save it as plain SVG",
-    "switch": "it has alternatives (<switch>): keep one, and save it as plain SVG",
-    "svg": "it has a drawing within the drawing (<svg>): save it as plain SVG",
-}
-
-_ROOT = _words(
-    "width height viewBox preserveAspectRatio x y version baseProfile zoomAndPan contentScriptType "
-    "contentStyleType"
-)
-_ANY = _words("id class style transform lang tabindex role focusable pathLength")
-_LINK = _words("href target rel type download hreflang title")
-_LOOKS = _words(
-    "opacity paint-order shape-rendering image-rendering vector-effect clip-rule mask-type "
-    "overflow overflow-x overflow-y enable-background mix-blend-mode isolation pointer-events "
-    "cursor user-select will-change backface-visibility content-visibility letter-spacing "
-    "word-spacing line-height writing-mode direction unicode-bidi baseline-shift "
-    "dominant-baseline alignment-baseline glyph-orientation-vertical glyph-orientation-horizontal "
-    "kerning white-space block-progression inline-size shape-inside shape-padding shape-margin "
-    "shape-subtract src unicode-range"
-)
-_LOOKS_BEGIN = (
-    *("fill", "stroke", "stop-", "flood-", "lighting-", "color", "solid-", "background"),
-    *("font", "text", "marker", "-inkscape-", "--"),
-)
-_HIDING = {
-    "display": _words("inline block none inherit"),
-    "visibility": _words("visible hidden collapse inherit"),
-}
+_ROOT, _ANY, _LINK = (_words(f"{of}_attributes") for of in ("root", "any", "link"))
+_LOOKS = _words("looks")
+_LOOKS_BEGIN = tuple(_LISTS["looks_begin"].split())
+_HIDING = {key: values.split() for key, values in _LISTS["hiding"].items()}
+_NOTHING = _words("may_be_none")
+_REMEDIES = tuple((re.compile(names), remedy) for names, remedy in _LISTS["remedies"])
+_APPLY = "apply the transforms to the shapes"
 _VENDOR = re.compile(r"-(webkit|moz|ms|o)-")
 
-_APPLY = "apply the transforms to the shapes"
-_RELEASE = "release it, so that the shapes have their final outline"
-_ATTRIBUTE = "write it as an attribute of the shape"
-_REMEDIES = (
-    (
-        re.compile(r"transform.*|translate|rotate|scale|zoom|offset.*|motion.*|perspective.*"),
-        _APPLY,
-    ),
-    (re.compile(r"clip|clip-path|mask.*"), _RELEASE),
-    (re.compile(r"d|x|y|r|rx|ry|cx|cy|width|height"), _ATTRIBUTE),
-    (
-        re.compile(r"display|visibility"),
-        "remove what is hidden, or hide it by the attribute display of each shape",
-    ),
-)
-_NOTHING = {"clip-path", "mask", "filter", "transform", "translate", "rotate", "scale"}
 _ASIDE = re.compile(r"/\*.*?(?:\*/|$)|\"[^\"\n]*\"|'[^'\n]*'|url\([^)]*(?:\)|$)", re.DOTALL | re.I)
 _STATEMENT = re.compile(r"([^{};]*)([{};]|$)")
 
@@ -101,7 +58,7 @@ def refuse_attributes(tag: str, keys: dict[str, str], *, is_root: bool = False) 
         _refuse_property(key, value, f"as an attribute of <{tag}>")
 
 
-def style_properties(style: str) -> dict[str, str]:
+def style_properties(style: str, *, is_root: bool = False) -> dict[str, str]:
     """Properties of a style attribute that place or hide a shape; others change only its looks.
 
     Raises ValueError for one that is not understood, by its name.
@@ -112,6 +69,8 @@ def style_properties(style: str) -> dict[str, str]:
             if key in found:
                 raise ValueError(f"it has {key} twice in a style: keep one")
             found[key] = value
+        if key == "transform" and is_root:  # it turns about the middle of the page
+            raise ValueError(f"it has transform in a style of its root: {_APPLY}")
         if key != "transform":
             _refuse_property(key, value, "in a style")
     return found
@@ -125,7 +84,7 @@ def refuse_style_sheet(text: str) -> None:
         _refuse_property(key, value, "in a <style>")
 
 
-def hides(properties: dict[str, str], attributes: dict[str, str], key: str) -> str:
+def hiding_value(properties: dict[str, str], attributes: dict[str, str], key: str) -> str:
     """The value of display or visibility of an element; "" where it is inherited."""
     value = properties.get(key, attributes.get(key, "")).strip().lower()
     return "" if value == "inherit" else value

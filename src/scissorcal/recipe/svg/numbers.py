@@ -69,8 +69,9 @@ def view_to_mm(attributes: Mapping[str, str]) -> Matrix:
     said = attributes.get("viewBox")
     if said is None:
         return (MM_PER_PX, 0.0, 0.0, MM_PER_PX, 0.0, 0.0)
-    box = [finite(one) for one in re.split(r"[\s,]+", said.strip()) if _is_number(one)]
-    if len(box) != 4 or len(re.split(r"[\s,]+", said.strip())) != 4 or not min(box[2:]) > 0.0:
+    words = re.split(r"[\s,]+", said.strip())
+    box = [finite(one) for one in words if _is_number(one)]
+    if not len(words) == len(box) == 4 or not min(box[2:]) > 0.0:
         raise ValueError(
             f'its viewBox is "{said[:40]}": state four numbers, the last two above 0, so that '
             "lengths are known"

@@ -98,6 +98,8 @@ def _role(key: str, value: Any) -> str:
         return "model"
     if role == "group" and not _is_group(value) and not _camera_in(value):
         return "unknown" if isinstance(value, list) else "ignored"
+    if role in words.GROUPS and isinstance(value, list) and any(isinstance(v, dict) for v in value):
+        return "block" if _camera_in(value) else "unknown"
     looked_into = role in ("unknown", "model") or (role != "second" and not _is_group(value))
     return "block" if looked_into and _camera_in(value) else role
 

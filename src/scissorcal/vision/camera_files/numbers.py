@@ -76,7 +76,8 @@ def _with_rows(entry: Entry) -> NDArray[np.float64]:
     rows, columns = number_of(facts.get("rows")), number_of(facts.get("cols", facts.get("columns")))
     if rows is None or columns is None or numbers.ndim > 1:
         return numbers
-    if rows * columns != numbers.size:
+    whole = rows >= 0.0 and rows.is_integer() and columns.is_integer()
+    if not whole or rows * columns != numbers.size:
         raise RefusedError(
             f"it is a matrix of {rows:g} x {columns:g} with {numbers.size} numbers. "
             "Save the file again.",

@@ -12,6 +12,7 @@ _COLMAP = re.compile(
     r"\A(#[^\n]*\n)*\s*\d+\s+(SIMPLE_|FULL_|THIN_|RADIAL|PINHOLE|OPENCV|FOV|RAD_)\w*\s+\d+\s+\d+\s",
 )
 _INI = re.compile(r"\A\s*(#[^\n]*\n\s*)*\[image\]", re.IGNORECASE)
+_ASSIGNED = re.compile(r"[\w.]+\s*=")
 _AS_OPENCV = "width, height, camera_matrix and distortion_coefficients (k1, k2, p1, p2, k3)"
 
 
@@ -38,6 +39,13 @@ def refuse_other_text(text: str) -> None:
             "is what rs-enumerate-devices of RealSense prints. Import the topic of the camera: "
             "ros2 topic echo --once /camera/camera/color/camera_info > camera.yaml."
         )
+    lines = (line.strip() for line in text.splitlines())
+    first = next((line for line in lines if line and line[0] not in "#;%["), "")
+    if _ASSIGNED.match(first):
+        raise RefusedError(
+            "is a text of assignments (name = value), as of an INI file or of MATLAB. Write "
+            f"{_AS_OPENCV} as JSON."
+        )
     if "numpy." in text and "_reconstruct" in text:
         raise RefusedError(
             "holds numpy arrays as yaml.dump writes them. Write camera_matrix.tolist() and "
@@ -45,10 +53,15 @@ def refuse_other_text(text: str) -> None:
         )
 
 
-def refuse_matlab(tree: Mapping[str, Any]) -> None:
-    """Raise RefusedError on MATLAB's camera parameters, whose first pixel is at 1, 1."""
+def refuse_other_names(tree: Mapping[str, Any]) -> None:
+    """Raise RefusedError on names of MATLAB, whose first pixel is at 1, 1, or of Android."""
     inner = [key for value in tree.values() if isinstance(value, Mapping) for key in value]
     names = {*tree, *inner}
+    if "LENS_DISTORTION" in names:
+        raise RefusedError(
+            "has LENS_DISTORTION of Android, whose order is k1, k2, k3, p1, p2. Write them as "
+            "distortion_coefficients in the order k1, k2, p1, p2, k3."
+        )
     distortion = {"radialdistortion", "tangentialdistortion"} & {plain(key) for key in names}
     if distortion or {"FocalLength", "PrincipalPoint"} <= names or "IntrinsicMatrix" in names:
         raise RefusedError(

@@ -11,7 +11,7 @@ from scissorcal.foreign.formats import CAMERA
 from scissorcal.foreign.text_tree import parse_xml, parse_yaml
 from scissorcal.vision.camera_files.assembling import camera_of
 from scissorcal.vision.camera_files.keys import Facts, facts_of
-from scissorcal.vision.camera_files.origins import origin_of, refuse_matlab, refuse_other_text
+from scissorcal.vision.camera_files.origins import origin_of, refuse_other_names, refuse_other_text
 from scissorcal.vision.camera_files.refusal import RefusedError
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.opencv_storage import number_of
@@ -76,7 +76,7 @@ def _read(tree: Any, text: str) -> CameraFile:
         raise RefusedError(f"has {len(tree)} cameras in one list: keep only the rig's.")
     if not isinstance(tree, dict):
         raise RefusedError("is not a camera file of OpenCV, ROS or Kalibr: it has no names.")
-    refuse_matlab(tree)
+    refuse_other_names(tree)
     facts = facts_of(tree)
     camera, notes = camera_of(facts)
     return CameraFile(camera, origin_of(tree, text), _rms(facts), notes)

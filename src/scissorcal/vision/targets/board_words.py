@@ -11,9 +11,12 @@ FORMS = (
     "OpenCV before 4.6 drew an even number of rows"
 )
 
+LEAST_SQUARE_MM = 0.3
+"""Squares have millimetres to 200 mm, which in metres is 0.2, and half as much again."""
+
 _NUMBER = r"(\d+(?:\.\d+)?)"
-_CHESSBOARD = re.compile(rf"chessboard:(\d+)x(\d+):{_NUMBER}")
-_CHARUCO = re.compile(rf"charuco:(\d+)x(\d+):{_NUMBER}:{_NUMBER}:(\w+?)(:legacy)?")
+_CHESSBOARD = re.compile(rf"chessboard:(\d{{1,3}})x(\d{{1,3}}):{_NUMBER}")
+_CHARUCO = re.compile(rf"charuco:(\d{{1,3}})x(\d{{1,3}}):{_NUMBER}:{_NUMBER}:(\w+?)(:legacy)?")
 
 
 def board_from_words(words: str) -> CharucoBoard | Chessboard:
@@ -27,10 +30,10 @@ def board_from_words(words: str) -> CharucoBoard | Chessboard:
     if words == "camera":
         return CAMERA_BOARD
     if found := _CHESSBOARD.fullmatch(words):
-        columns, rows = int(found[1]), int(found[2])
-        if min(columns, rows) >= 3 and float(found[3]) > 0.0:
-            name = f"chessboard {columns}x{rows}"
-            return Chessboard(name, columns, rows, 1e-3 * float(found[3]))
+        columns, rows, square = int(found[1]), int(found[2]), float(found[3])
+        if min(columns, rows) >= 3 and square > 0.0:
+            _refuse_metres(square, words)
+            return Chessboard(f"chessboard {columns}x{rows}", columns, rows, 1e-3 * square)
     elif found := _CHARUCO.fullmatch(words):
         columns, rows, square, marker = (
             int(found[1]),
@@ -39,10 +42,19 @@ def board_from_words(words: str) -> CharucoBoard | Chessboard:
             float(found[4]),
         )
         if min(columns, rows) >= 3 and 0.0 < marker < square:
+            _refuse_metres(square, words)
             return _charuco(
                 columns, rows, 1e-3 * square, 1e-3 * marker, found[5], found[6] is not None
             )
     raise InputError(f"{words!r} is not a board: give {FORMS}, for example chessboard:9x6:25.")
+
+
+def _refuse_metres(square_mm: float, words: str) -> None:
+    if square_mm < LEAST_SQUARE_MM:
+        raise InputError(
+            f"{words!r} has squares of {square_mm:g} mm: give lengths in mm, {1e3 * square_mm:g} "
+            "where that is in metres."
+        )
 
 
 def words_of_board(board: CharucoBoard) -> str:

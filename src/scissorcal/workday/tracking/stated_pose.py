@@ -4,6 +4,8 @@ import math
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.euler_angles import EulerAngles, one_rotation
+from scissorcal.recipe.everyday import EVERYDAY
+from scissorcal.recipe.unlikely import bounds
 from scissorcal.tracking.plate_pose import level_plate
 from scissorcal.vision.geometry.pose import Pose
 
@@ -20,12 +22,15 @@ def stated_pose(text: str) -> Pose:
     space; z is 0 where it is not given. "20,10,4" is short for a plate that lies level on the rig's
     plane and rises by 4 degrees along the cut: that turn about the rig's z is its yaw.
 
-    Raises InputError where the text is no pose, or both rotations are given and differ.
+    Raises InputError where the text is no pose, both rotations are given and differ, or the place
+    or angles are in another unit.
 
     >>> stated_pose("20,10,4").euler_angles.words
     'yaw 4.00, pitch 0.00, roll -90.00 deg'
     """
-    return _by_keys(text) if "=" in text else _short(text)
+    pose = _by_keys(text) if "=" in text else _short(text)
+    _refuse_other_unit(pose, text)
+    return pose
 
 
 def _short(text: str) -> Pose:
@@ -64,6 +69,21 @@ def _by_keys(text: str) -> Pose:
     turn = one_rotation(quaternion, angles, "the stated pose")
     x, y, z = (1e-3 * given.get(key, 0.0) for key in _PLACE)
     return Pose(turn, (x, y, z))
+
+
+def _refuse_other_unit(pose: Pose, text: str) -> None:
+    """Refuse a place that no plate has in mm, as a recipe's place_mm is refused; 0 is one."""
+    size = 1e3 * max(map(abs, pose.translation_m))
+    least, most = bounds("plate.place_mm")
+    if size == 0.0 or least <= size <= most:
+        return
+    place = EVERYDAY["plate_place"]
+    near, far = (f"{1e3 * value:g}" for value in place.ends)
+    slip = f" Was it in m? {size:g} m = {1e3 * size:g} mm." if size < least else ""
+    raise InputError(
+        f"The pose '{text[:100]}' is {size:g} mm from the pivot, far from the everyday {near} to "
+        f"{far} mm ({place.why}).{slip} Give x, y and z in mm."
+    )
 
 
 def _refuse_radians(angles: EulerAngles, text: str) -> None:

@@ -4,6 +4,7 @@ import { SVGPathData } from "svg-pathdata";
 import { flattened, nested, Outline, Point } from "./outline";
 import { familyOf, withEdge } from "./design_state";
 import { Drawn, FAMILIES, Family, Layer, layerName } from "./pieces";
+import { shownShapes } from "./svg_names";
 
 const MOST_CHARACTERS = 2_000_000;
 const MOST_SHAPES = 400;
@@ -11,18 +12,13 @@ const MOST_POINTS = 4_000;
 const MOST_POINTS_OF_FILE = 20_000;
 const FLAT_mm = 0.02;
 const PIXEL_mm = 25.4 / 96;
-/** By SVGLength's numbers: none, px, cm, mm, in, pt, pc. */
-const UNITS_mm: Record<number, number | undefined> = {
-  1: PIXEL_mm, 5: PIXEL_mm, 6: 10, 7: 1, 8: 25.4, 9: 25.4 / 72, 10: 25.4 / 6,
+const UNITS_mm: Record<string, number | undefined> = {
+  "": PIXEL_mm, px: PIXEL_mm, cm: 10, mm: 1, in: 25.4, pt: 25.4 / 72, pc: 25.4 / 6,
 };
+const LENGTH = /^([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)([a-z%]*)$/i;
 
 const NAMESPACE = "http://www.w3.org/2000/svg";
-const DRAWN = new Set(["path", "rect", "circle", "ellipse", "polygon", "polyline"]);
 const KINDS = new Set(["cut", "edge", "outline", "hole", "region"]);
-/** What these hold is not itself in the picture. */
-const HIDES = /(?<![\w-])(display\s*:\s*none|visibility\s*:\s*(hidden|collapse))\b/i;
-const COMMENT = /\/\*[\s\S]*?(\*\/|$)/g;
-const NOT_SHOWN = "defs, symbol, clipPath, mask, pattern, marker, metadata, foreignObject";
 
 /** One element's outlines in mm, y up; `marks` are its data- attributes and those of its group. */
 export interface Shape {
@@ -36,44 +32,47 @@ export interface Shape {
 /**
  * The shapes of an SVG file: paths, rectangles, circles, ellipses, polygons and polylines.
  *
- * Curves become points within 0.02 mm. Nothing of the file is shown or run: scripts, styles, texts,
- * pictures and references are passed over, and so is what display or visibility hides; a style that
- * hides something is refused. Places are from the upper left corner of the page, y up
- * and so below 0; units are those of the width and the viewBox, a pixel (1/96 inch) where it states
- * none. Raises Error with a sentence.
+ * Curves become points within 0.02 mm. Nothing of the file is shown or run: texts, pictures and
+ * what display or visibility hides are passed over, and what is refused in a recipe's drawing is
+ * refused here, by its name. Places are from the upper left corner of the page, y up and so below
+ * 0; units are those of the width and the viewBox, a pixel (1/96 inch) where it states none.
+ * Raises Error with a sentence.
  */
 export function readSvg(text: string): Shape[] {
   if (text.length > MOST_CHARACTERS) throw new Error("This SVG file is larger than 2 MB: simplify it first.");
-  if (/<!ENTITY/i.test(text)) throw new Error("This SVG file defines entities, which are not read.");
+  if (text.startsWith("\x1f")) throw new Error("This SVG file is compressed (svgz): unpack it, or save it as plain SVG.");
+  if (/<!(ENTITY|ATTLIST)/i.test(text)) throw new Error("This SVG file defines entities or attributes, which are not read: save it as plain SVG.");
   const page = new DOMParser().parseFromString(text, "image/svg+xml");
   const root = page.documentElement;
   if (page.querySelector("parsererror") || root.namespaceURI !== NAMESPACE || root.localName !== "svg") {
     throw new Error("This is no SVG file: it does not parse as one.");
   }
-  for (const style of root.getElementsByTagNameNS("*", "style")) {
-    if (!HIDES.test((style.textContent ?? "").replace(COMMENT, " "))) continue;
-    throw new Error("This SVG file has a <style> that hides something: remove what is hidden, or hide it by the attribute display of each shape.");
+  try {
+    return shapesOf(page);
+  } catch (error) {
+    throw new Error(`This SVG file is not taken: ${(error as Error).message}.`);
   }
-  const svg = root as unknown as SVGSVGElement;
-  const [unit, box] = [unitOf(svg), svg.viewBox.baseVal];
-  const corner: Point = box ? [box.x, box.y] : [0, 0];
+}
+
+/** The shapes of a page. Raises Error, of words that say what is wrong with it. */
+function shapesOf(page: Document): Shape[] {
+  const view = viewOf(page.documentElement as unknown as SVGSVGElement);
   const found: Shape[] = [];
   let points = 0;
-  for (const element of root.querySelectorAll<SVGGeometryElement>("*")) {
-    if (!DRAWN.has(element.localName) || element.namespaceURI !== NAMESPACE || element.closest(NOT_SHOWN) || isHidden(element)) continue;
-    if (found.length === MOST_SHAPES) throw new Error(`This SVG file has more than ${MOST_SHAPES} shapes.`);
-    const contours = outlinesOf(element, unit, corner).filter(({ outline }) => outline.length >= 2);
+  for (const { element, matrix } of shownShapes(page)) {
+    if (found.length === MOST_SHAPES) throw new Error(`it has more than ${MOST_SHAPES} shapes`);
+    const contours = outlinesOf(element, view.multiply(matrix)).filter(({ outline }) => outline.length >= 2);
     const outlines = contours.map(({ outline }) => outline);
     points += outlines.reduce((sum, one) => sum + one.length, 0);
     if (points > MOST_POINTS_OF_FILE || outlines.some((one) => one.length > MOST_POINTS)) {
-      throw new Error(`This SVG file has an outline of more than ${MOST_POINTS} points, or ${MOST_POINTS_OF_FILE} in all.`);
+      throw new Error(`it has an outline of more than ${MOST_POINTS} points, or ${MOST_POINTS_OF_FILE} in all`);
     }
     if (outlines.flat(2).some((value) => !(Math.abs(value) < 1e5))) {
-      throw new Error("This SVG file has a place that is no number, or 100 m away.");
+      throw new Error("it has a place that is no number, or 100 m away");
     }
     if (outlines.length) found.push({ outlines, closed: contours.map(({ isClosed }) => isClosed), id: element.id, marks: marksOf(element) });
   }
-  if (!found.length) throw new Error("This SVG file has no path, rectangle, circle, ellipse, polygon or polyline.");
+  if (!found.length) throw new Error("it has no path, rectangle, circle, ellipse, polygon or polyline");
   return found;
 }
 
@@ -157,27 +156,48 @@ export function svgOf(drawn: Drawn): string {
   ].join("\n");
 }
 
-/** Millimetres of one user unit of the file. */
-function unitOf(root: SVGSVGElement): number {
-  const width = root.width.baseVal;
+/** The matrix from user units to mm on the page, y up. */
+function viewOf(root: SVGSVGElement): DOMMatrix {
+  const [width, height] = ["width", "height"].map((key) => {
+    const length = root.hasAttribute(key) ? mmOf(root, key) : null;
+    if (length !== null && !(length > 0)) throw new Error(`its ${key} is not above 0: state its lengths`);
+    return length;
+  });
+  if (!root.hasAttribute("viewBox")) return new DOMMatrix([PIXEL_mm, 0, 0, -PIXEL_mm, 0, 0]);
   const box = root.viewBox.baseVal;
-  const unit = root.hasAttribute("width") ? UNITS_mm[width.unitType] : undefined;
-  if (!box || !box.width || unit === undefined || !(width.valueInSpecifiedUnits > 0)) return PIXEL_mm;
-  return (unit * width.valueInSpecifiedUnits) / box.width;
+  if (!box || !(box.width > 0 && box.height > 0)) throw new Error("its viewBox is not four numbers, the last two above 0");
+  const across = width === null ? null : width / box.width;
+  const down = height === null ? null : height / box.height;
+  const scale = Math.min(across ?? Infinity, down ?? Infinity);
+  const unit = Number.isFinite(scale) ? scale : PIXEL_mm;
+  const [spareX, spareY] = [((across ?? unit) - unit) * box.width, ((down ?? unit) - unit) * box.height];
+  const fit = (root.getAttribute("preserveAspectRatio") ?? "xMidYMid").trim();
+  const isFilled = !spareX && !spareY;
+  if (!(isFilled ? /^(none|xM(in|id|ax)YM(in|id|ax)( +(meet|slice))?)$/ : /^xMidYMid( +meet)?$/).test(fit)) {
+    throw new Error(`its preserveAspectRatio="${fit.slice(0, 40)}" is not read: remove it, or save it as plain SVG`);
+  }
+  return new DOMMatrix([unit, 0, 0, -unit, 0.5 * spareX - unit * box.x, unit * box.y - 0.5 * spareY]);
 }
 
-function outlinesOf(element: SVGGeometryElement, unit: number, [left, top]: Point): { outline: Outline; isClosed: boolean }[] {
+/** A length in mm; one without a unit, or in px, is of pixels. */
+function mmOf(element: Element, key: string): number {
+  const text = (element.getAttribute(key) ?? "").trim();
+  const found = LENGTH.exec(text);
+  const unit = found ? UNITS_mm[found[2].toLowerCase()] : undefined;
+  if (!found || unit === undefined) throw new Error(`its ${key}="${text.slice(0, 40)}" is relative, or no length: state a number`);
+  return Number(found[1]) * unit;
+}
+
+function outlinesOf(element: SVGGeometryElement, matrix: DOMMatrix): { outline: Outline; isClosed: boolean }[] {
   const found: Outline[] = [];
   const shut = new Set<Outline>();
-  const matrix = placeOf(element);
-  const place = (x: number, y: number): Point => [
-    unit * (matrix.a * x + matrix.c * y + matrix.e - left), -unit * (matrix.b * x + matrix.d * y + matrix.f - top),
-  ];
+  const place = (x: number, y: number): Point => [matrix.a * x + matrix.c * y + matrix.e, matrix.b * x + matrix.d * y + matrix.f];
+  const path = pathOf(element);
   let data: SVGPathData;
   try {
-    data = new SVGPathData(pathOf(element)).toAbs().normalizeHVZ(false).normalizeST().aToC().qtToC();
+    data = new SVGPathData(path).toAbs().normalizeHVZ(false).normalizeST().aToC().qtToC();
   } catch {
-    throw new Error(`This SVG file has a ${element.localName} that is not written as SVG asks${element.id ? ` (${element.id})` : ""}.`);
+    throw new Error(`it has a ${element.localName} that is not written as SVG asks${element.id ? ` (${element.id})` : ""}`);
   }
   for (const command of data.commands) {
     const own = found[found.length - 1];
@@ -215,45 +235,21 @@ function round(value: number): number {
   return Math.round(value * 1e4) / 1e4 + 0;
 }
 
-/** Whether display, of it or of what it stands in, or visibility, which is inherited, hides an element. */
-function isHidden(element: Element): boolean {
-  let visibility = "";
-  for (let at: Element | null = element; at; at = at.parentElement) {
-    if (propertyOf(at, "display") === "none") return true;
-    visibility ||= propertyOf(at, "visibility");
-  }
-  return visibility === "hidden" || visibility === "collapse";
-}
-
-/** A property of an element, in its style or else as an attribute; "" where it is inherited. */
-function propertyOf(element: Element, name: string): string {
-  const said = (element.getAttribute("style") ?? "").replace(COMMENT, " ").split(";").map((one) => one.split(":"));
-  const own = said.filter(([key]) => key.trim().toLowerCase() === name).pop();
-  const value = (own ? own[1] ?? "" : element.getAttribute(name) ?? "").split("!")[0].trim().toLowerCase();
-  return value === "inherit" ? "" : value;
-}
-
-/** All transforms from the file's root down to an element. */
-function placeOf(element: SVGGraphicsElement): DOMMatrix {
-  let matrix = new DOMMatrix();
-  for (let at: Element | null = element; at; at = at.parentElement) {
-    const own = (at as SVGGraphicsElement).transform?.baseVal.consolidate()?.matrix;
-    if (own) matrix = new DOMMatrix([own.a, own.b, own.c, own.d, own.e, own.f]).multiply(matrix);
-  }
-  return matrix;
-}
-
 /** An element as the commands of a path. */
 function pathOf(element: SVGGeometryElement): string {
-  const length = (name: string): number => {
-    const animated = (element as unknown as Record<string, SVGAnimatedLength | undefined>)[name];
-    return animated ? animated.baseVal.value : 0;
+  const stated = (name: string): number | undefined => {
+    if ((element.getAttribute(name) ?? "auto").trim() === "auto") return undefined;
+    const value = mmOf(element, name) / PIXEL_mm;
+    if (value < 0 && !["x", "y", "cx", "cy"].includes(name)) throw new Error(`it has a <${element.localName}> of a size below 0: draw it anew`);
+    return value;
   };
-  if (element.localName === "path") return element.getAttribute("d") ?? "";
+  const length = (name: string): number => stated(name) ?? 0;
+  const radii = (): Point => [stated("rx") ?? length("ry"), stated("ry") ?? length("rx")];
+  const listed = (name: string): string => (element.getAttribute(name) ?? "").trim().replace(/^none$/, "");
+  if (element.localName === "path") return listed("d");
   if (element.localName === "rect") {
     const [x, y, w, h] = ["x", "y", "width", "height"].map(length);
-    const [rx0, ry0] = [length("rx"), length("ry")];
-    const [rx, ry] = [Math.min(rx0 || ry0, w / 2), Math.min(ry0 || rx0, h / 2)];
+    const [rx, ry] = [Math.min(radii()[0], w / 2), Math.min(radii()[1], h / 2)];
     if (!(w > 0 && h > 0)) return "";
     if (!rx || !ry) return `M${x} ${y}h${w}v${h}h${-w}z`;
     const corner = (dx: number, dy: number): string => `a${rx} ${ry} 0 0 1 ${dx} ${dy}`;
@@ -261,12 +257,13 @@ function pathOf(element: SVGGeometryElement): string {
   }
   if (element.localName === "circle" || element.localName === "ellipse") {
     const [cx, cy] = [length("cx"), length("cy")];
-    const [rx, ry] = element.localName === "circle" ? [length("r"), length("r")] : [length("rx"), length("ry")];
+    const [rx, ry] = element.localName === "circle" ? [length("r"), length("r")] : radii();
     if (!(rx > 0 && ry > 0)) return "";
     return `M${cx - rx} ${cy}a${rx} ${ry} 0 1 0 ${2 * rx} 0a${rx} ${ry} 0 1 0 ${-2 * rx} 0z`;
   }
-  const points = [...(element as SVGPolygonElement).points].map(({ x, y }) => `${x} ${y}`);
-  return points.length ? `M${points.join("L")}${element.localName === "polygon" ? "z" : ""}` : "";
+  const points = listed("points");
+  if (/[^\d\s.,e+-]/i.test(points)) throw new Error("its points are no numbers: draw it anew");
+  return points && `M${points}${element.localName === "polygon" ? "z" : ""}`;
 }
 
 function marksOf(element: SVGElement): Record<string, string> {
