@@ -79,7 +79,7 @@ def prototype(
         for thread in opening:
             thread.join(_OPENED_s)
             opener.unlink(missing_ok=True)
-    return Answer({"address": address, "options.device": device}, "the page is closed")
+    return Answer({"address": address, "device": options.device}, "the page is closed")
 
 
 def _open(url: str, opener: Path) -> None:
