@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from scissorcal.errors import InputError
 from scissorcal.foreign import read_foreign_text
 from scissorcal.foreign.formats import RECIPE, Format
-from scissorcal.recipe.locate import broken_statement
+from scissorcal.recipe.explain import broken_statement
 
 if TYPE_CHECKING:
     from pydantic import BaseModel

@@ -9,8 +9,7 @@ from pydantic import Field, Strict, model_validator
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.fields import Finite, Range, Thickness_mm
-from scissorcal.recipe.plate_surface import PlateSurface, Touch
-from scissorcal.recipe.plate_tracking import PlateTracking
+from scissorcal.recipe.plate_surface import PlateSurface, PlateTracking, Touch
 from scissorcal.recipe.priors import Section
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from scissorcal.recipe.locate import key_lines
+from scissorcal.recipe.explain import key_lines
 from scissorcal.recipe.priors import AnyPrior
 from scissorcal.recipe.schema import Recipe
 

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from scissorcal.errors import InputError, file_error
 from scissorcal.files import replacing
 from scissorcal.recipe.euler_angles import euler_deg, singular_within_deg
-from scissorcal.recording.channels import CHANNELS
 from scissorcal.recording.header import METADATA_NAME
-from scissorcal.recording.parquetfile import require_pyarrow
 from scissorcal.recording.recording import Recording, columns
 from scissorcal.recording.scan import scan_file
 from scissorcal.recording.schema import describe
-from scissorcal.recording.telemetry import TelemetryChannel
+from scissorcal.recording.table_file import require_pyarrow
+from scissorcal.recording.telemetry import CHANNELS, TelemetryChannel
 
 
 def export_table(recording: Recording, path: str | Path, *, overwrite: bool = False) -> Path:

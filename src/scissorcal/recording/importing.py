@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.recording.layout import MEASURED, empty_samples
-from scissorcal.recording.marks import lone_excursion, marks_in
-from scissorcal.recording.plausible import size_note
-from scissorcal.recording.quantities import Quantity, describe, quantity
+from scissorcal.recording.quantities import Quantity, describe, quantity, size_note
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
 from scissorcal.recording.resolution import (
@@ -34,6 +32,8 @@ from scissorcal.recording.wraps import (
     continued,
     continued_clock,
     jumps_in,
+    lone_excursion,
+    marks_in,
     overflows,
 )
 

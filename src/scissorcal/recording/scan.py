@@ -12,7 +12,6 @@ from scissorcal.foreign import read_foreign, reading
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.identity import bytes_digest
 from scissorcal.recording import layout
-from scissorcal.recording.channels import CHANNELS
 from scissorcal.recording.chunks import (
     LARGEST_CHUNK,
     ChunkPlaces,
@@ -23,7 +22,7 @@ from scissorcal.recording.chunks import (
 )
 from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, from_entries
-from scissorcal.recording.telemetry import TelemetryChannel, rows_of
+from scissorcal.recording.telemetry import CHANNELS, TelemetryChannel, rows_of
 
 LARGEST_RATIO = 100
 """Unpacked bytes for each byte of a file, beyond one chunk: samples of a rig at rest, without any

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import DeviceError, ScissorcalError
 from scissorcal.recording import layout
-from scissorcal.recording.partfile import create_locked, explained, seal
 from scissorcal.recording.recording import STOP_MARK, Joint, Kind, Recording, Stroke
-from scissorcal.recording.samplefile import SampleFile
+from scissorcal.recording.samplefile import SampleFile, create_locked, explained, seal
 from scissorcal.recording.schema import describe, stroke_records
 from scissorcal.recording.telemetry import TelemetryChannel
 

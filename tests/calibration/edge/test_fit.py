@@ -22,7 +22,7 @@ from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import load_recipe
 from scissorcal.vision.blade.borders import BorderPoints
 from scissorcal.vision.blade.measure import BladeMeasurement
-from scissorcal.vision.blade.parts import BladeParts
+from scissorcal.vision.blade.silhouette import BladeParts
 
 LENGTH = 0.075
 

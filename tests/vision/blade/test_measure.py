@@ -8,14 +8,14 @@ import pytest
 
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.measure import measure_blade
-from scissorcal.vision.blade.parts import lone_blade
 from scissorcal.vision.blade.photo import photograph_blade, photograph_scissors
 from scissorcal.vision.blade.picture import NickMark, blade_picture
+from scissorcal.vision.blade.silhouette import lone_blade
 from scissorcal.vision.blade.view import CameraView
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import Glare, Nick, Pose, blade_layer, render, target_layers
 from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD, MAT_PIVOT_M
-from scissorcal.vision.targets.marker_corners import linear_light
+from scissorcal.vision.targets.detect import linear_light
 from tests.vision.blade.scenes import (
     CAMERA,
     LENS,

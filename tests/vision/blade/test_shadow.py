@@ -8,10 +8,10 @@ import pytest
 from benchmarks.scissors import ALIKE, judged, photographed, true_edge
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.photo import by_blade, photograph_scissors
-from scissorcal.vision.blade.plain_view import PlainView
 from scissorcal.vision.blade.profile import outermost_sharp, steepest
+from scissorcal.vision.blade.view import PlainView
 from scissorcal.vision.sim import CastShadow, Lamp, Layer, Lens, Looks, Pose, render
 from tests.vision.blade.scenes import photo_of
 

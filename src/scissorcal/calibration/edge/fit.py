@@ -13,7 +13,7 @@ from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow
 from scissorcal.errors import InputError
 from scissorcal.inference import Effort
 from scissorcal.model import EdgeBelief, draw_edges, edge_height
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.blade.measure import BladeMeasurement
 from scissorcal.vision.blade.modes import smooth_slope

@@ -8,14 +8,18 @@ has the opposite sign, and the last term is written - J^T lambda.)
 """
 
 from scissorcal.model.blade_point import BladePoint
-from scissorcal.model.mechanism.axes import AxisLaw, rig_mechanism
-from scissorcal.model.mechanism.contact import Constraint, ContactLaw, Level, surface_constraint
 from scissorcal.model.mechanism.dynamics import (
+    AxisLaw,
     ConstrainedMotion,
+    Constraint,
+    ContactLaw,
+    Level,
     Mechanism,
     compliant_motion,
     constrained_motion,
     free_acceleration,
+    rig_mechanism,
+    surface_constraint,
 )
 
 __all__ = [

@@ -7,8 +7,8 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.model.surface.differential import curvatures
 from scissorcal.model.surface.height_field import HeightField
+from scissorcal.model.surface.protocol import curvatures
 
 FEWEST_POINTS = 25
 MOST_POINTS = 20_000

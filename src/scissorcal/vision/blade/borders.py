@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.vision.blade.parts import BladeParts
 from scissorcal.vision.blade.profile import (
     Crossings,
     Light,
@@ -16,6 +15,7 @@ from scissorcal.vision.blade.profile import (
     outermost_sharp,
     steepest,
 )
+from scissorcal.vision.blade.silhouette import BladeParts
 from scissorcal.vision.blade.view import View
 
 _MOST_POINTS = 3000

@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints, find_border, find_hole, fit_circle
 from scissorcal.vision.blade.modes import (
     SHARP,
@@ -16,8 +16,8 @@ from scissorcal.vision.blade.modes import (
     edge_modes,
     halving_stations,
 )
-from scissorcal.vision.blade.parts import BACK_FIRST, BACK_LAST, FIRST, LAST, BladeParts
 from scissorcal.vision.blade.profile import Light
+from scissorcal.vision.blade.silhouette import BACK_FIRST, BACK_LAST, FIRST, LAST, BladeParts
 from scissorcal.vision.blade.view import View
 
 _ANCHORS, _STRETCHES = 14, 30

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints
-from scissorcal.vision.blade.parts import BladeParts
+from scissorcal.vision.blade.silhouette import BladeParts
 from scissorcal.vision.blade.view import View
 
 SHARP = 1.4

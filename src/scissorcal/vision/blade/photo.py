@@ -5,18 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scissorcal.recipe.photograph_priors import BladePriors
-from scissorcal.vision.blade.lamp import lamp_direction
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
 from scissorcal.vision.blade.pair import PairLengths, measure_pair
-from scissorcal.vision.blade.parts import EdgeSide, lone_blade
-from scissorcal.vision.blade.plain_view import PlainView
-from scissorcal.vision.blade.scissors import Scissors, find_scissors
-from scissorcal.vision.blade.silhouette import LONGEST, Silhouette, silhouette
-from scissorcal.vision.blade.view import View, see_mat
+from scissorcal.vision.blade.scissors import Scissors, find_scissors, lamp_direction
+from scissorcal.vision.blade.silhouette import LONGEST, EdgeSide, Silhouette, lone_blade, silhouette
+from scissorcal.vision.blade.view import PlainView, View, see_mat
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
-from scissorcal.vision.targets.marker_corners import linear_light
+from scissorcal.vision.targets.detect import linear_light
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,28 @@ from typing import Literal
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.vision.camera_files.checks import check_coefficients, check_matrix, check_size
-from scissorcal.vision.camera_files.keys import Entry, Facts, is_off, is_zero
-from scissorcal.vision.camera_files.models import (
+from scissorcal.vision.camera_files.checks import (
+    array_at,
+    check_coefficients,
+    check_matrix,
+    check_size,
+    number_at,
+    size_at,
+    vector_at,
+)
+from scissorcal.vision.camera_files.keys import (
     ONLY_PINHOLE,
     Distortion,
+    Entry,
+    Facts,
+    RefusedError,
     distortion_of,
+    is_off,
+    is_zero,
     refused_model,
+    short,
+    shown,
 )
-from scissorcal.vision.camera_files.numbers import array_at, number_at, size_at, vector_at
-from scissorcal.vision.camera_files.refusal import RefusedError, short, shown
 from scissorcal.vision.camera_files.vocabulary import OWN
 from scissorcal.vision.geometry.camera import Camera
 

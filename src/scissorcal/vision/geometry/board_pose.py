@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.recipe.photograph_priors import PlatePriors
+from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
 from scissorcal.vision.targets.detect import Detection

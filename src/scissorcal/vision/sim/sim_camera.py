@@ -11,12 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recipe.library import specimen_path
-from scissorcal.vision.sim.blades import BladeShape, blade_layer, scissors_layers
-from scissorcal.vision.sim.lens import Lens, Pose, about
-from scissorcal.vision.sim.looks import Looks, as_jpeg
+from scissorcal.vision.sim.lens import Lens, Looks, Pose, about, as_jpeg
 from scissorcal.vision.sim.photograph import Layer, render
-from scissorcal.vision.sim.plate_scene import LEVEL, PlateScene, plate_scene
-from scissorcal.vision.sim.targets import target_layers
+from scissorcal.vision.sim.plate_scene import (
+    LEVEL,
+    BladeShape,
+    PlateScene,
+    blade_layer,
+    plate_scene,
+    scissors_layers,
+    target_layers,
+)
 from scissorcal.vision.targets.boards import (
     BLADE_MAT,
     MAT_PIVOT_M,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 
 from scissorcal.aliases import Say
 from scissorcal.errors import InputError
-from scissorcal.recipe.capture_cost import CaptureKind, capture_cost, refuse_long
 from scissorcal.recipe.load import parse_recipe, read_text
+from scissorcal.recipe.pace import CaptureKind, capture_cost, refuse_long
 from scissorcal.recipe.requirements import DesignedKind, requirements
 from scissorcal.recipe.show import with_designed_captures
 from scissorcal.workday.rigs import line_of, open_rig

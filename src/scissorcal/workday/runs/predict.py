@@ -150,7 +150,7 @@ def _read_table(path: Path, joint: "Joint", handle_radius_m: float) -> "Recordin
 
 def _headings(path: Path) -> list[str]:
     if path.suffix.lower() == ".parquet":
-        from scissorcal.recording.parquetfile import parquet_headings
+        from scissorcal.recording.table_file import parquet_headings
 
         return parquet_headings(path)
     import csv

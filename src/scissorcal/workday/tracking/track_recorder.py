@@ -14,7 +14,7 @@ from scissorcal.errors import InputError
 from scissorcal.foreign import parse_json, reading
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording import Joint, RecordingWriter, read_recording, read_telemetry
-from scissorcal.recording.plate_channels import (
+from scissorcal.recording.telemetry import (
     FRAME,
     OUTCOMES,
     PICTURE,
@@ -26,7 +26,7 @@ from scissorcal.recording.plate_channels import (
 )
 from scissorcal.tracking.follow import FollowedRow
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.seen_plate import SeenPlate
+from scissorcal.vision.geometry.rig_frame import SeenPlate
 from scissorcal.workday.tracking.pictures import TARGETS, PlatePicture
 
 TRACK_MARK = "track"
