@@ -8,7 +8,7 @@ import pytest
 from scissorcal.errors import DeviceError
 from scissorcal.recording import read_recording, read_telemetry
 from scissorcal.recording.telemetry import FRAME, PICTURE, POSE
-from scissorcal.vision.track import Frame
+from scissorcal.vision.live import Frame
 from scissorcal.workday.runs.capture import capture_advance_into, capture_into
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.tracking.sim_world import SimWorld

@@ -19,9 +19,9 @@ from scissorcal.recording import read_recording, read_telemetry
 from scissorcal.recording.telemetry import FRAME, PICTURE, POSE
 from scissorcal.vision.geometry.pose import Pose as Found
 from scissorcal.vision.geometry.pose import difference
+from scissorcal.vision.live import Frame
 from scissorcal.vision.sim import Pose, chained
 from scissorcal.vision.sim.sim_camera import OPENINGS_DEG, SIM_LENS, render_frame, sim_plate_scene
-from scissorcal.vision.track import Frame
 from tests.cli.conftest import Cli
 from tests.guard import GUARD_S
 

@@ -14,15 +14,15 @@ from scissorcal.calibration.signals.sensors import channels_of
 from scissorcal.calibration.signals.survey import survey
 from scissorcal.errors import InputError
 from scissorcal.recording import Joint, Recording, import_table
-from scissorcal.recording.layout import empty_samples
-from scissorcal.recording.quantities import size_note
-from scissorcal.recording.wraps import (
+from scissorcal.recording.faulty_values import (
     continued_clock,
     jumps_in,
     lone_excursion,
     marks_in,
     overflows,
 )
+from scissorcal.recording.layout import empty_samples
+from scissorcal.recording.quantities import size_note
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "logs"
 COUNT, RATE_HZ = 1600, 200.0

@@ -23,9 +23,9 @@ from scissorcal.recipe.plate_surface import probed_surface
 from scissorcal.recording import import_table, read_header, read_recording
 from scissorcal.recording.chunks import run_end
 from scissorcal.vision.camera_files import read_camera_file
+from scissorcal.vision.live import frames_of
 from scissorcal.vision.photo import read_photo
 from scissorcal.vision.stances import read_stances
-from scissorcal.vision.track import frames_of
 from tests.recording.logs import COLUMNS
 from tests.recording.made import made_samples, written_live
 

@@ -19,7 +19,7 @@ from scissorcal.vision.sim import (
     render,
     target_layers,
 )
-from scissorcal.vision.sim.lens import coverage
+from scissorcal.vision.sim.optics import coverage
 from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD
 
 SHARP = Looks(exposure=0.9, softness_px=0.0)

@@ -23,8 +23,8 @@ from scissorcal.tracking.consistency import pose_error
 from scissorcal.tracking.contacts import TipContacts
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import SeenPlate
+from scissorcal.vision.live import Frame
 from scissorcal.vision.sim.sim_camera import SIM_LENS
-from scissorcal.vision.track import Frame
 from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.inputs import REST_RATE_RAD_PER_S
 from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture

@@ -61,8 +61,8 @@ def camera(
         places 6 of 9, sizes 1 of 3, slants 1 of 5; wanted: upper left, left, lower left, ...
       ...
     """
-    from scissorcal.vision.coverage import ViewCoverage
     from scissorcal.vision.targets.boards import board_from_words
+    from scissorcal.vision.view_coverage import ViewCoverage
     from scissorcal.workday.runs.camera import capture_camera
 
     _refuse_two_sources(images, source)
@@ -267,9 +267,9 @@ def _take_in(
 def _board_pictures(
     source: str, board: "Board", seed: int, views: int, workspace: "Workspace", scratch: Path
 ) -> Iterable[Path]:
+    from scissorcal.vision.live import pick_frames
     from scissorcal.vision.sim.sim_camera import render_board_photographs
     from scissorcal.vision.targets.boards import Chessboard
-    from scissorcal.vision.track import pick_frames
 
     if source != "sim":
         return pick_frames(source, board, scratch, views)
@@ -281,9 +281,9 @@ def _board_pictures(
 def _plate_pictures(
     source: str, seed: int, views: int, workspace: "Workspace", scratch: Path
 ) -> Iterable[Path]:
+    from scissorcal.vision.live import pick_at_rest
     from scissorcal.vision.sim.sim_camera import render_plate_photographs, standing_plate
     from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
-    from scissorcal.vision.track import pick_at_rest
 
     if source == "sim":
         recipe = workspace.recipe()

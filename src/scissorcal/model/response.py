@@ -1,4 +1,8 @@
-"""The material's response g(delta): force at the edge against indentation."""
+"""The material's response g(delta): force at the edge against indentation.
+
+A power law, or a monotone spline between logarithms: a power law whose exponent changes from knot
+to knot.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property

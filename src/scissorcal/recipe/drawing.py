@@ -1,4 +1,4 @@
-"""Shapes of an SVG drawing as outlines in metres."""
+"""Shapes of an SVG drawing as outlines in metres; curves become polygons."""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
-"""How fast a capture moves between its strokes, and how long a movement takes.
+"""How fast a capture moves between its strokes, how long a movement takes, and what captures cost.
 
-A plan of a capture is made from these, and so is what it costs, before there is a rig.
+A plan of a capture is made from these before there is a rig. Costs (minutes at the rig, samples,
+bytes) are upper estimates from the recipe alone, at 1 kHz: a device's stops may shorten sweeps and
+a sheet may hold fewer strokes than the recipe allows, never more.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The plate's upper surface and what a touch of it is: recipe tables, and the surface itself."""
+"""The plate's upper surface, touches of it, and its tracking: recipe tables and surface."""
 
 from __future__ import annotations
 

@@ -1,7 +1,11 @@
-"""The forms of a prior in a recipe, and the priors of friction and of a cut.
+"""The forms of a prior in a recipe, and the priors of friction, of a cut and of photographs.
 
-Every default is an argument about machines of the kind, written beside its number (that of a row of
-friction in :mod:`scissorcal.model.friction_terms`); none is taken from the data that a fit judges.
+Every default is an argument about machines of the kind, or about boards, printers, cameras and
+blades, written beside its number (that of a row of friction in
+:mod:`scissorcal.model.friction_terms`); none is taken from the data that a fit judges. Shapes and
+roughness of a blade are in shares of its length, so that one default serves photographs with and
+without a scale; the length itself is measured and no parameter of the fit. A key with ``_sd`` in
+its name is the standard deviation of a quantity that is normal about zero.
 """
 
 from __future__ import annotations

@@ -5,6 +5,10 @@ another unit, or farther out: then a wrong unit explains it better than an uncom
 other units only those count whose everyday values lie outside the everyday range (where that holds
 0, clear of it by 1.5 on both sides), and no number within a factor of 1.5 of the everyday range is
 ever refused.
+
+The everyday range of each quantity stands here alone: what rigs, materials and hands of this kind
+usually have, in SI units and radians; a share is a number between 0 and 1. ``scissorcal bench
+extremes`` calls a state everyday by them.
 """
 
 import difflib

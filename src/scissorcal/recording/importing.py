@@ -11,6 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.recording.faulty_values import (
+    COUNTERS,
+    continued,
+    continued_clock,
+    jumps_in,
+    lone_excursion,
+    marks_in,
+    overflows,
+)
 from scissorcal.recording.layout import MEASURED, empty_samples
 from scissorcal.recording.quantities import Quantity, describe, quantity, size_note
 from scissorcal.recording.reader import content_hash
@@ -27,15 +36,6 @@ from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_cost, gap_note
 from scissorcal.recording.table import Table, shortened
 from scissorcal.recording.table_file import read_table, refuse_no_table
-from scissorcal.recording.wraps import (
-    COUNTERS,
-    continued,
-    continued_clock,
-    jumps_in,
-    lone_excursion,
-    marks_in,
-    overflows,
-)
 
 MOST_PLACES = 3
 """Places that a note lists."""

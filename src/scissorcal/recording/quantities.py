@@ -1,4 +1,4 @@
-"""Conversion of a column's numbers to SI: units, and scales such as newtons per volt."""
+"""Conversion of a column's numbers to SI: units, newtons per volt and the like, and size."""
 
 import math
 import re

@@ -1,4 +1,7 @@
-"""MCAP encoding: samples, notes and attachments into one open file, in small chunks."""
+"""MCAP encoding: samples, notes and attachments into one open file, in small chunks.
+
+An unfinished file is created under a lock and renamed when it is complete.
+"""
 
 import contextlib
 import os

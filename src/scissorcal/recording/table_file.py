@@ -1,4 +1,8 @@
-"""Read a table from a file of any kind that `import` and `summarise` take."""
+"""Read a table from a file of any kind that `import` and `summarise` take.
+
+MATLAB files are of version 5 (scipy) or 7.3 (which is HDF5); Parquet takes pyarrow, of the extra
+``parquet``; all else is text.
+"""
 
 import re
 from collections.abc import Iterator, Mapping

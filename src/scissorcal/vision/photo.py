@@ -1,4 +1,7 @@
-"""Read a photograph: upright, eight bits, limited in size."""
+"""Read a photograph: upright, eight bits, limited in size.
+
+Its bytes are decoded in the child process that `scissorcal.foreign` starts.
+"""
 
 import struct
 import warnings

@@ -14,7 +14,7 @@ from scissorcal.vision.blade.profile import crossings, sampled, steepest
 from scissorcal.vision.blade.silhouette import silhouette
 from scissorcal.vision.blade.view import PlainView
 from scissorcal.vision.photo import read_photo
-from scissorcal.vision.sim.lens import Looks, coverage, develop
+from scissorcal.vision.sim.optics import Looks, coverage, develop
 from scissorcal.vision.targets.detect import linear_light
 
 DATA = Path(__file__).parents[4] / "shared" / "data"

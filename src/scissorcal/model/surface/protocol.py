@@ -1,4 +1,10 @@
-"""What every surface gives: its level, the level's derivatives, and its nearest points."""
+"""What every surface gives (level, derivatives, nearest points), and plane, cylinder and sphere.
+
+Of these the level is phi0 = z + |C p|^2 / 2 R. C projects onto the directions that are curved: none
+of a plane, all of a sphere, those across the axis of a cylinder. The level is a polynomial, so that
+nothing is singular on an axis or at a centre, and a plane is the limit of large radii without
+cancellation.
+"""
 
 import math
 from abc import ABC, abstractmethod

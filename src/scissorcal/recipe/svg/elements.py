@@ -1,4 +1,10 @@
-"""The shapes of an SVG file: their paths, and the matrices that place them on the page."""
+"""The shapes of an SVG file: their paths, and the matrices that place them on the page.
+
+Elements, attributes and properties are of three kinds: what places or hides a shape and is read,
+what changes nothing of its outline, and the rest, which is refused by its name. Of
+https://www.w3.org/TR/SVG11/, https://www.w3.org/TR/SVG2/, https://www.w3.org/TR/css-transforms-1/
+and what Inkscape, Illustrator and CorelDRAW write.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
-"""Paths and lists of points as SVG writes them, in absolute commands of which each says all.
+"""Paths, lists of points, lengths and transforms as SVG and CSS write them.
 
-What breaks the grammar is refused: a viewer draws such a path in part, or not at all.
+Paths become absolute commands of which each says all. What breaks the grammar is refused: a viewer
+draws such a path in part or elsewhere, or not at all. Errors are ValueErrors that begin with what
+is wrong.
 """
 
 from __future__ import annotations

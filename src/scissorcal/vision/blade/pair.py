@@ -1,4 +1,7 @@
-"""Both blades of open scissors: measured in one plane, with the lengths against each other."""
+"""Both blades of open scissors: measured in one plane, with the lengths against each other.
+
+The end of each blade's metal is told from the end of its shadow.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Handles, blades, pivot and opening angle in the outline of scissors."""
+"""Handles, blades, pivot and opening angle in the outline of scissors, and their lamp's side."""
 
 from dataclasses import dataclass, replace
 from typing import Any

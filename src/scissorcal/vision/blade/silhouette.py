@@ -1,4 +1,4 @@
-"""The silhouette of a dark object on a bright sheet."""
+"""The silhouette of a dark object on a bright sheet, and the parts of a single blade in it."""
 
 from dataclasses import dataclass
 from typing import Any, Literal

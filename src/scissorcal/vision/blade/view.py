@@ -1,4 +1,7 @@
-"""The mapping from pixels to the sheet under a blade, with its covariance."""
+"""The mapping from pixels to the sheet under a blade, with its covariance.
+
+The sheet is the mat with its markers, or bare, under a camera that is held above it by hand.
+"""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol

@@ -6,15 +6,6 @@ from typing import Literal
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.vision.camera_files.checks import (
-    array_at,
-    check_coefficients,
-    check_matrix,
-    check_size,
-    number_at,
-    size_at,
-    vector_at,
-)
 from scissorcal.vision.camera_files.keys import (
     ONLY_PINHOLE,
     Distortion,
@@ -27,6 +18,15 @@ from scissorcal.vision.camera_files.keys import (
     refused_model,
     short,
     shown,
+)
+from scissorcal.vision.camera_files.values import (
+    array_at,
+    check_coefficients,
+    check_matrix,
+    check_size,
+    number_at,
+    size_at,
+    vector_at,
 )
 from scissorcal.vision.camera_files.vocabulary import OWN
 from scissorcal.vision.geometry.camera import Camera

@@ -1,4 +1,10 @@
-"""What each key of a camera file means: of the camera, without effect on it, or unknown."""
+"""What each key of a camera file means: of the camera, without effect on it, or unknown.
+
+The pinhole camera with radial and tangential distortion is plumb_bob and rational_polynomial in ROS
+(REP 104), radtan in Kalibr, PINHOLE in VINS and ORB-SLAM, Brown-Conrady in RealSense. OpenCV's file
+storage is read by Python alone: ``cv2.FileStorage`` 5.0 writes past its memory on a matrix with
+``rows`` and without ``cols``.
+"""
 
 import base64
 import math

@@ -1,4 +1,4 @@
-"""Read a camera file of OpenCV, ROS, Kalibr and others, recognised by its content."""
+"""Read a camera file of OpenCV, ROS, Kalibr and others; write one of OpenCV or ROS."""
 
 import math
 import re

@@ -1,4 +1,7 @@
-"""The camera's pose in the rig's frame, from a card of markers on the moving rig."""
+"""The camera's pose in the rig's frame, from a card of markers on the moving rig.
+
+With it, the plate's pose in one picture: what is new in that picture, and what all pictures share.
+"""
 
 from dataclasses import dataclass, replace
 

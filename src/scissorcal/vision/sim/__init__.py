@@ -3,9 +3,9 @@
 Nothing here is used by a fit, and nothing of a fit is used here except the printed targets' layout.
 """
 
-from scissorcal.vision.sim.lens import Lens, Looks, Pose, as_jpeg, random_looks
+from scissorcal.vision.sim.optics import Lens, Looks, Pose, as_jpeg, random_looks
 from scissorcal.vision.sim.photograph import CastShadow, Glare, Lamp, Layer, render
-from scissorcal.vision.sim.plate_scene import (
+from scissorcal.vision.sim.scenes import (
     BladeShape,
     Nick,
     PlateScene,

@@ -1,4 +1,4 @@
-"""Rendering of flat shapes in planes through a lens."""
+"""Rendering of flat shapes in planes through a lens, with their shadows."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.vision.sim.lens import Bytes, Lens, Looks, Picture, Pose, coverage, develop
+from scissorcal.vision.sim.optics import Bytes, Lens, Looks, Picture, Pose, coverage, develop
 
 _SAMPLES = 24
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recipe.library import specimen_path
-from scissorcal.vision.sim.lens import Lens, Looks, Pose, about, as_jpeg
+from scissorcal.vision.sim.optics import Lens, Looks, Pose, about, as_jpeg
 from scissorcal.vision.sim.photograph import Layer, render
-from scissorcal.vision.sim.plate_scene import (
+from scissorcal.vision.sim.scenes import (
     LEVEL,
     BladeShape,
     PlateScene,

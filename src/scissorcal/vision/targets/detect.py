@@ -1,4 +1,7 @@
-"""Detect a target in a photograph: its corners with subpixel accuracy, or why it is missing."""
+"""Detect a target in a photograph: its corners with subpixel accuracy, or why it is missing.
+
+Marker corners are intersections of a marker's sides, independent of blur and tone curve.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

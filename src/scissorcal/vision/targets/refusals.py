@@ -1,4 +1,9 @@
-"""Why a target was not found in a photograph: a sentence with the remedy."""
+"""Why a target was not found in a photograph: a sentence with the remedy.
+
+Where its markers are readable, the picture and its mirrored and inverted copies are searched for
+them, and where these lie is compared with the named layout, the layout of OpenCV before 4.6,
+columns and rows swapped, and other numbers of columns.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

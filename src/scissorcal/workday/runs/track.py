@@ -15,7 +15,7 @@ from scissorcal.recipe.plate_surface import LONGEST_DELAY_MS
 from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.track import STATES, State, camera_number, frames_of, timed
+from scissorcal.vision.live import STATES, State, camera_number, frames_of, timed
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM, line_of, open_rig
 from scissorcal.workday.runs.fit import load_result

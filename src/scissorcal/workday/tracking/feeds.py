@@ -99,7 +99,7 @@ def refuse_strange_pairs(camera: str, device: str) -> None:
             f"--camera {camera} and --device {device} do not show the same plate: the simulated "
             "camera goes with the simulated rig. Give both as sim, or one of them as none."
         )
-    from scissorcal.vision.track import camera_number
+    from scissorcal.vision.live import camera_number
 
     if device != "none" and camera not in ("none", "sim") and camera_number(camera) is None:
         raise InputError(

@@ -8,8 +8,8 @@ from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import RigPose, SeenPlate, seen_plate
+from scissorcal.vision.live import Frame, State, Tracked, track
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
-from scissorcal.vision.track import Frame, State, Tracked, track
 
 TARGETS = ("", PLATE_BOARD.name, PLATE_STRIP.name)
 """Names of targets, in the order of their numbers in a recording."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
 from scissorcal.verdicts import Verdict
-from scissorcal.vision.track import frames_of
+from scissorcal.vision.live import frames_of
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM, open_rig, set_line
 from scissorcal.workday.tracking import feeds, inputs

@@ -16,10 +16,10 @@ from scissorcal.device.sim.specimen import Specimen, TouchedPlate, load_specimen
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey
 from scissorcal.tracking.rotation import rotation_of, rotation_vector
-from scissorcal.vision.sim.lens import Pose
-from scissorcal.vision.sim.plate_scene import LEVEL
+from scissorcal.vision.live import Frame
+from scissorcal.vision.sim.optics import Pose
+from scissorcal.vision.sim.scenes import LEVEL
 from scissorcal.vision.sim.sim_camera import render_frame, sim_plate_scene
-from scissorcal.vision.track import Frame
 
 if TYPE_CHECKING:
     from scissorcal.device.motion import Motion

@@ -1,4 +1,11 @@
-"""Forward dynamics: accelerations and contact forces of a mechanism at one state."""
+"""Dynamics of the rig's two axes, or of any chain: free, constrained and in compliant contact.
+
+    D(q) qdd + n(q, qd) = tau + J^T lambda
+
+q are the axes, tau what drives them, J the gradient of a gap that is positive outside the material,
+and lambda >= 0 the force with which the material presses. (With a gap that is positive inside, J
+has the opposite sign, and the last term is written - J^T lambda.)
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,6 +18,21 @@ from scissorcal.aliases import Array
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.checks import SMALLEST, check_numbers
 from scissorcal.model.friction import FrictionLaw, friction_torque
+
+__all__ = [
+    "AxisLaw",
+    "BladePoint",
+    "ConstrainedMotion",
+    "Constraint",
+    "ContactLaw",
+    "Level",
+    "Mechanism",
+    "compliant_motion",
+    "constrained_motion",
+    "free_acceleration",
+    "rig_mechanism",
+    "surface_constraint",
+]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,7 @@
-"""Numbers that begin again: an angle after a full turn, a counter after its last number."""
+"""Numbers that begin again, as a counter after its last one, and those in a measurement's place.
+
+The latter are 9999, -32768, -1 and the like, for overflow and loss.
+"""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Whether a matrix is a camera's, with the figure where it is none."""
+"""Numbers, matrices and picture sizes of camera files, and whether a matrix is a camera's."""
 
 import re
 from typing import Any

@@ -1,4 +1,4 @@
-"""The pose of a target in each picture of a sequence, or why it has none."""
+"""Frames of a running camera or a video: photographs selected, and the pose of a target in each."""
 
 import math
 import time

@@ -1,4 +1,4 @@
-"""The rendered camera: where a point of the world falls on the picture."""
+"""The rendered camera: place and share of a pixel, light, blur, noise, tone and compression."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -219,7 +219,7 @@ def _line(length: float, angle: float) -> Picture:
 
 
 def _kernel(outline: NDArray[np.float64], half: int) -> Picture:
-    from scissorcal.vision.sim.lens import coverage
+    from scissorcal.vision.sim.optics import coverage
 
     covered = coverage([outline + half], 2 * half + 1, 2 * half + 1)
     return np.asarray(covered / covered.sum(), dtype=np.float32)

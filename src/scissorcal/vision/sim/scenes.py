@@ -1,4 +1,4 @@
-"""A plate and a rig's card before one camera, composed from exact geometry."""
+"""What the rendered camera sees: printed targets, blades with known edges, plate and card."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scissorcal.aliases import Array
-from scissorcal.vision.sim.lens import Pose, about
+from scissorcal.vision.sim.optics import Pose, about
 from scissorcal.vision.sim.photograph import Layer
 from scissorcal.vision.targets.boards import RIG_MARKERS, Board, Chessboard, MarkedBoard
 from scissorcal.vision.targets.sheet import board_ink
