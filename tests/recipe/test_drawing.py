@@ -14,7 +14,8 @@ import scissorcal
 from scissorcal.errors import InputError
 from scissorcal.foreign.formats import DRAWING
 from scissorcal.model.plate_pieces import Outline, spans_on_line
-from scissorcal.recipe.drawing import FLAT_MM, parse_drawing, read_drawing
+from scissorcal.recipe.drawing import parse_drawing, read_drawing
+from scissorcal.recipe.svg.curves import FLAT_MM
 from scissorcal.recipe.svg.elements import MOST_POINTS, MOST_POINTS_OF_FILE, MOST_SHAPES
 from tests.guard import GUARD_S
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field, Strict, model_validator
 
 from scissorcal.errors import InputError
+from scissorcal.recipe.drawing import Drawing, read_drawing
 from scissorcal.recipe.fields import Finite, Range, Thickness_mm
 from scissorcal.recipe.plate_surface import PlateSurface, PlateTracking, Touch
 from scissorcal.recipe.priors import Section
 
 if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import Layer, LayerPiece, Outline
-    from scissorcal.recipe.drawing import Drawing
 
 MOST_PIECES = 16
 MOST_STRIPS = 64
@@ -193,8 +193,6 @@ def drawn_layers(plate: Plate, folder: Path) -> tuple[Layer, ...]:
     ``folder`` is the recipe's, for its drawings. Raises InputError, with the file, where a drawing
     cannot be read, or lacks a shape.
     """
-    from scissorcal.recipe.drawing import read_drawing
-
     shapes = {name: read_drawing(folder / name) for name in plate.drawings}
     try:
         return tuple(_layer(layer, shapes) for layer in plate.layers)
@@ -209,8 +207,6 @@ def plate_pieces(plate: Plate, folder: Path) -> tuple[LayerPiece, ...]:
     ``folder`` is the recipe's, for its drawings. Raises InputError, with the file, where a drawing
     cannot be read, or the layers make no plate that can be cut.
     """
-    from scissorcal.recipe.drawing import read_drawing
-
     if not plate.layers:
         return ()
     shapes = {name: read_drawing(folder / name) for name in plate.drawings}

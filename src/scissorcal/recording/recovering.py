@@ -9,6 +9,7 @@ import numpy as np
 from scissorcal.errors import InputError
 from scissorcal.foreign import open_foreign
 from scissorcal.foreign.formats import RECORDING
+from scissorcal.locks import NO_LOCKS, try_lock
 from scissorcal.recording import layout
 from scissorcal.recording.samplefile import SampleFile, explained, is_same_file, seal
 from scissorcal.recording.scan import Attachment, Mark, Note, Scan, Sheet, Telemetry, scan_file
@@ -46,8 +47,6 @@ def recover(folder: str | Path) -> tuple[Recovered, ...]:
 
 
 def _recover_one(part: Path) -> Recovered | None:
-    from scissorcal.locks import NO_LOCKS, try_lock
-
     if not part.exists():
         return None
     with open_foreign(part, RECORDING) as stream, explained(part):

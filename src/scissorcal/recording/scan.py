@@ -1,10 +1,14 @@
 """Read the bytes of a recording and keep every complete part, whatever happened to the rest."""
 
+import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Attachment as Record
+from mcap.records import Channel, Metadata, Statistics
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
@@ -192,9 +196,6 @@ class Walk:
 
     def take(self, offset: int, opcode: int, body: bytes) -> None:
         """Take one record, which begins at ``offset`` of the file."""
-        from mcap.opcode import Opcode
-        from mcap.records import Statistics
-
         if opcode == Opcode.CHUNK:
             self._take_chunk(open_chunk(body, self.room))
         elif opcode == Opcode.CHANNEL:
@@ -209,8 +210,6 @@ class Walk:
             self.stated_count = stated.message_count - others
 
     def _take_metadata(self, offset: int, body: bytes) -> None:
-        from mcap.records import Metadata
-
         record = parse_record(Metadata, body)
         if record.name == NOTE_NAME:
             self.events.append(Note(record.metadata.get("note", "")))
@@ -231,8 +230,6 @@ class Walk:
             self.metadata = metadata
 
     def _take_channel(self, body: bytes) -> None:
-        from mcap.records import Channel
-
         if body in self.channels:
             return
         self.channels.add(body)
@@ -245,8 +242,6 @@ class Walk:
 
     def _take_chunk(self, data: bytes) -> None:
         """Take a chunk's records: runs of messages of one size and channel in one sweep each."""
-        from mcap.opcode import Opcode
-
         self.room -= len(data)
         runs: dict[int | None, list[memoryview]] = {}
         view, at, count = memoryview(data), 0, 0
@@ -331,10 +326,6 @@ def _too_long(data: bytes, chunks: "ChunkPlaces", offset: int, end: int) -> bool
 
 
 def _open_attachment(body: bytes) -> Attachment:
-    import zlib
-
-    from mcap.records import Attachment as Record
-
     record = parse_record(Record, body)
     if zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
         raise DamageError(f"attachment {record.name!r}, whose checksum does not match")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 
 from scissorcal.errors import DeviceError, InputError
@@ -150,8 +151,6 @@ def frames_of(source: str) -> Iterator[Frame]:
 
     Raises DeviceError where the camera gives none, InputError where the file is no video.
     """
-    import cv2
-
     number = camera_number(source)
     if number is None and not Path(source).exists():
         raise InputError(f"{source} does not exist: give a video file, or a camera's number.")
@@ -270,8 +269,6 @@ def _moved(one: Detection | None, other: Detection | None) -> float:
 
 
 def _stored(frame: Any, path: Path) -> Path:
-    import cv2
-
     with replacing(path) as part:
         part.write_bytes(cv2.imencode(".png", frame)[1].tobytes())
     return path

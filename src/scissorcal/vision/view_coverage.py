@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from scissorcal.aliases import Array
@@ -69,8 +70,6 @@ def slant_of(detection: Detection, width: int, height: int) -> tuple[float, floa
 
     That is enough to classify slants.
     """
-    import cv2
-
     matrix = usual_camera(width, height).matrix
     _, turns, _, _ = cv2.solvePnPGeneric(
         detection.points, detection.pixels, matrix, None, flags=cv2.SOLVEPNP_IPPE

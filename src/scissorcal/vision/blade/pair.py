@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import hypot
 
+import cv2
 import numpy as np
 
 from scissorcal.aliases import Array
@@ -219,8 +220,6 @@ def _pixels_per_unit(view: View, parts: BladeParts, station: float) -> float:
 
 def _sampled_sharpness(light: Light, pixels: Array, soft: float) -> Array:
     """Sharpness of the picture at pixels (n, 2): as `outermost_sharp` has it, in two directions."""
-    import cv2
-
     low = np.floor(pixels.min(axis=0)).astype(int) - 12
     high = np.ceil(pixels.max(axis=0)).astype(int) + 13
     rows, columns = light.shape

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
+import cv2
 import numpy as np
 
 from scissorcal.aliases import Array
@@ -110,8 +111,6 @@ def _refuse_others(shape: Silhouette, source: str) -> None:
 
 
 def _rings(shape: Silhouette) -> tuple[Array, ...]:
-    import cv2
-
     size = float(np.ptp(shape.outer, axis=0).max())
     found = []
     for hole in shape.holes:
@@ -131,8 +130,6 @@ def _prongs(outline: Array) -> str:
 
 def _notches(outline: Array) -> list[tuple[int, int, int, float]]:
     """Start, end, deepest point (indices) and depth of an outline's convexity defects."""
-    import cv2
-
     scale = 1e4 / float(np.ptp(outline, axis=0).max())
     whole = np.rint((outline - outline.min(axis=0)) * scale).astype(np.int32)[:, None, :]
     hull = np.sort(cv2.convexHull(whole, returnPoints=False).ravel())[::-1]
@@ -254,8 +251,6 @@ def _best_screw(
     A circle is clear where the light changes across most of its length, in either sense. Larger
     circles score higher than a glint, and those with structure inside higher than even patches.
     """
-    import cv2
-
     centre = shape.grid(near)
     size = length / shape.pixel
     light = np.clip(shape.relative * 170.0, 0, 255).astype(np.uint8)
@@ -346,8 +341,6 @@ def lamp_direction(shape: Silhouette, scissors: Scissors) -> float | None:
     farther than on the other. Each darkened place counts with its darkness and its direction from
     the nearest place of the silhouette.
     """
-    import cv2
-
     inside = (shape.mask > 0).astype(np.uint8)
     distance, nearest = cv2.distanceTransformWithLabels(
         1 - inside, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL

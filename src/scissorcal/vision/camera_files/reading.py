@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 
 from scissorcal.errors import InputError, file_error
@@ -201,8 +202,6 @@ def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "cam
 
 
 def _opencv_text(camera: Camera, ending: str) -> str:
-    import cv2
-
     kinds = {".xml": cv2.FILE_STORAGE_FORMAT_XML, ".json": cv2.FILE_STORAGE_FORMAT_JSON}
     flags = cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY
     storage = cv2.FileStorage("", flags | kinds.get(ending, cv2.FILE_STORAGE_FORMAT_YAML))

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -132,8 +133,6 @@ def develop(radiance: Picture, looks: Looks, rng: np.random.Generator) -> Bytes:
 
 def as_jpeg(picture: Bytes, quality: int) -> bytes:
     """Compress a picture as a camera would."""
-    import cv2
-
     done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not done:
         raise InputError("The rendered picture cannot be stored as JPEG.")
@@ -160,8 +159,6 @@ def random_looks(rng: np.random.Generator, px_per_mm: float, strength: float = 1
 
 def _toned(index: NDArray[np.uint16], looks: Looks) -> Bytes:
     """Bytes (h, w, 3) of light in steps (h, w), looked up as one word of four bytes a pixel."""
-    import cv2
-
     levels = np.arange(int(_STEPS * _HEADROOM) + 1, dtype=np.float32) / _STEPS
     table = np.zeros((len(levels), 4), dtype=np.uint8)
     for channel, share in enumerate(looks.tint):
@@ -186,8 +183,6 @@ def _lit(radiance: Picture, looks: Looks) -> Picture:
 
 
 def _blurred(picture: Picture, looks: Looks) -> Picture:
-    import cv2
-
     kernel = None
     if looks.defocus_px > 0.05:
         kernel = _disc(looks.defocus_px)
@@ -219,15 +214,11 @@ def _line(length: float, angle: float) -> Picture:
 
 
 def _kernel(outline: NDArray[np.float64], half: int) -> Picture:
-    from scissorcal.vision.sim.optics import coverage
-
     covered = coverage([outline + half], 2 * half + 1, 2 * half + 1)
     return np.asarray(covered / covered.sum(), dtype=np.float32)
 
 
 def _convolved(one: Picture, other: Picture) -> Picture:
-    import cv2
-
     room = (other.shape[0] - 1) // 2
     wide = np.pad(one, room)
     return np.asarray(cv2.filter2D(wide, -1, other, borderType=cv2.BORDER_CONSTANT))

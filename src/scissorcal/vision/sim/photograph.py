@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from scissorcal.aliases import Array
@@ -131,8 +132,6 @@ def _lay(radiance: Picture, layer: Layer, lens: Lens, rng: np.random.Generator) 
 
 
 def _cast_shadow(radiance: Picture, layer: Layer, lens: Lens) -> None:
-    import cv2
-
     moved = [np.asarray(outline) + layer.shadow_m for outline in layer.outlines_m]
     seen = _seen(moved, layer, lens)
     soft = layer.shadow_soft_m * lens.focal_px / float(layer.pose.shift_m[2])
@@ -157,8 +156,6 @@ def _shade(
     layer: Layer, lens: Lens, box: tuple[int, int, int, int], rng: np.random.Generator
 ) -> Picture | np.float32:
     """Reflectance over a box of pixels; metal's changes slowly, so every fourth pixel is enough."""
-    import cv2
-
     plain = np.float32(layer.reflectance)
     if not (any(layer.shading) or layer.brushed or layer.glares):
         return plain
@@ -186,8 +183,6 @@ def _shade(
 
 def _texture(layer: Layer, lens: Lens, shape: tuple[int, int], rng: np.random.Generator) -> Picture:
     """Relative light of a rough material over a box of pixels, about 1."""
-    import cv2
-
     reach = max(layer.texture_m * lens.focal_px / float(layer.pose.shift_m[2]), 0.3)
     grain = cv2.GaussianBlur(rng.standard_normal(shape, dtype=np.float32), (0, 0), reach)
     rough = np.asarray(grain, dtype=np.float32)
@@ -245,8 +240,6 @@ def cast(radiance: Picture, shadow: CastShadow, lens: Lens) -> None:
     The lamp's disc is a set of points, each of which casts a sharp shadow, so that the penumbra
     widens with the height above the sheet as it does under a real lamp.
     """
-    import cv2
-
     number = np.arange(_SAMPLES)
     disc = np.sqrt((number + 0.5) / _SAMPLES)[:, None] * np.column_stack(
         [np.cos(_GOLDEN * number), np.sin(_GOLDEN * number)]

@@ -5,12 +5,13 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recipe.library import specimen_path
+from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.sim.optics import Lens, Looks, Pose, about, as_jpeg
 from scissorcal.vision.sim.photograph import Layer, render
 from scissorcal.vision.sim.scenes import (
@@ -29,9 +30,6 @@ from scissorcal.vision.targets.boards import (
     Board,
     MarkedBoard,
 )
-
-if TYPE_CHECKING:
-    from scissorcal.recipe.schema import Recipe
 
 SIM_LENS = Lens(1900.0, (1003.2, 744.9), 2000, 1500, (-0.08, 0.03, 4e-4, -3e-4, 0.0))
 """The lens of every rendered photograph."""

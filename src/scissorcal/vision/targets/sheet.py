@@ -8,10 +8,13 @@ no scaling by the printer (12.2, PrintScaling). The PNG has 20 pixels per millim
 import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+import cv2
 import numpy as np
+from PIL import Image, ImageDraw, ImageFont
 
 from scissorcal.errors import file_error
 from scissorcal.files import replacing
@@ -26,10 +29,6 @@ from scissorcal.vision.targets.boards import (
     MarkedBoard,
     dictionary,
 )
-
-if TYPE_CHECKING:
-    from PIL import Image
-from itertools import accumulate
 
 _POINTS_PER_MM = 72.0 / 25.4
 
@@ -148,8 +147,6 @@ def board_ink(
 
 
 def _marker(board: MarkedBoard, marker: int, x: float, y: float, cells: int) -> Iterator[Rectangle]:
-    import cv2
-
     bits = cv2.aruco.generateImageMarker(dictionary(board.dictionary), marker, cells) == 0
     cell = 1e3 * board.marker_m / cells
     for row, dark in enumerate(bits):
@@ -268,8 +265,6 @@ def sheet_png(sheet: Sheet) -> bytes:
 
 def sheet_picture(sheet: Sheet) -> "Image.Image":
     """Draw a sheet at `PIXELS_PER_MM`."""
-    from PIL import Image, ImageDraw, ImageFont
-
     scale = PIXELS_PER_MM
     picture = Image.new("L", (round(sheet.width * scale), round(sheet.height * scale)), 255)
     draw = ImageDraw.Draw(picture)
