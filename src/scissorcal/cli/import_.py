@@ -111,7 +111,7 @@ def import_(
     if output and len(files) > 1:
         raise InputError(f"--output names one file, and {len(files)} logs are given.")
 
-    from scissorcal.recording import Joint, import_table, write_recording
+    from scissorcal.recording import ImportOptions, Joint, import_table, write_recording
     from scissorcal.recording.table import column_of
 
     workspace = None if output else open_workspace(folder)
@@ -127,13 +127,15 @@ def import_(
             units=unit_of,
             scale=scale_of,
             rate_Hz=rate_Hz,
-            joint=Joint(joint or (rig.joint if rig else "rotary")),
-            kind=kind,
-            handle_radius_m=radius_mm * 1e-3 if radius_mm else math.nan,
-            min_travel=min_travel,
-            allow_gaps=allow_gaps,
-            drop_last_line=drop_last_line,
-            delimiter=delimiter,
+            options=ImportOptions(
+                joint=Joint(joint or (rig.joint if rig else "rotary")),
+                kind=kind,
+                handle_radius_m=radius_mm * 1e-3 if radius_mm else math.nan,
+                min_travel=min_travel,
+                allow_gaps=allow_gaps,
+                drop_last_line=drop_last_line,
+                delimiter=delimiter,
+            ),
         )
         target = output or (workspace.new_recording(kind) if workspace else None)
         assert target is not None

@@ -90,7 +90,7 @@ def summarise(
     )
     from scissorcal.files import replacing
     from scissorcal.identity import VERSION
-    from scissorcal.recording import Joint, import_table, read_recording
+    from scissorcal.recording import ImportOptions, Joint, import_table, read_recording
     from scissorcal.recording.table import column_of
     from scissorcal.recording.table_file import refuse_no_table
     from scissorcal.report.summary import Shown, summary_page, summary_panels
@@ -117,13 +117,15 @@ def summarise(
             units=unit_of,
             scale=scale_of,
             rate_Hz=rate_Hz,
-            joint=Joint(joint),
-            handle_radius_m=handle_radius_mm * 1e-3 if handle_radius_mm else math.nan,
-            min_travel=min_travel,
-            allow_gaps=allow_gaps,
-            drop_last_line=drop_last_line,
-            delimiter=delimiter,
-            motion_only=True,
+            options=ImportOptions(
+                joint=Joint(joint),
+                handle_radius_m=handle_radius_mm * 1e-3 if handle_radius_mm else math.nan,
+                min_travel=min_travel,
+                allow_gaps=allow_gaps,
+                drop_last_line=drop_last_line,
+                delimiter=delimiter,
+                motion_only=True,
+            ),
         )
         # A page that is passed on tells nothing of the disk.
         named = replace(recording, source=path.name)

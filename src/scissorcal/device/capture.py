@@ -30,7 +30,7 @@ from scissorcal.device.trajectory import Plan, friction_plan
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
+from scissorcal.recording import Joint, Kind, RecordingFacts, RecordingWriter, Stroke
 from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult, RestFacts
 
 SUPERVISOR_S = 0.3
@@ -82,11 +82,13 @@ def open_writer(
         path,
         kind,
         Joint(recipe.rig.joint),
-        recipe_toml,
-        rig_facts(identity, recipe.rig.motor_sign, probe),
-        identity.handle_radius,
-        strokes,
-        min_travel=hand_travel(recipe, identity) if hand else None,
+        facts=RecordingFacts(
+            recipe_toml=recipe_toml,
+            device=rig_facts(identity, recipe.rig.motor_sign, probe),
+            handle_radius_m=identity.handle_radius,
+            strokes=strokes,
+            min_travel=hand_travel(recipe, identity) if hand else None,
+        ),
     )
 
 

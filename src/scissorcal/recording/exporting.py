@@ -14,7 +14,7 @@ from scissorcal.recipe.euler_angles import euler_deg, singular_within_deg
 from scissorcal.recording.header import METADATA_NAME
 from scissorcal.recording.recording import Recording, columns
 from scissorcal.recording.scan import scan_file
-from scissorcal.recording.schema import describe
+from scissorcal.recording.schema import RecordingFacts, describe
 from scissorcal.recording.table_file import require_pyarrow
 from scissorcal.recording.telemetry import CHANNELS, TelemetryChannel
 
@@ -34,10 +34,9 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
     metadata = describe(
         recording.kind,
         recording.joint,
-        recording.handle_radius_m,
-        recording.strokes,
-        recording.recipe_toml,
-        recording.device,
+        RecordingFacts(
+            recording.recipe_toml, recording.device, recording.handle_radius_m, recording.strokes
+        ),
     )
     about = {
         METADATA_NAME: metadata.model_dump_json(),

@@ -4,7 +4,7 @@ import difflib
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +45,30 @@ SHORT_SHARE, MANY = 0.25, 20
 """More strokes than MANY, half of them shorter than this share of the range, are worth a note."""
 
 
+@dataclass(frozen=True)
+class ImportOptions:
+    """What a table does not say of itself, and how strictly it is read.
+
+    ``joint``, ``kind`` and ``handle_radius_m`` (NaN: not known) are the recording's. A stroke
+    travels at least ``min_travel`` [rad, or m]; where that is not given, so far that neither noise
+    nor steps of the sensor make a stroke (`stroke_threshold`), which a note states.
+
+    A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
+    it and notes it. ``delimiter`` is the text's (None: found). The last line of a text file is
+    left out where it has no end, unless ``drop_last_line`` is false. ``motion_only`` says that
+    neither force nor torque was measured.
+    """
+
+    joint: Joint = Joint()
+    kind: Kind = "friction"
+    handle_radius_m: float = math.nan
+    min_travel: float | None = None
+    allow_gaps: bool = False
+    delimiter: str | None = None
+    drop_last_line: bool = True
+    motion_only: bool = False
+
+
 def import_table(
     path: str | Path,
     *,
@@ -52,14 +76,7 @@ def import_table(
     units: Mapping[str, str] | None = None,
     scale: Mapping[str, str | float] | None = None,
     rate_Hz: float | None = None,
-    joint: Joint | None = None,
-    kind: Kind = "friction",
-    handle_radius_m: float = math.nan,
-    min_travel: float | None = None,
-    allow_gaps: bool = False,
-    delimiter: str | None = None,
-    drop_last_line: bool = True,
-    motion_only: bool = False,
+    options: ImportOptions = ImportOptions(),
 ) -> Recording:
     """Read a table as a recording, in SI, with strokes found from the motion.
 
@@ -74,15 +91,11 @@ def import_table(
     may also stand in the headings; ``scale`` multiplies a column: a number, or single variables
     of the .mat file joined by * and /, as in ``{"motor_torque": "gtau"}`` for a gain in N/V.
 
-    A stroke travels at least ``min_travel`` [rad, or m]; where that is not given, so far that
-    neither noise nor steps of the sensor make a stroke (`stroke_threshold`), which a note states.
-    The last line of a text file is left out where it has no end, unless ``drop_last_line`` is
-    false. A clock that begins again after a counter's last number, a second, minute, hour or day is
+    A clock that begins again after a counter's last number, a second, minute, hour or day is
     continued, with a note; so is an angle that begins again after a full turn, or a counter after
     its last number. Other jumps of the opening, and forces that pass a counter's end, are noted.
 
-    A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
-    it and notes it. Both clocks begin at 0 and are rounded to 1 us.
+    Both clocks begin at 0 and are rounded to 1 us. `ImportOptions` has the rest.
 
     Raises InputError, naming the line (or row), the column and the remedy: text, empty cells, NaN,
     time that repeats or decreases, gaps, unknown columns and units.
@@ -92,14 +105,13 @@ def import_table(
     ...     columns={"time": "t", "opening": "qm", "motor_torque": "vir"},
     ...     units={"time": "s", "opening": "m", "motor_torque": "V"},
     ...     scale={"motor_torque": "gtau"},
-    ...     joint=Joint("linear"),
+    ...     options=ImportOptions(joint=Joint("linear")),
     ... )
     """
-    path, joint = Path(path), joint or Joint()
+    path, joint = Path(path), options.joint
     units, scale = units or {}, scale or {}
-    wanted = () if motion_only else ("motor_torque", "handle_force")
-    _check_request(path, columns, units, scale, rate_Hz, handle_radius_m, min_travel, wanted)
-    table = read_table(path, columns, delimiter, drop_last_line=drop_last_line)
+    _check_request(path, columns, (*units, *scale), rate_Hz, options)
+    table = read_table(path, columns, options.delimiter, drop_last_line=options.drop_last_line)
     quantities = {
         channel: quantity(table, channel, units.get(channel), scale.get(channel), joint)
         for channel in columns
@@ -114,19 +126,19 @@ def import_table(
     else:
         table, wrapped = _clock_goes_on(table, quantities["time"].factor)
         said += wrapped
-        _set_clock(samples, table, quantities["time"].factor, allow_gaps=allow_gaps)
+        _set_clock(samples, table, quantities["time"].factor, allow_gaps=options.allow_gaps)
     said += _told_of_jumps(samples, table, joint)
-    strokes, found, odd = _label(samples, joint, min_travel)
+    strokes, found, odd = _label(samples, joint, options.min_travel)
     said += [*odd, *_sizes(samples, quantities, joint)]
     digest = content_hash(path)
     source = f"{path.name} (sha256:{digest[:16]})"
     particular = _particular(quantities, samples, said)
     return Recording(
-        kind=kind,
+        kind=options.kind,
         samples=samples,
         strokes=strokes,
         joint=joint,
-        handle_radius_m=handle_radius_m,
+        handle_radius_m=options.handle_radius_m,
         source=str(path),
         content_hash=digest,
         notes=(*_general(source, columns, quantities), found, *particular),
@@ -137,16 +149,15 @@ def import_table(
 def _check_request(
     path: Path,
     columns: Mapping[str, str | int],
-    units: Mapping[str, str],
-    scale: Mapping[str, str | float],
+    converted: tuple[str, ...],
     rate_Hz: float | None,
-    handle_radius_m: float,
-    min_travel: float | None,
-    wanted: tuple[str, ...],
+    options: ImportOptions,
 ) -> None:
-    """Check the arguments; of the channels ``wanted``, if any, one must be named."""
+    """Check the arguments; ``converted`` are the channels with a unit or scale."""
+    wanted = () if options.motion_only else ("motor_torque", "handle_force")
+    min_travel = options.min_travel
     known = ("time", *MEASURED)
-    for name in (*columns, *units, *scale):
+    for name in (*columns, *converted):
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
             hint = f"Did you mean {near[0]!r}? " if near else ""
@@ -163,7 +174,7 @@ def _check_request(
             f"{path}: no column is given for {' or '.join(wanted)}. Name one of them with "
             "-c CHANNEL=COLUMN."
         )
-    if wanted and "handle_force" in columns and not handle_radius_m > 0:
+    if wanted and "handle_force" in columns and not options.handle_radius_m > 0:
         raise InputError(
             f"{path}: handle_force needs the handle radius, which is not known. Give it."
         )

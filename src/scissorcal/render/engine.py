@@ -15,7 +15,7 @@ from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, PlateConfig, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
-from scissorcal.recording import Joint, RecordingWriter
+from scissorcal.recording import Joint, RecordingFacts, RecordingWriter
 from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult
 from scissorcal.render.admission import (
     Admission,
@@ -226,10 +226,12 @@ def open_writer(
         path,
         "render",
         Joint("rotary"),
-        recipe_toml,
-        rig_facts(link.identity, motor_sign, probe),
-        link.identity.handle_radius,
-        min_travel=_travel(package),
+        facts=RecordingFacts(
+            recipe_toml=recipe_toml,
+            device=rig_facts(link.identity, motor_sign, probe),
+            handle_radius_m=link.identity.handle_radius,
+            min_travel=_travel(package),
+        ),
     )
     manifest = package.manifest.model_dump_json(indent=2).encode("utf-8")
     writer.attach("package-manifest.json", manifest, "application/json")

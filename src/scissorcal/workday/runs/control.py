@@ -269,16 +269,18 @@ def _open_writer(
     path: Path, link: "Link", workspace: Workspace, path_file: Path, probe: "ProbeResult"
 ) -> "RecordingWriter":
     from scissorcal.device.rig_record import rig_facts
-    from scissorcal.recording import Joint, RecordingWriter
+    from scissorcal.recording import Joint, RecordingFacts, RecordingWriter
 
     recipe = workspace.recipe()
     writer = RecordingWriter(
         path,
         "control",
         Joint("rotary"),
-        read_text(workspace.recipe_path),
-        rig_facts(link.identity, recipe.rig.motor_sign, probe),
-        link.identity.handle_radius,
+        facts=RecordingFacts(
+            recipe_toml=read_text(workspace.recipe_path),
+            device=rig_facts(link.identity, recipe.rig.motor_sign, probe),
+            handle_radius_m=link.identity.handle_radius,
+        ),
     )
     writer.attach("path.csv", read_foreign(path_file, PATH), "text/csv")
     return writer

@@ -120,7 +120,7 @@ def read_motion(path: Path, joint: "Joint", handle_radius_m: float) -> "Recordin
 
 
 def _read_table(path: Path, joint: "Joint", handle_radius_m: float) -> "Recording":
-    from scissorcal.recording import import_table
+    from scissorcal.recording import ImportOptions, import_table
     from scissorcal.recording.layout import column_name
 
     headings = _headings(path)
@@ -141,9 +141,11 @@ def _read_table(path: Path, joint: "Joint", handle_radius_m: float) -> "Recordin
     read = import_table(
         path,
         columns=columns,
-        joint=joint,
-        handle_radius_m=handle_radius_m if "handle_force" in columns else float("nan"),
-        motion_only=True,
+        options=ImportOptions(
+            joint=joint,
+            handle_radius_m=handle_radius_m if "handle_force" in columns else float("nan"),
+            motion_only=True,
+        ),
     )
     return replace(read, source=str(path))
 
