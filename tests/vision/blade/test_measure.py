@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields, replace
 import cv2
 import numpy as np
 import pytest
+from benchmarks.photographs import Glare
 
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.measure import measure_blade
@@ -13,7 +14,7 @@ from scissorcal.vision.blade.picture import NickMark, blade_picture
 from scissorcal.vision.blade.silhouette import lone_blade
 from scissorcal.vision.blade.view import CameraView
 from scissorcal.vision.photo import Photo
-from scissorcal.vision.sim import Glare, Nick, Pose, blade_layer, render, target_layers
+from scissorcal.vision.sim import Nick, Pose, blade_layer, render, target_layers
 from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD, MAT_PIVOT_M
 from scissorcal.vision.targets.detect import linear_light
 from tests.vision.blade.scenes import (

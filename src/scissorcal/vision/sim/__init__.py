@@ -3,8 +3,8 @@
 Nothing here is used by a fit, and nothing of a fit is used here except the printed targets' layout.
 """
 
-from scissorcal.vision.sim.optics import Lens, Looks, Pose, as_jpeg, random_looks
-from scissorcal.vision.sim.photograph import CastShadow, Glare, Lamp, Layer, render
+from scissorcal.vision.sim.optics import Lens, Looks, Pose, as_jpeg
+from scissorcal.vision.sim.photograph import Layer, render
 from scissorcal.vision.sim.scenes import (
     BladeShape,
     Nick,
@@ -18,9 +18,6 @@ from scissorcal.vision.sim.scenes import (
 
 __all__ = [
     "BladeShape",
-    "CastShadow",
-    "Glare",
-    "Lamp",
     "Layer",
     "Lens",
     "Looks",
@@ -31,7 +28,6 @@ __all__ = [
     "blade_layer",
     "chained",
     "plate_scene",
-    "random_looks",
     "render",
     "scissors_layers",
     "target_layers",

@@ -1,7 +1,7 @@
 """The rendered camera: place and share of a pixel, light, blur, noise, tone and compression."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -137,24 +137,6 @@ def as_jpeg(picture: Bytes, quality: int) -> bytes:
     if not done:
         raise InputError("The rendered picture cannot be stored as JPEG.")
     return data.tobytes()
-
-
-def random_looks(rng: np.random.Generator, px_per_mm: float, strength: float = 1.0) -> Looks:
-    """Draw how a picture is taken, from careful (``strength`` 0) to careless (1 and above)."""
-    blur = strength * min(px_per_mm / 12.0, 1.5)
-    looks = Looks(
-        exposure=float(rng.uniform(0.7, 0.95)),
-        defocus_px=float(rng.uniform(0.0, 2.0) * blur),
-        motion_px=float(rng.uniform(0.0, 2.5) * blur),
-        motion_angle=float(rng.uniform(0.0, np.pi)),
-        softness_px=float(rng.uniform(0.5, 0.8)),
-        vignetting=float(rng.uniform(0.0, 0.4) * strength),
-        light_slope=float(rng.uniform(-0.3, 0.3) * strength),
-        noise=float(rng.uniform(0.003, 0.02) * max(strength, 0.1)),
-        tone=float(rng.normal(0.0, 0.15) * strength),
-    )
-    warm = float(rng.uniform(-0.06, 0.06) * strength)
-    return replace(looks, tint=(1.0 - warm, 1.0, 1.0 + warm))
 
 
 def _toned(index: NDArray[np.uint16], looks: Looks) -> Bytes:

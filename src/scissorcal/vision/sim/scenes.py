@@ -72,24 +72,6 @@ class BladeShape:
         edge = self.edge_at(s)
         return np.asarray(edge + (straight - edge) * np.sqrt(1.0 - near**2))
 
-    def centreline_turn(self) -> float:
-        """How far this frame must be turned for its x axis to halve the blade, in radians.
-
-        Halving means: least squares through the pivot over 30 to 80 % of the blade's length.
-        """
-        turn = 0.0
-        s = np.linspace(0.0, self.length_m, 4001)
-        for _ in range(6):
-            c, n = np.cos(turn), np.sin(turn)
-            along = np.linspace(0.3, 0.8, 501) * self.length_m
-            lower, upper = (
-                np.interp(along, c * s + n * y, c * y - n * s)
-                for y in (self.edge_at(s), self.back_at(s))
-            )
-            middle = 0.5 * (lower + upper)
-            turn += float(np.arctan(np.sum(middle * along) / np.sum(along**2)))
-        return turn
-
     def outlines(self, *, tail: Array | None = None) -> list[Array]:
         """The body's outline and the pivot's hole, polygons in the blade's frame.
 
@@ -255,8 +237,6 @@ def scissors_layers(
     pose: Pose,
     pivot_m: tuple[float, float],
     turn: float = 0.0,
-    *,
-    rings: bool = True,
     **look: Any,
 ) -> list[Layer]:
     """Both blades, open by ``opening`` about one pivot, with ring handles behind it.
@@ -267,10 +247,7 @@ def scissors_layers(
     look = {"reflectance": STEEL, "brushed": 0.04, **look}
     layers = []
     for shape, side in ((replace(lower, hole_m=0.0), -1.0), (upper, 1.0)):
-        tail = _handle(shape) if rings else None
-        outlines = shape.outlines(tail=tail)
-        if rings:
-            outlines.append(_ring_hole())
+        outlines = [*shape.outlines(tail=_handle(shape)), _ring_hole()]
         placed = []
         for outline in outlines:
             mirrored = outline * (1.0, side)
