@@ -24,10 +24,7 @@ def edge_picture(photo: BladePhoto, fits: Mapping[str, BladeFit]) -> NDArray[np.
                 for nick in fit.nicks
             ]
         )
-    source = photo.photo.source
-    return blade_picture(
-        photo.photo, photo.view, photo.outline, photo.measured, edges, marks, source
-    )
+    return blade_picture(photo, edges, marks)
 
 
 def _scaled_edge(fit: BladeFit, unit: float) -> Callable[[Array], Array]:

@@ -15,7 +15,7 @@ from scissorcal.vision.blade.profile import (
     outermost_sharp,
     steepest,
 )
-from scissorcal.vision.blade.silhouette import BladeParts
+from scissorcal.vision.blade.silhouette import BACK_FIRST, FIRST, BladeParts
 from scissorcal.vision.blade.view import View
 
 _MOST_POINTS = 3000
@@ -29,6 +29,22 @@ _SHARP_SHARE = 1.0 / 300.0
 _LEAST_GOOD = {"edge": 0.75, "back": 0.3}
 _LEAST_IN_SHADOW = {"edge": 0.4, "back": 0.2}
 _MOST_BLUR_PX, _MOST_BLUR_SHARE = 8.0, 0.15
+
+
+Side = Literal["edge", "back"]
+
+
+@dataclass(frozen=True)
+class PicturedBlade:
+    """A blade in a photograph of linear ``light``, seen by ``view``, whose parts are roughly known.
+
+    ``source`` names the photograph in refusals.
+    """
+
+    light: Light
+    view: View
+    parts: BladeParts
+    source: str
 
 
 @dataclass(frozen=True)
@@ -46,27 +62,19 @@ class BorderPoints:
     good_share: float
 
 
-def find_border(
-    light: Light,
-    view: View,
-    parts: BladeParts,
-    side: Array,
-    first: float,
-    last: float,
-    source: str,
-    what: str,
-    search: float,
-) -> BorderPoints:
+def find_border(blade: PicturedBlade, side: Side, last: float, search: float) -> BorderPoints:
     """Cross one side of a blade in the picture, about once every pixel.
 
-    ``side`` are rough points of it on the sheet, of which those between the shares ``first`` and
-    ``last`` of the blade's length count. Raises InputError where the picture is too blurred, or
-    too little of the side has a clear border.
+    Of its rough points those before the share ``last`` of the blade's length count; ``search`` is
+    how far from them the border may lie, in blade lengths. Raises InputError where the picture is
+    too blurred, or too little of the side has a clear border.
     """
-    frame = parts.frame(side)
+    light, view, parts, source = blade.light, blade.view, blade.parts, blade.source
+    first = FIRST if side == "edge" else BACK_FIRST
+    frame = parts.frame(parts.edge if side == "edge" else parts.back)
     there = (frame[:, 0] > first * parts.length) & (frame[:, 0] < last * parts.length)
     if there.sum() < 20:
-        raise InputError(f"{source}: too little of the blade's {what} is visible.")
+        raise InputError(f"{source}: too little of the blade's {side} is visible.")
     s, e = _thinned(frame[there])
     rough = view.to_pixels(parts.points(s, e))
     count = int(np.clip(np.sum(np.linalg.norm(np.diff(rough, axis=0), axis=1)), 60, _MOST_POINTS))
@@ -74,27 +82,25 @@ def find_border(
     per_unit = count / max(s[-1] - s[0], 1e-12)
     offsets = np.interp(stations, s, e)
     shadowed = search > _SHADOW_SEARCH
-    rough_side = _Rough(view, parts, stations, offsets, float(np.sign(np.median(e))), per_unit)
+    rough_side = _Rough(blade, stations, offsets, float(np.sign(np.median(e))), per_unit)
     if shadowed:
         lines = [
-            rough_side.followed(light, search, "innermost"),
-            rough_side.followed(light, search, "outermost sharp"),
+            rough_side.followed(search, "innermost"),
+            rough_side.followed(search, "outermost sharp"),
         ]
         inner, outer = (_crossed(light, *line) for line in lines)
         best = inner if _merit(inner) > _INNER_MERIT * _merit(outer) else outer
-        if what == "back" and _merit(best) < _LEAST_MERIT:
-            return _as_followed(lines[-1], in_focus(parts, per_unit))
+        if side == "back" and _merit(best) < _LEAST_MERIT:
+            return _as_followed(lines[-1], _in_focus(parts, per_unit))
         points, normals, found, blur = best
     else:
-        points, normals, found, blur = _crossed(
-            light, *rough_side.followed(light, search, "steepest")
-        )
+        points, normals, found, blur = _crossed(light, *rough_side.followed(search, "steepest"))
     good = found.good & _alike(found)
     share = float(good.mean())
     _refuse_blur(blur, per_unit, parts, source)
-    if share < (_LEAST_IN_SHADOW if shadowed else _LEAST_GOOD)[what]:
+    if share < (_LEAST_IN_SHADOW if shadowed else _LEAST_GOOD)[side]:
         raise InputError(
-            f"{source}: only {100 * share:.0f} % of the blade's {what} shows a clear border: a "
+            f"{source}: only {100 * share:.0f} % of the blade's {side} shows a clear border: a "
             "mirror's glare, a shadow or dirt hides the rest. Turn the blade or the lamp so that "
             "the metal looks darker than the sheet."
         )
@@ -108,23 +114,21 @@ def find_border(
 class _Rough:
     """A side of the blade, roughly: stations and offsets of points about a pixel apart."""
 
-    view: View
-    parts: BladeParts
+    blade: PicturedBlade
     stations: Array
     offsets: Array
     outward: float
     per_unit: float
 
     def followed(
-        self, light: Light, search: float, kind: Literal["steepest", "innermost", "outermost sharp"]
+        self, search: float, kind: Literal["steepest", "innermost", "outermost sharp"]
     ) -> tuple[Array, Array]:
         """Points (n, 2) on a border near this side and normals there, both in the picture."""
-        length, offsets = self.parts.length, self.offsets
-        sharp = in_focus(self.parts, self.per_unit)
+        light, offsets = self.blade.light, self.offsets
+        length = self.blade.parts.length
+        sharp = _in_focus(self.blade.parts, self.per_unit)
         for first, far in ((True, search), (False, 0.012)):
-            points, normals = _with_normals(
-                self.view, self.parts, self.stations, offsets, self.outward
-            )
+            points, normals = _with_normals(self.blade, self.stations, offsets, self.outward)
             reach = float(np.clip(far * length * self.per_unit, 6.0, 80.0))
             if kind == "outermost sharp":
                 shift = outermost_sharp(light, points, normals, reach, sharp)
@@ -133,7 +137,7 @@ class _Rough:
                 soft = 1.5 if not first else 1.2 if inner else 2.0
                 shift = steepest(light, points, normals, reach, soft, innermost=inner)
             offsets = offsets + self.outward * shift / self.per_unit
-        return _with_normals(self.view, self.parts, self.stations, offsets, self.outward)
+        return _with_normals(self.blade, self.stations, offsets, self.outward)
 
 
 def _crossed(light: Light, points: Array, normals: Array) -> tuple[Array, Array, Crossings, float]:
@@ -162,7 +166,7 @@ def _as_followed(line: tuple[Array, Array], soft: float) -> BorderPoints:
     return BorderPoints(points, normals, soft * one, one, soft, 1.0)
 
 
-def in_focus(parts: BladeParts, per_unit: float) -> float:
+def _in_focus(parts: BladeParts, per_unit: float) -> float:
     """Blur in pixels of a border in focus, of a blade that has ``per_unit`` pixels a unit."""
     return max(_SHARP_SHARE * parts.length * per_unit, 1.0)
 
@@ -188,8 +192,9 @@ def _alike(found: Crossings) -> NDArray[np.bool_]:
     )
 
 
-def find_hole(light: Light, view: View, parts: BladeParts) -> BorderPoints | None:
+def find_hole(blade: PicturedBlade) -> BorderPoints | None:
     """Cross the pivot hole's border all around; None where there is no hole, or no clear one."""
+    light, view, parts = blade.light, blade.view, blade.parts
     if not len(parts.hole):
         return None
     middle = parts.hole.mean(axis=0)
@@ -247,12 +252,11 @@ def _thinned(frame: Array) -> tuple[Array, Array]:
     return thin[:, 0], np.asarray(median_filter(thin[:, 1], size=5, mode="nearest"))
 
 
-def _with_normals(
-    view: View, parts: BladeParts, s: Array, e: Array, outward: float
-) -> tuple[Array, Array]:
+def _with_normals(blade: PicturedBlade, s: Array, e: Array, outward: float) -> tuple[Array, Array]:
     """Points in the picture and unit normals there that lead out of the blade."""
     from scipy.ndimage import gaussian_filter1d
 
+    view, parts = blade.view, blade.parts
     smooth = gaussian_filter1d(e, 8.0, mode="nearest")
     points = view.to_pixels(parts.points(s, e))
     line = view.to_pixels(parts.points(s, smooth))

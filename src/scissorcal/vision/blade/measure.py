@@ -8,7 +8,13 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.recipe.priors import BladePriors
-from scissorcal.vision.blade.borders import BorderPoints, find_border, find_hole, fit_circle
+from scissorcal.vision.blade.borders import (
+    BorderPoints,
+    PicturedBlade,
+    find_border,
+    find_hole,
+    fit_circle,
+)
 from scissorcal.vision.blade.modes import (
     SHARP,
     BladeFrame,
@@ -16,8 +22,7 @@ from scissorcal.vision.blade.modes import (
     edge_modes,
     halving_stations,
 )
-from scissorcal.vision.blade.profile import Light
-from scissorcal.vision.blade.silhouette import BACK_FIRST, BACK_LAST, FIRST, LAST, BladeParts
+from scissorcal.vision.blade.silhouette import BACK_LAST, LAST, BladeParts
 from scissorcal.vision.blade.view import View
 
 _ANCHORS, _STRETCHES = 14, 30
@@ -61,13 +66,7 @@ class BladeMeasurement:
 
 
 def measure_blade(
-    light: Light,
-    view: View,
-    parts: BladeParts,
-    source: str,
-    priors: BladePriors = BladePriors(),
-    *,
-    search: float = 0.035,
+    blade: PicturedBlade, priors: BladePriors = BladePriors(), *, search: float = 0.035
 ) -> BladeMeasurement:
     """Measure a blade whose parts are roughly known, in the photograph's pixels.
 
@@ -76,13 +75,12 @@ def measure_blade(
     ``search`` is how far from the rough outline a border may lie, in blade lengths.
     Raises InputError where the picture is too blurred or too much of the edge is hidden.
     """
-    edge = find_border(light, view, parts, parts.edge, FIRST, LAST, source, "edge", search)
-    back = find_border(
-        light, view, parts, parts.back, BACK_FIRST, BACK_LAST, source, "back", search
-    )
+    view, parts, source = blade.view, blade.parts, blade.source
+    edge = find_border(blade, "edge", LAST, search)
+    back = find_border(blade, "back", BACK_LAST, search)
     for border, what in ((edge, "edge"), (back, "back")):
         _refuse_unhalved(view, parts, border, f"{source}: too little of the blade's {what}")
-    seen = SeenBorders(edge, back, find_hole(light, view, parts))
+    seen = SeenBorders(edge, back, find_hole(blade))
     frame = _framed(view, parts, seen)
     pivot, axis, up = frame.pivot, frame.axis, frame.up
     columns, names = edge_modes(view, seen, frame, parts, priors)

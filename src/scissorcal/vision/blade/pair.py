@@ -6,13 +6,14 @@ The end of each blade's metal is told from the end of its shadow.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import hypot
+from typing import get_args
 
 import cv2
 import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.recipe.priors import BladePriors
-from scissorcal.vision.blade.borders import find_border
+from scissorcal.vision.blade.borders import PicturedBlade, Side, find_border
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
 from scissorcal.vision.blade.profile import (
     ASIDE,
@@ -23,7 +24,7 @@ from scissorcal.vision.blade.profile import (
     Light,
     best_path,
 )
-from scissorcal.vision.blade.silhouette import BACK_FIRST, FIRST, BladeParts
+from scissorcal.vision.blade.silhouette import BladeParts
 from scissorcal.vision.blade.view import PlainView, View
 
 BEFORE_TIP = 0.85
@@ -37,7 +38,7 @@ _SD_PX = 0.5
 
 
 @dataclass(frozen=True)
-class Tip:
+class _Tip:
     """Where the metal ends: ``station`` on the blade's axis with its ``sd``, in sheet units.
 
     ``border`` (n, 2) is the end's border on the sheet, for pictures.
@@ -84,7 +85,7 @@ def measure_pair(
     moves both edges. The length of the pair, the mean of both, is one for both blades, with the
     error of tips and pivot; a stated length is that one. Raises InputError as `measure_blade` does.
     """
-    tips = [_of_metal(light, view, parts, source) for parts in blades]
+    tips = [_of_metal(PicturedBlade(light, view, parts, source)) for parts in blades]
     ends = [parts.points(np.array([parts.length]), np.zeros(1))[0] for parts in tips]
     pixels = view.to_pixels(np.array([tips[0].pivot, *ends]))
     sds = [parts.tip_sd / parts.length for parts in tips]
@@ -101,7 +102,10 @@ def measure_pair(
         gain = carried / sd**2
         leant = view.leaning(-gain * ratio, view.lean_covariance - np.outer(gain, carried))
         tips = [_in_view(parts, view, leant) for parts in tips]
-    measured = [measure_blade(light, leant, parts, source, priors, search=SEARCH) for parts in tips]
+    measured = [
+        measure_blade(PicturedBlade(light, leant, parts, source), priors, search=SEARCH)
+        for parts in tips
+    ]
     lengths = [one.length for one in measured]
     pair = float(np.exp(np.mean(np.log(lengths))))
     middle = float(np.linalg.norm(measured[0].parts.axis + measured[1].parts.axis)) / 2.0
@@ -113,15 +117,12 @@ def measure_pair(
     return leant, sized, PairLengths(seen, ratio, sd, tilt)
 
 
-def _of_metal(light: Light, view: View, parts: BladeParts, source: str) -> BladeParts:
+def _of_metal(blade: PicturedBlade) -> BladeParts:
     """The parts with the tip of the metal in place of the outline's, which may be a shadow's."""
-    sides = [
-        find_border(light, view, parts, side, first, BEFORE_TIP, source, what, SEARCH)
-        for side, first, what in ((parts.edge, FIRST, "edge"), (parts.back, BACK_FIRST, "back"))
-    ]
-    edge, back = (view.to_sheet(side.pixels) for side in sides)
-    tip = metal_end(light, view, parts, edge, back, max(side.blur_px for side in sides))
-    return replace(parts, length=tip.station, tip_sd=tip.sd, end=tip.border)
+    edge, back = (find_border(blade, side, BEFORE_TIP, SEARCH) for side in get_args(Side))
+    sides = [blade.view.to_sheet(border.pixels) for border in (edge, back)]
+    tip = _metal_end(blade, sides, max(edge.blur_px, back.blur_px))
+    return replace(blade.parts, length=tip.station, tip_sd=tip.sd, end=tip.border)
 
 
 def _lengths(view: View, pixels: Array, values: Array | None = None) -> tuple[float, float]:
@@ -169,9 +170,7 @@ def _in_view(parts: BladeParts, old: View, new: View) -> BladeParts:
     )
 
 
-def metal_end(
-    light: Light, view: View, parts: BladeParts, edge: Array, back: Array, soft: float
-) -> Tip:
+def _metal_end(blade: PicturedBlade, sides: Sequence[Array], soft: float) -> _Tip:
     """Find the tip of a blade of which edge and back (n, 2), on the sheet, are known before it.
 
     From a place within the metal short of the tip, the outermost sharp border is followed around
@@ -179,10 +178,11 @@ def metal_end(
     border and is passed over. ``soft`` is the blur of a border in focus, in pixels. The outline in
     ``parts`` may include the shadow: it bounds the search.
     """
+    view, parts = blade.view, blade.parts
     outline = parts.frame(np.concatenate([parts.edge, parts.back]))
     stop = parts.length
     at = _CENTRE * stop
-    middle = np.mean([_offset_at(parts.frame(side), at) for side in (edge, back)])
+    middle = np.mean([_offset_at(parts.frame(side), at) for side in sides])
     turn = np.linspace(-_WIDEST, _WIDEST, _TURNS)
     pixel = 1.0 / _pixels_per_unit(view, parts, at)
     reach = _REACH * stop / pixel
@@ -190,7 +190,7 @@ def metal_end(
     station = at + np.outer(np.cos(turn), r * pixel)
     offset = middle + np.outer(np.sin(turn), r * pixel)
     places = parts.points(station.ravel(), offset.ravel())
-    sharp = _sampled_sharpness(light, view.to_pixels(places), soft).reshape(station.shape)
+    sharp = _sampled_sharpness(blade.light, view.to_pixels(places), soft).reshape(station.shape)
     low, high = (float(bound) for bound in np.quantile(outline[:, 1], [0.0, 1.0]))
     room = _BEYOND_PX * pixel
     beyond = (station > stop + room) | (offset < low - room) | (offset > high + room)
@@ -202,7 +202,7 @@ def metal_end(
     rows = np.arange(len(turn))
     border = parts.points(station[rows, path], offset[rows, path])
     ahead = station[rows, path]
-    return Tip(float(ahead.max()), float(np.hypot(_SD_PX, soft)) * pixel, border)
+    return _Tip(float(ahead.max()), float(np.hypot(_SD_PX, soft)) * pixel, border)
 
 
 def _offset_at(side: Array, station: float) -> float:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.recipe.priors import BladePriors
+from scissorcal.vision.blade.borders import PicturedBlade
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
 from scissorcal.vision.blade.pair import PairLengths, measure_pair
 from scissorcal.vision.blade.scissors import Scissors, find_scissors, lamp_direction
@@ -129,7 +130,7 @@ def photograph_blade(
         there = view.to_sheet(photo.within([pivot_px, beside]))
         pivot, sd = there[0], priors.pivot_sd_px * float(np.hypot(*(there[1] - there[0])))
     parts = lone_blade(outline, photo.source, edge_side=edge_side, pivot=pivot, pivot_sd=sd)
-    measured = measure_blade(light, view, parts, photo.source, priors)
+    measured = measure_blade(PicturedBlade(light, view, parts, photo.source), priors)
     return BladePhoto(photo, view, outline, (measured,))
 
 

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.vision.blade.measure import BladeMeasurement
-from scissorcal.vision.blade.silhouette import Silhouette
+from scissorcal.vision.blade.photo import BladePhoto
 from scissorcal.vision.blade.view import View
 from scissorcal.vision.overlay import Canvas
-from scissorcal.vision.photo import Photo
 
 Picture = NDArray[np.uint8]
 
@@ -42,66 +41,57 @@ class NickMark:
 
 
 def blade_picture(
-    photo: Photo,
-    view: View,
-    outline: Silhouette | None,
-    measured: Sequence[BladeMeasurement],
-    edges: Sequence[Callable[[Array], Array] | None] = (),
-    nicks: Sequence[Sequence[NickMark]] = (),
-    caption: str = "",
+    photo: BladePhoto,
+    edges: Sequence[Callable[[Array], Array]],
+    nicks: Sequence[Sequence[NickMark]],
 ) -> Picture:
     """Draw a measurement over its photograph: bytes (rows, columns, 3), BGR.
 
     The segmented outline (orange), each blade's back and the end of its metal (violet), its points
-    of the edge, the fitted edge (green) where
-    ``edges`` gives e(s), the enlarged residuals as arrows, the nicks (red), the
-    pivot and the centreline. Cropped to what matters and enlarged or reduced to `LARGEST` pixels.
+    of the edge, the fitted edge (green) as ``edges`` gives e(s), the enlarged residuals as arrows,
+    the nicks (red), the pivot and the centreline. Cropped to what matters and enlarged or reduced
+    to `LARGEST` pixels.
     """
-    left, top, right, bottom = _frame(photo, view, outline, measured)
-    part = photo.image[top:bottom, left:right]
+    borders = [
+        photo.view.to_pixels(border) for border in (photo.outline.outer, *photo.outline.others)
+    ]
+    left, top, right, bottom = _frame(photo, borders)
+    part = photo.photo.image[top:bottom, left:right]
     canvas = Canvas(part, min(LARGEST / max(part.shape[:2]), 4.0), (left, top))
-    if outline is not None:
-        for border in (outline.outer, *outline.others):
-            canvas.line(view.to_pixels(border), OUTLINE, closed=True)
+    for border in borders:
+        canvas.line(border, OUTLINE, closed=True)
     factor = 0.0
-    for index, one in enumerate(measured):
-        edge = edges[index] if index < len(edges) else None
-        marks = nicks[index] if index < len(nicks) else ()
-        factor = max(factor, _blade(canvas, view, one, edge, marks))
-    words = [caption] if caption else []
+    for measured, edge, marks in zip(photo.measured, edges, nicks, strict=True):
+        factor = max(factor, _blade(canvas, photo.view, measured, edge, marks))
+    words = [photo.photo.source]
     if factor:
         words.append(f"residuals x {factor:.0f}")
-    if words:
-        canvas.title("   ".join(words))
+    canvas.title("   ".join(words))
     return canvas.picture
 
 
 def _blade(
     canvas: Canvas,
     view: View,
-    one: BladeMeasurement,
-    edge: Callable[[Array], Array] | None,
+    blade: BladeMeasurement,
+    edge: Callable[[Array], Array],
     marks: Sequence[NickMark],
 ) -> float:
     def on_picture(station: Array, offset: Array) -> Array:
-        return view.to_pixels(one.parts.points(station, offset))
+        return view.to_pixels(blade.parts.points(station, offset))
 
-    canvas.line(np.array([one.pivot_px, one.axis_px]), AXIS)
-    if one.parts.end is not None:
-        canvas.line(view.to_pixels(one.parts.end), END)
-    back = one.back.pixels[np.argsort(one.parts.frame(view.to_sheet(one.back.pixels))[:, 0])]
+    canvas.line(np.array([blade.pivot_px, blade.axis_px]), AXIS)
+    if blade.parts.end is not None:
+        canvas.line(view.to_pixels(blade.parts.end), END)
+    back = blade.back.pixels[np.argsort(blade.parts.frame(view.to_sheet(blade.back.pixels))[:, 0])]
     canvas.line(back, END)
-    canvas.cross(one.pivot_px, PIVOT)
-    seen = on_picture(one.station, one.offset)
-    factor = 0.0
-    if edge is None:
-        canvas.line(seen, EDGE)
-    else:
-        station = np.linspace(one.station[0], one.station[-1], 400)
-        canvas.line(on_picture(station, edge(station)), EDGE)
-        factor = _arrows(canvas, seen, on_picture(one.station, edge(one.station)))
+    canvas.cross(blade.pivot_px, PIVOT)
+    seen = on_picture(blade.station, blade.offset)
+    station = np.linspace(blade.station[0], blade.station[-1], 400)
+    canvas.line(on_picture(station, edge(station)), EDGE)
+    factor = _arrows(canvas, seen, on_picture(blade.station, edge(blade.station)))
     for mark in marks:
-        here = float(np.interp(mark.station, one.station, one.offset))
+        here = float(np.interp(mark.station, blade.station, blade.offset))
         place = on_picture(np.array([mark.station]), np.array([here]))[0]
         canvas.ring(place, NICK, 14)
         canvas.words(mark.text, canvas.whole(place) + 18)
@@ -123,16 +113,13 @@ def _arrows(canvas: Canvas, seen: Array, fitted: Array) -> float:
     return factor
 
 
-def _frame(
-    photo: Photo, view: View, outline: Silhouette | None, measured: Sequence[BladeMeasurement]
-) -> tuple[int, int, int, int]:
-    height, width = photo.image.shape[:2]
-    points = [one.edge.pixels for one in measured] + [one.pivot_px[None] for one in measured]
-    if outline is not None:
-        points += [view.to_pixels(border) for border in (outline.outer, *outline.others)]
-    every = np.concatenate(points) if points else np.array([[0.0, 0.0], [width, height]])
-    every = every[np.isfinite(every).all(axis=1)]
-    low, high = every.min(axis=0), every.max(axis=0)
+def _frame(photo: BladePhoto, borders: Sequence[Array]) -> tuple[int, int, int, int]:
+    height, width = photo.photo.image.shape[:2]
+    points = [blade.edge.pixels for blade in photo.measured]
+    points += [blade.pivot_px[None] for blade in photo.measured]
+    corners = np.concatenate([*points, *borders])
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    low, high = corners.min(axis=0), corners.max(axis=0)
     room = _MARGIN * float((high - low).max())
     left, top = np.maximum(np.floor(low - room).astype(int), 0)
     right, bottom = np.minimum(np.ceil(high + room).astype(int), [width, height])
