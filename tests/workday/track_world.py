@@ -1,27 +1,30 @@
 """Tracks in simulated worlds whose camera and rig frame are off as their covariances say."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from benchmarks.consistency import nees
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.plate.fit import plate_target
 from scissorcal.device.motion import Motion
+from scissorcal.device.session import RigSession
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.surface import Plane
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import parse_recipe, read_text
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.recipe.schema import Recipe
-from scissorcal.tracking.consistency import nees, pose_error
 from scissorcal.tracking.contacts import TipContacts
+from scissorcal.tracking.rotation import pose_error
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.sim.sim_camera import SIM_LENS, sim_plate_scene
 from scissorcal.workday.tracking.feeds import idle_rig, sim_feed, sim_rig_feed
 from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
-from scissorcal.workday.tracking.session import RigDrive, TrackSession
+from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import SimCamera, SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder
 
@@ -63,15 +66,10 @@ def a_session(
 ) -> TrackSession:
     delay = recipe.plate.tracking.camera_delay_ms
     about = TrackAbout("sim", "rig", "a" * 16, SIM_LENS.width, SIM_LENS.height, delay)
-    return TrackSession(
-        recipe,
-        Plane(),
-        about,
-        drive=RigDrive(0.06) if rig else None,
-        contacts=TipContacts(tip_of(recipe)) if rig else None,
-        friction_known=False,
-        recorder=recorder,
-    )
+    facts = TrackFacts(Plane(), about, friction_known=False)
+    if rig:
+        facts = replace(facts, drive=RigDrive(0.06), contacts=TipContacts(tip_of(recipe)))
+    return TrackSession(recipe, facts, recorder=recorder)
 
 
 def tracked(
@@ -89,7 +87,7 @@ def tracked(
             session.take_picture(picture)
             last = picture.arrived_s
         return session, world, last
-    with idle_rig(world.link, recipe) as motion:
+    with idle_rig(RigSession(world.link, recipe)) as motion:
         run_rig(session, world, motion, eye, seconds)
     return session, world, world.link.virtual_time
 
@@ -108,17 +106,17 @@ def run_rig(
 
 def score(session: TrackSession, world: SimWorld, host_s: float) -> tuple[float, Array]:
     """NEES and error (6,) of the pose at the last row, against the world's truth."""
-    found = session.follower.tracker.estimate()
+    estimate = session.follower.tracker.estimate()
     clock = session.follower.rig
     if clock is not None:
-        at = clock.fit.host(found.time_s)
+        at = clock.fit.host(estimate.time_s)
     else:
         from scissorcal.workday.tracking.sim_world import CAMERA_DRIFT, CAMERA_OFFSET_S
 
         delay = 1e-3 * session.about.camera_delay_ms
-        at = (found.time_s + delay - CAMERA_OFFSET_S) / (1.0 + CAMERA_DRIFT)
-    error = pose_error(found.rotation, found.place_m, *world.truth(at))
-    return nees(error, found.covariance), error
+        at = (estimate.time_s + delay - CAMERA_OFFSET_S) / (1.0 + CAMERA_DRIFT)
+    error = pose_error(estimate.rotation, estimate.place_m, *world.truth(at))
+    return nees(error, estimate.covariance), error
 
 
 def recorder_at(path: Path) -> TrackRecorder:

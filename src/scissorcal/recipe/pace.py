@@ -7,9 +7,9 @@ a sheet may hold fewer strokes than the recipe allows, never more.
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 from scissorcal.errors import InputError
+from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe
 
 LEAST_RAMP_S = 0.03
@@ -48,8 +48,6 @@ def glide_time(length: float, speed: float, acceleration: float) -> float:
     cruise = glide_speed(length, speed, acceleration)
     return ramp_time(cruise, acceleration) + length / cruise
 
-
-CaptureKind = Literal["friction", "friction-advance", "cut"]
 
 RATE_HZ = 1000.0
 BYTES_A_SAMPLE = 60

@@ -9,7 +9,6 @@ import numpy as np
 from scissorcal.errors import InputError
 from scissorcal.foreign import open_foreign
 from scissorcal.foreign.formats import RECORDING
-from scissorcal.locks import NO_LOCKS, try_lock
 from scissorcal.recording import layout
 from scissorcal.recording.samplefile import SampleFile, explained, is_same_file, seal
 from scissorcal.recording.scan import Attachment, Mark, Note, Scan, Sheet, Telemetry, scan_file
@@ -47,14 +46,13 @@ def recover(folder: str | Path) -> tuple[Recovered, ...]:
 
 
 def _recover_one(part: Path) -> Recovered | None:
+    from scissorcal.locks import try_lock
+
     if not part.exists():
         return None
     with open_foreign(part, RECORDING) as stream, explained(part):
-        try:
-            free = try_lock(stream)
-        except OSError as error:
-            if error.errno not in NO_LOCKS:
-                raise
+        free = try_lock(stream)
+        if free is None:
             sentence = (
                 f"{part.name} was not touched: there are no locks here, so that it is not known "
                 "whether it is still being written. Copy the folder to a disk of a computer that "

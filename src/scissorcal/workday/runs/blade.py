@@ -54,10 +54,9 @@ def capture_blade(
                 f"{photo.source}: no open blades: where this is a pair of scissors, it is closed, "
                 "and each blade hides the other's edge. Open it by 30 to 80 deg."
             )
-        return Seen(found.sentence())
+        return Seen(found.sentence(), board=BLADE_MAT if setup.mat else None)
 
-    board = BLADE_MAT if setup.mat else None
-    return take_photographs(workspace, "blade", paths, look, tell, board=board, blade=setup)
+    return take_photographs(workspace, "blade", paths, look, tell, blade=setup)
 
 
 def fit(engine: "Engine", request: "Request") -> "Made":
@@ -120,7 +119,7 @@ def _camera_verdicts(engine: "Engine", seen: Sequence["BladePhoto"]) -> tuple[Ve
     import numpy as np
 
     from scissorcal.calibration.camera.there import CameraThere
-    from scissorcal.calibration.edge.checks import SCOPE
+    from scissorcal.calibration.edge.checks import CAMERA
 
     fitted = _camera_fit(engine)
     edges = [(one.photo, own) for one in seen for own in one.measured if own.metric]
@@ -132,7 +131,7 @@ def _camera_verdicts(engine: "Engine", seen: Sequence["BladePhoto"]) -> tuple[Ve
         float(np.linalg.norm(np.ptp(photo.whole(own.edge.pixels), axis=0)) / np.ptp(own.station))
         for photo, own in edges
     )
-    return (CameraThere.of(fitted.pixel_map, pixels, scale).verdict(SCOPE),)
+    return (CameraThere.of(fitted.pixel_map, pixels, scale).verdict(CAMERA),)
 
 
 def _refuse_other_setup(before: Sequence[PhotoCapture], setup: BladeSetup) -> None:
