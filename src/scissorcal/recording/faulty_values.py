@@ -48,17 +48,17 @@ def continued(position: Array, counts: Array, turn: float | None) -> tuple[Array
     ([350.0, 356.0, 362.0, 368.0], [2])
     """
     if turn is not None:
-        found, places = _gone_on(position, turn)
+        values, places = _gone_on(position, turn)
         if len(places):
-            return found, places
+            return values, places
     if not len(jumps_in(counts)):
         return position, np.zeros(0, dtype=np.int64)
     whole, bits = _whole(counts)
     if bits is not None:
-        found, places = _gone_on(whole, 2.0**bits)
+        values, places = _gone_on(whole, 2.0**bits)
         if len(places) and _at_ends(whole, places, 2.0**bits):
             scale = float(np.ptp(position)) / float(np.ptp(whole))
-            return position[0] + (found - found[0]) * _sense(position, whole) * scale, places
+            return position[0] + (values - values[0]) * _sense(position, whole) * scale, places
     return position, np.zeros(0, dtype=np.int64)
 
 
@@ -123,7 +123,7 @@ def continued_clock(time: Array, unit_s: float) -> tuple[Array, Integers, float]
                 fitting[period] = np.inf
     if not fitting:
         return time, falls[:0], 0.0
-    period = min(fitting, key=lambda one: fitting[one])
+    period = min(fitting, key=lambda candidate: fitting[candidate])
     turns = np.zeros(len(time))
     turns[falls + 1] = period
     return time + np.cumsum(turns), falls + 1, period
@@ -131,9 +131,9 @@ def continued_clock(time: Array, unit_s: float) -> tuple[Array, Integers, float]
 
 def _clock_periods(unit_s: float) -> list[float]:
     """Periods of clocks, in units of ``unit_s`` seconds, without repetitions."""
-    counted = [2.0**k * one for k in COUNTERS for one in (1.0, *(x / unit_s for x in TICKS_S))]
-    told = [seconds / unit_s for seconds in OF_DAY_S]
-    return sorted({float(f"{period:.12g}") for period in (*counted, *told)})
+    counted = [2.0**k * unit for k in COUNTERS for unit in (1.0, *(x / unit_s for x in TICKS_S))]
+    stated = [seconds / unit_s for seconds in OF_DAY_S]
+    return sorted({float(f"{period:.12g}") for period in (*counted, *stated)})
 
 
 def jumps_in(values: Array) -> Integers:
@@ -173,12 +173,12 @@ def _gone_on(values: Array, period: float) -> tuple[Array, Integers]:
     if not np.any(jumps) or np.ptp(values) > period * (1.0 + 1e-9):
         return values, none
     turns = np.concatenate([[0.0], np.cumsum(np.where(jumps, -np.sign(step), 0.0))])
-    found = values + period * turns
-    went = np.abs(np.diff(found))
+    unwrapped = values + period * turns
+    went = np.abs(np.diff(unwrapped))
     usual = FASTER * went[~jumps].max(initial=0.0)
     if went.max() > MOST_LEFT * period or went[jumps].max() > usual + 1e-9 * period:
         return values, none
-    return np.asarray(found), np.flatnonzero(jumps) + 1
+    return np.asarray(unwrapped), np.flatnonzero(jumps) + 1
 
 
 def _at_ends(counts: Array, places: Integers, period: float) -> bool:
@@ -235,13 +235,13 @@ def marks_in(values: Array) -> tuple[float, ...]:
     >>> marks_in(np.array([1.0, 1.2, -1.0, 1.1, 1.3, -1.0, 1.2, 1.4]))
     (-1.0,)
     """
-    found: set[float] = set()
+    marks: set[float] = set()
     while True:
-        rest = values[~np.isin(values, list(found))] if found else values
+        rest = values[~np.isin(values, list(marks))] if marks else values
         more = _apart(rest) or _excursions(rest)
         if not more:
-            return tuple(sorted(found))
-        found |= more
+            return tuple(sorted(marks))
+        marks |= more
 
 
 def lone_excursion(values: Array) -> int | None:
@@ -259,10 +259,10 @@ def lone_excursion(values: Array) -> int | None:
         if np.count_nonzero(values == values[place]) > 1:
             continue
         step = np.abs(np.diff(np.concatenate([values[:1], values, values[-1:]])))
-        own = step[[place, place + 1]]
-        own = own[[place > 0, place < len(values) - 1]]
+        excursion = step[[place, place + 1]]
+        excursion = excursion[[place > 0, place < len(values) - 1]]
         others = np.delete(step, [place, place + 1])
-        if own.min() > FASTER * others.max() > 0.0:
+        if excursion.min() > FASTER * others.max() > 0.0:
             return place
     return None
 

@@ -119,20 +119,20 @@ def import_table(
     samples = empty_samples(table.length)
     for channel in set(columns) - {"time"}:
         samples[channel] = table.columns[channel].values * quantities[channel].factor
-    said = list(table.notes)
-    said += _opening_goes_on(samples, table, joint)
+    sentences = list(table.notes)
+    sentences += _opening_goes_on(samples, table, joint)
     if rate_Hz is not None:
         _set_regular_clock(samples, rate_Hz)
     else:
         table, wrapped = _clock_goes_on(table, quantities["time"].factor)
-        said += wrapped
+        sentences += wrapped
         _set_clock(samples, table, quantities["time"].factor, allow_gaps=options.allow_gaps)
-    said += _told_of_jumps(samples, table, joint)
-    strokes, found, odd = _label(samples, joint, options.min_travel)
-    said += [*odd, *_sizes(samples, quantities, joint)]
+    sentences += _told_of_jumps(samples, table, joint)
+    strokes, stroke_sentence, odd = _label(samples, joint, options.min_travel)
+    sentences += [*odd, *_sizes(samples, quantities, joint)]
     digest = content_hash(path)
     source = f"{path.name} (sha256:{digest[:16]})"
-    particular = _particular(quantities, samples, said)
+    particular = _particular(quantities, samples, sentences)
     return Recording(
         kind=options.kind,
         samples=samples,
@@ -141,7 +141,7 @@ def import_table(
         handle_radius_m=options.handle_radius_m,
         source=str(path),
         content_hash=digest,
-        notes=(*_general(source, columns, quantities), found, *particular),
+        notes=(*_general(source, columns, quantities), stroke_sentence, *particular),
         particular=particular,
     )
 
@@ -255,11 +255,13 @@ def _clock_goes_on(table: Table, factor: float) -> tuple[Table, list[str]]:
     begins = "0" if clock.values.min() >= 0.0 else f"{-0.5 * period:.10g}"
     bits = math.log2(period)
     length = f"2^{bits:.0f}" if bits in COUNTERS else f"{period * factor:.10g} s"
-    said = (
+    sentence = (
         f"The clock begins at {begins} again at {_listed(table, places)}, after {length}: it was "
         "continued."
     )
-    return replace(table, columns={**table.columns, "time": replace(clock, values=values)}), [said]
+    return replace(table, columns={**table.columns, "time": replace(clock, values=values)}), [
+        sentence
+    ]
 
 
 def _opening_goes_on(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
@@ -267,11 +269,11 @@ def _opening_goes_on(samples: NDArray[np.void], table: Table, joint: Joint) -> l
     turn = 2.0 * math.pi if joint.kind == "rotary" else None
     position = np.asarray(samples["opening"], dtype=np.float64)
     counts = table.columns["opening"].values
-    found, places = continued(position, counts, turn)
+    continued_position, places = continued(position, counts, turn)
     if not len(places):
         _refuse_marks(counts, table)
         return []
-    samples["opening"] = found
+    samples["opening"] = continued_position
     where = _listed(table, places)
     return [f"The opening begins again at {where}, after its period: it was continued."]
 
@@ -297,21 +299,21 @@ def _told_of_jumps(samples: NDArray[np.void], table: Table, joint: Joint) -> lis
     whole = step_us <= GAP_FACTOR * float(np.median(step_us))
     unit = "deg" if joint.kind == "rotary" else "m"
     factor = math.degrees(1.0) if joint.kind == "rotary" else 1.0
-    said = []
+    sentences = []
     jumps = jumps_in(position)
     jumps = jumps[whole[jumps - 1]]
     lone = lone_excursion(position) if len(jumps) == 0 else None
     if len(jumps):
         size = factor * float(np.median(np.abs(np.diff(position)[jumps - 1])))
         others = factor * float(np.delete(np.abs(np.diff(position)), jumps - 1).max())
-        said.append(
+        sentences.append(
             f"The opening jumps by {size:.4g} {unit} from one sample to the next at "
             f"{_listed(table, jumps)}, and by {others:.3g} {unit} at most elsewhere. If this is no "
             "motion (a sensor of an unknown period, or one that lost its place), correct or remove "
             "those rows: strokes are found from it."
         )
     elif lone is not None and np.all(whole[max(lone - 1, 0) : lone + 1]):
-        said.append(
+        sentences.append(
             f"The opening is {factor * position[lone]:.6g} {unit} at {_listed(table, [lone])} "
             "alone, farther from the samples before and after than it goes anywhere else. If this "
             "is no motion, remove that row: strokes are found from it."
@@ -320,12 +322,12 @@ def _told_of_jumps(samples: NDArray[np.void], table: Table, joint: Joint) -> lis
         if channel in table.columns:
             bits, places = overflows(table.columns[channel].values)
             if bits:
-                said.append(
+                sentences.append(
                     f"{channel} jumps between the ends of a counter of {bits} bits at "
                     f"{_listed(table, places)}: negative numbers read without their sign, or "
                     "numbers too large for it. Export them as signed numbers, or of more bits."
                 )
-    return said
+    return sentences
 
 
 def _listed(table: Table, places: Sequence[int] | NDArray[np.int64]) -> str:
@@ -389,10 +391,10 @@ def _general(
 
 
 def _particular(
-    quantities: Mapping[str, Quantity], samples: NDArray[np.void], said: Sequence[str]
+    quantities: Mapping[str, Quantity], samples: NDArray[np.void], sentences: Sequence[str]
 ) -> tuple[str, ...]:
     """What is particular in a log."""
-    notes = [*(entry.note for entry in quantities.values() if entry.note), *said]
+    notes = [*(entry.note for entry in quantities.values() if entry.note), *sentences]
     if samples["stroke"].max() < 0:
         notes.append("No stroke was found: the joint moves less than the least travel.")
     gaps = gap_note(samples)

@@ -16,6 +16,7 @@ from scissorcal.errors import InputError, needs_extra
 from scissorcal.foreign import parse_isolated, read_foreign, reading, refuse_unless_regular
 from scissorcal.foreign.formats import LOG, MATLAB, PARQUET
 from scissorcal.recording.table import Column, Table, Wanted, find_column, shortened
+from scissorcal.recording.textfile import read_text
 
 MOST_ROWS = 40_000_000
 """Eleven hours at 1 kHz. A file states its rows, and a few bytes can state any number."""
@@ -42,16 +43,10 @@ def read_table(
     """
     suffix = path.suffix.lower()
     if suffix == ".mat":
-        from scissorcal.recording.table_file import read_mat
-
         table = read_mat(path, wanted)
     elif suffix in (".parquet", ".pq"):
-        from scissorcal.recording.table_file import read_parquet
-
         table = read_parquet(path, wanted)
     else:
-        from scissorcal.recording.textfile import read_text
-
         with reading(path, LOG):
             table = read_text(path, wanted, delimiter, drop_last_line=drop_last_line)
     _check_lengths(table)

@@ -97,20 +97,20 @@ def track(
                 f"The pictures are {width} x {height} pixels, the camera was fitted at "
                 f"{camera.width} x {camera.height}: use the same camera, size, focus and zoom."
             )
-        seen = look(frame.image, boards, f"picture {frame.number}")
-        if seen is None:
+        detection = look(frame.image, boards, f"picture {frame.number}")
+        if detection is None:
             state: State = "blank" if _is_blank(frame) else "no target"
             yield Tracked(_without_image(frame), state, None, 0, None)
             continue
-        boards = tuple(board for board in boards if board == seen.board)
+        boards = tuple(board for board in boards if board == detection.board)
         try:
-            found = locate_board(Corners.of(seen), camera, priors)
+            pose = locate_board(Corners.of(detection), camera, priors)
         except ValueError:
-            count = len(seen.ids)
+            count = len(detection.ids)
             yield Tracked(_without_image(frame), "no pose", boards[0], count, None)
             continue
-        state = "seen" if found.odds >= ODDS else "ambiguous"
-        yield Tracked(_without_image(frame), state, boards[0], len(seen.ids), found)
+        state = "seen" if pose.odds >= ODDS else "ambiguous"
+        yield Tracked(_without_image(frame), state, boards[0], len(detection.ids), pose)
 
 
 def _without_image(frame: Frame) -> Frame:
@@ -130,9 +130,9 @@ def pick_frames(source: str, board: Board, folder: Path, most: int) -> Iterator[
     without any frame.
     """
 
-    def new_place(frame: Frame, seen: Detection, kept: list[tuple[int, Detection]]) -> bool:
+    def new_place(frame: Frame, detection: Detection, kept: list[tuple[int, Detection]]) -> bool:
         far = NEW_SHARE * frame.image.shape[1]
-        return all(_moved(seen, old) >= far for _, old in kept)
+        return all(_moved(detection, old) >= far for _, old in kept)
 
     yield from _picked(source, (board,), folder, most, new_place)
 
@@ -176,8 +176,8 @@ def frames_of(source: str) -> Iterator[Frame]:
             if number is None:
                 yield Frame(index, index / rate, image, count, stamp, rate_Hz=stated)
             else:
-                own = stamp if stamp > 0.0 else math.nan
-                yield Frame(index, now - began, image, count, own, now)
+                camera_time = stamp if stamp > 0.0 else math.nan
+                yield Frame(index, now - began, image, count, camera_time, now)
             index += 1
             good, image = video.read()
     finally:
@@ -209,11 +209,11 @@ def timed(frames: Iterable[Frame], source: str) -> Iterator[Frame]:
             first = frame.stamp_s
         passed = frame.stamp_s - first
         if frame.number % RATE_EVERY == RATE_EVERY - 1 and passed > 0.0:
-            found = frame.number / passed
-            if not 1.0 - RATE_SHARE < found / frame.rate_Hz < 1.0 + RATE_SHARE:
+            measured_Hz = frame.number / passed
+            if not 1.0 - RATE_SHARE < measured_Hz / frame.rate_Hz < 1.0 + RATE_SHARE:
                 raise InputError(
                     f"{source} states a frame rate of {frame.rate_Hz:g} per second, and its time "
-                    f"stamps have {found:.3g}: {_ENCODE}."
+                    f"stamps have {measured_Hz:.3g}: {_ENCODE}."
                 )
         yield frame
 
@@ -234,12 +234,12 @@ def _picked(
     try:
         for frame in frames_of(source):
             name = f"frame-{frame.number:05d}.png"
-            seen = look(frame.image, boards, name)
-            still = _moved(seen, previous) < STILL_SHARE * frame.image.shape[1]
-            previous = seen
-            if seen is None or not still or not wanted(frame, seen, kept):
+            detection = look(frame.image, boards, name)
+            still = _moved(detection, previous) < STILL_SHARE * frame.image.shape[1]
+            previous = detection
+            if detection is None or not still or not wanted(frame, detection, kept):
                 continue
-            kept.append((frame.number, seen))
+            kept.append((frame.number, detection))
             yield _stored(frame.image, folder / name)
             if len(kept) >= most:
                 return
@@ -257,14 +257,14 @@ def look(image: Any, boards: Sequence[Board], name: str) -> Detection | None:
         return None
 
 
-def _moved(one: Detection | None, other: Detection | None) -> float:
+def _moved(first: Detection | None, second: Detection | None) -> float:
     """Median distance in pixels between the corners that both show."""
-    if one is None or other is None:
+    if first is None or second is None:
         return float("inf")
-    _, here, there = np.intersect1d(one.ids, other.ids, return_indices=True)
+    _, here, there = np.intersect1d(first.ids, second.ids, return_indices=True)
     if len(here) < 4:
         return float("inf")
-    apart = one.pixels[here] - other.pixels[there]
+    apart = first.pixels[here] - second.pixels[there]
     return float(np.median(np.linalg.norm(apart, axis=1)))
 
 

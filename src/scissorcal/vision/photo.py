@@ -39,8 +39,6 @@ Picture = NDArray[np.uint8]
 MAX_PIXELS = 25_000_000
 """Default size limit; larger photographs are reduced by 2, 4 or 8."""
 
-_DECODER = "scissorcal.vision.photo"
-
 
 @dataclass(frozen=True)
 class Photo:
@@ -76,8 +74,6 @@ class Photo:
 
         Raises ValueError unless ``factor`` divides both sides, as the rest would be cut off.
         """
-        from scissorcal.vision.photo import averaged
-
         rows, columns = self.image.shape[:2]
         if factor < 1 or rows % factor or columns % factor:
             raise ValueError(f"{columns} x {rows} pixels are no multiples of {factor}")
@@ -106,7 +102,7 @@ def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True)
     """
     data = read_foreign(path, PHOTOGRAPH)
     options = {"path": str(path), "max_pixels": max_pixels, "colour": colour}
-    facts = parse_isolated(f"{_DECODER}:decode", data, path, PHOTOGRAPH, **options)
+    facts = parse_isolated(f"{__name__}:decode", data, path, PHOTOGRAPH, **options)
     return Photo(
         facts["image"],
         facts["width"],
@@ -122,7 +118,7 @@ def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True)
 def picture_size(path: Path) -> tuple[int, int]:
     """Width and height in pixels by the header alone; raises InputError as `read_photo` does."""
     data = read_foreign(path, PHOTOGRAPH)
-    found = parse_isolated(f"{_DECODER}:decode_size", data, path, PHOTOGRAPH, path=str(path))
+    found = parse_isolated(f"{__name__}:decode_size", data, path, PHOTOGRAPH, path=str(path))
     return found[0], found[1]
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
-from scissorcal.recipe.svg import paths
+from scissorcal.recipe.svg import path_data as paths
 
 _LISTS: Any = json.loads(Path(__file__).with_name("names.json").read_text("utf-8"))
 """The names, of which the prototype's page has the same (``svg_names.ts``)."""
@@ -108,13 +108,13 @@ def shown_shapes(data: bytes) -> list[DrawnShape]:
     ValueError for what places, shapes or hides something in a way that is not read, by its name,
     and for what is refused anywhere: scripts, animations, other files, entities.
     """
-    found = _Shapes()
+    collected = _Shapes()
     parser = expat.ParserCreate(namespace_separator=" ")
-    parser.StartElementHandler, parser.EndElementHandler = found.begin, found.end
-    parser.CharacterDataHandler = found.said
-    parser.ProcessingInstructionHandler = found.instructed
+    parser.StartElementHandler, parser.EndElementHandler = collected.begin, collected.end
+    parser.CharacterDataHandler = collected.said
+    parser.ProcessingInstructionHandler = collected.instructed
     _parse(parser, _without_type(data))
-    return found.shapes
+    return collected.shapes
 
 
 class _Shapes:
@@ -151,8 +151,8 @@ class _Shapes:
         passed = space not in _SVG or tag in PASSED_OVER
         self._hidden.append(self._hidden[-1] or passed)
         if not self._hidden[-1]:
-            own = {key: value for key, value in attributes.items() if " " not in key}
-            self._shown(tag, own, is_root)
+            svg_attributes = {key: value for key, value in attributes.items() if " " not in key}
+            self._shown(tag, svg_attributes, is_root)
 
     def end(self, name: str) -> None:
         """Called where an element ends."""
@@ -296,10 +296,10 @@ def _parse(parser: Any, data: bytes) -> None:
 def refuse_attributes(tag: str, keys: dict[str, str], *, is_root: bool = False) -> None:
     """Raise ValueError for an attribute of a shown element that is not understood, by its name."""
     for key, value in keys.items():
-        own = SHAPES.get(tag, _ROOT if is_root else _LINK if tag == "a" else ())
+        of_element = SHAPES.get(tag, _ROOT if is_root else _LINK if tag == "a" else ())
         if key == "transform" and is_root:
             raise ValueError(f"it has transform as an attribute of its root: {_APPLY}")
-        if key in own or key in _ANY or key.startswith(("data-", "aria-")):
+        if key in of_element or key in _ANY or key.startswith(("data-", "aria-")):
             continue
         _refuse_property(key, value, f"as an attribute of <{tag}>")
 
@@ -309,17 +309,17 @@ def style_properties(style: str, *, is_root: bool = False) -> dict[str, str]:
 
     Raises ValueError for one that is not understood, by its name.
     """
-    found: dict[str, str] = {}
+    properties: dict[str, str] = {}
     for key, value in _declarations(style, "in a style"):
         if key in ("display", "visibility", "transform"):
-            if key in found:
+            if key in properties:
                 raise ValueError(f"it has {key} twice in a style: keep one")
-            found[key] = value
+            properties[key] = value
         if key == "transform" and is_root:  # it turns about the middle of the page
             raise ValueError(f"it has transform in a style of its root: {_APPLY}")
         if key != "transform":
             _refuse_property(key, value, "in a style")
-    return found
+    return properties
 
 
 def refuse_style_sheet(text: str) -> None:
@@ -340,29 +340,33 @@ def _declarations(text: str, where: str) -> Iterator[tuple[str, str]]:
     """Properties, in lower case, with their values; of a sheet those of all its rules."""
     if "\\" in text:
         raise ValueError(f"it has an escape (\\) {where}: save it as plain SVG")
-    plain = _ASIDE.sub(lambda one: " " if one[0].startswith("/*") else "_", text)
+    plain = _ASIDE.sub(lambda match: " " if match[0].startswith("/*") else "_", text)
     if '"' in plain or "'" in plain:
         raise ValueError(f"it has a quote that is not closed {where}: save it as plain SVG")
     for statement in _STATEMENT.finditer(plain):
-        said = statement[1].strip()
-        if said[:7].lower() == "@import":
+        declaration = statement[1].strip()
+        if declaration[:7].lower() == "@import":
             raise ValueError("it refers to another file (@import): embed or remove it")
-        key, colon, value = said.partition(":")
+        key, colon, value = declaration.partition(":")
         if statement[2] != "{" and colon:
             yield key.strip().lower(), value.partition("!")[0].strip()
 
 
 def _refuse_property(key: str, value: str, where: str) -> None:
     bare = _VENDOR.sub("", key, count=1)
-    said = value.strip().lower()
-    if bare in _LOOKS or bare.startswith(_LOOKS_BEGIN) or (said == "none" and bare in _NOTHING):
+    plain_value = value.strip().lower()
+    if (
+        bare in _LOOKS
+        or bare.startswith(_LOOKS_BEGIN)
+        or (plain_value == "none" and bare in _NOTHING)
+    ):
         return
-    if key in _HIDING and said in ("", *_HIDING[key]):
+    if key in _HIDING and plain_value in ("", *_HIDING[key]):
         return
     raise _refusal(key, where)
 
 
 def _refusal(key: str, where: str) -> ValueError:
     name = key[:40]
-    remedy = next((said for names, said in _REMEDIES if names.fullmatch(_VENDOR.sub("", key))), "")
+    remedy = next((cure for names, cure in _REMEDIES if names.fullmatch(_VENDOR.sub("", key))), "")
     return ValueError(f"it has {name} {where}, which is not read: {remedy or f'remove {name}'}")

@@ -92,10 +92,10 @@ def find_border(blade: PicturedBlade, side: Side, last: float, search: float) ->
         best = inner if _merit(inner) > _INNER_MERIT * _merit(outer) else outer
         if side == "back" and _merit(best) < _LEAST_MERIT:
             return _as_followed(lines[-1], _in_focus(parts, per_unit))
-        points, normals, found, blur = best
+        points, normals, crossed, blur = best
     else:
-        points, normals, found, blur = _crossed(light, *rough_side.followed(search, "steepest"))
-    good = found.good & _alike(found)
+        points, normals, crossed, blur = _crossed(light, *rough_side.followed(search, "steepest"))
+    good = crossed.good & _alike(crossed)
     share = float(good.mean())
     _refuse_blur(blur, per_unit, parts, source)
     if share < (_LEAST_IN_SHADOW if shadowed else _LEAST_GOOD)[side]:
@@ -104,9 +104,9 @@ def find_border(blade: PicturedBlade, side: Side, last: float, search: float) ->
             "mirror's glare, a shadow or dirt hides the rest. Turn the blade or the lamp so that "
             "the metal looks darker than the sheet."
         )
-    seen = points + normals * found.place[:, None]
+    places = points + normals * crossed.place[:, None]
     return BorderPoints(
-        seen[good], normals[good], found.sd[good], found.blur[good] / blur, blur, share
+        places[good], normals[good], crossed.sd[good], crossed.blur[good] / blur, blur, share
     )
 
 
@@ -142,18 +142,18 @@ class _Rough:
 
 def _crossed(light: Light, points: Array, normals: Array) -> tuple[Array, Array, Crossings, float]:
     """A line of points and normals with its crossings, wide enough for their blur, and that."""
-    found = crossings(light, points, normals, 6.0)
-    blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
+    crossed = crossings(light, points, normals, 6.0)
+    blur = float(np.median(crossed.blur[crossed.good])) if crossed.good.any() else np.inf
     if blur > 1.6:
-        found = crossings(light, points, normals, float(np.clip(4.0 * blur, 6.0, 30.0)))
-        blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
-    return points, normals, found, blur
+        crossed = crossings(light, points, normals, float(np.clip(4.0 * blur, 6.0, 30.0)))
+        blur = float(np.median(crossed.blur[crossed.good])) if crossed.good.any() else np.inf
+    return points, normals, crossed, blur
 
 
 def _merit(line: tuple[Array, Array, Crossings, float]) -> float:
     """How much of a line is one clear border, divided by its blur: a shadow's is soft."""
-    _, _, found, blur = line
-    return float(np.mean(found.good & _alike(found))) / max(blur, 1.0)
+    _, _, crossed, blur = line
+    return float(np.mean(crossed.good & _alike(crossed))) / max(blur, 1.0)
 
 
 def _as_followed(line: tuple[Array, Array], soft: float) -> BorderPoints:
@@ -162,8 +162,8 @@ def _as_followed(line: tuple[Array, Array], soft: float) -> BorderPoints:
     It is good to about the blur ``soft`` of a border in focus.
     """
     points, normals = line
-    one = np.ones(len(points))
-    return BorderPoints(points, normals, soft * one, one, soft, 1.0)
+    ones = np.ones(len(points))
+    return BorderPoints(points, normals, soft * ones, ones, soft, 1.0)
 
 
 def _in_focus(parts: BladeParts, per_unit: float) -> float:
@@ -180,15 +180,15 @@ def _refuse_blur(blur: float, per_unit: float, parts: BladeParts, source: str) -
         )
 
 
-def _alike(found: Crossings) -> NDArray[np.bool_]:
+def _alike(crossed: Crossings) -> NDArray[np.bool_]:
     """Crossings whose blur and contrast are like those of most."""
-    contrast = found.outer - found.inner
-    usual = np.median(contrast[found.good]) if found.good.any() else 0.0
-    blur = np.median(found.blur[found.good]) if found.good.any() else 1.0
+    contrast = crossed.outer - crossed.inner
+    usual = np.median(contrast[crossed.good]) if crossed.good.any() else 0.0
+    blur = np.median(crossed.blur[crossed.good]) if crossed.good.any() else 1.0
     return np.asarray(
         (contrast * np.sign(usual) > 0.25 * abs(usual))
-        & (found.blur < 1.8 * blur + 0.2)
-        & (found.blur > 0.4 * blur - 0.3)
+        & (crossed.blur < 1.8 * blur + 0.2)
+        & (crossed.blur > 0.4 * blur - 0.3)
     )
 
 
@@ -206,20 +206,20 @@ def find_hole(blade: PicturedBlade) -> BorderPoints | None:
         inward = view.to_pixels(middle + 0.98 * radius * ring) - points
         size = float(np.median(np.linalg.norm(points - points.mean(axis=0), axis=1)))
         normals = inward / np.linalg.norm(inward, axis=1, keepdims=True)
-        found = crossings(light, points, normals, float(np.clip(0.6 * size, 3.0, 12.0)))
-        if found.good.sum() < 60:
+        crossed = crossings(light, points, normals, float(np.clip(0.6 * size, 3.0, 12.0)))
+        if crossed.good.sum() < 60:
             return None
-        seen = points + normals * found.place[:, None]
-        middle, radius = fit_circle(view.to_sheet(seen[found.good]))
-        off = np.abs(np.linalg.norm(view.to_sheet(seen) - middle, axis=1) - radius)
-        sure = found.good & (off < 4.0 * 1.4826 * np.median(off[found.good]) + 1e-12)
-        middle, radius = fit_circle(view.to_sheet(seen[sure]))
+        places = points + normals * crossed.place[:, None]
+        middle, radius = fit_circle(view.to_sheet(places[crossed.good]))
+        off = np.abs(np.linalg.norm(view.to_sheet(places) - middle, axis=1) - radius)
+        sure = crossed.good & (off < 4.0 * 1.4826 * np.median(off[crossed.good]) + 1e-12)
+        middle, radius = fit_circle(view.to_sheet(places[sure]))
     return BorderPoints(
-        seen[sure],
+        places[sure],
         normals[sure],
-        found.sd[sure],
+        crossed.sd[sure],
         np.ones(int(sure.sum())),
-        float(np.median(found.blur[sure])),
+        float(np.median(crossed.blur[sure])),
         1.0,
     )
 

@@ -80,10 +80,10 @@ def measure_blade(
     back = find_border(blade, "back", BACK_LAST, search)
     for border, what in ((edge, "edge"), (back, "back")):
         _refuse_unhalved(view, parts, border, f"{source}: too little of the blade's {what}")
-    seen = SeenBorders(edge, back, find_hole(blade))
-    frame = _framed(view, parts, seen)
+    borders = SeenBorders(edge, back, find_hole(blade))
+    frame = _framed(view, parts, borders)
     pivot, axis, up = frame.pivot, frame.axis, frame.up
-    columns, names = edge_modes(view, seen, frame, parts, priors)
+    columns, names = edge_modes(view, borders, frame, parts, priors)
     there = view.to_sheet(edge.pixels)
     station, offset = frame.of(there)
     # noise along the normals in pixels becomes noise along ``up`` in sheet units
@@ -126,14 +126,15 @@ def _refuse_unhalved(view: View, parts: BladeParts, border: BorderPoints, what: 
         )
 
 
-def _framed(view: View, parts: BladeParts, seen: SeenBorders) -> BladeFrame:
+def _framed(view: View, parts: BladeParts, borders: SeenBorders) -> BladeFrame:
     """The blade's frame as its borders give it."""
-    if seen.hole is None:
+    if borders.hole is None:
         pivot, radius = parts.pivot, 0.0
     else:
-        pivot, radius = fit_circle(view.to_sheet(seen.hole.pixels))
+        pivot, radius = fit_circle(view.to_sheet(borders.hole.pixels))
     sides = [
-        view.to_sheet(border.pixels[border.softness < SHARP]) for border in (seen.edge, seen.back)
+        view.to_sheet(border.pixels[border.softness < SHARP])
+        for border in (borders.edge, borders.back)
     ]
     axis, up = parts.axis, parts.up
     for _ in range(3):
@@ -183,9 +184,9 @@ def _smooth(station: Array, offset: Array, along: Array) -> Array:
     places = 0.5 * (cells[1:] + cells[:-1])
     values = np.polyval(curve, places - middle)
     for cell in range(_STRETCHES):
-        own = kept & (index == cell)
-        if own.sum() >= 2:
-            shift = e[own] - np.polyval(curve, s[own] - middle)
+        in_cell = kept & (index == cell)
+        if in_cell.sum() >= 2:
+            shift = e[in_cell] - np.polyval(curve, s[in_cell] - middle)
             values[cell] += float(np.median(shift))
     return np.asarray(np.interp(along, places, values))
 

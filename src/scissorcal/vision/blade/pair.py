@@ -90,14 +90,14 @@ def measure_pair(
     pixels = view.to_pixels(np.array([tips[0].pivot, *ends]))
     sds = [parts.tip_sd / parts.length for parts in tips]
     real = 0.01 * priors.pair_length_sd_percent
-    own = hypot(*sds, real)
+    sd_of_pair = hypot(*sds, real)
     ratio = _log_ratio(view, pixels, view.values)
-    sd, tilt = own, 0.0
+    sd, tilt = sd_of_pair, 0.0
     leant = view
     if isinstance(view, PlainView) and view.lean_covariance is not None:
         slope = _slope(view, pixels)
         carried = view.lean_covariance @ slope
-        sd = float(np.sqrt(own**2 + slope @ carried))
+        sd = float(np.sqrt(sd_of_pair**2 + slope @ carried))
         tilt = float(np.degrees(abs(ratio) / max(float(np.linalg.norm(slope[:2])), 1e-12)))
         gain = carried / sd**2
         leant = view.leaning(-gain * ratio, view.lean_covariance - np.outer(gain, carried))
@@ -106,15 +106,17 @@ def measure_pair(
         measure_blade(PicturedBlade(light, leant, parts, source), priors, search=SEARCH)
         for parts in tips
     ]
-    lengths = [one.length for one in measured]
+    lengths = [measurement.length for measurement in measured]
     pair = float(np.exp(np.mean(np.log(lengths))))
     middle = float(np.linalg.norm(measured[0].parts.axis + measured[1].parts.axis)) / 2.0
     share = hypot(0.5 * hypot(*sds), 0.5 * real, tips[0].pivot_sd * middle / pair)
-    sized = tuple(replace(one, unit_length=pair, unit_length_sd=share) for one in measured)
-    seen = (
+    sized = tuple(
+        replace(measurement, unit_length=pair, unit_length_sd=share) for measurement in measured
+    )
+    seen_lengths = (
         (float(tips[0].length), float(tips[1].length)) if leant is view else _lengths(view, pixels)
     )
-    return leant, sized, PairLengths(seen, ratio, sd, tilt)
+    return leant, sized, PairLengths(seen_lengths, ratio, sd, tilt)
 
 
 def _of_metal(blade: PicturedBlade) -> BladeParts:

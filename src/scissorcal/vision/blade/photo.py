@@ -54,10 +54,16 @@ class BladePhoto:
         if self.scissors is not None and not self.measured:
             return f"{name}: closed scissors; their edges hide each other"
         parts = []
-        for one in self.measured:
-            length = f"{1e3 * one.length:.2f} mm" if one.metric else f"{one.length:.0f} px"
-            blur = one.edge.blur_px
-            parts.append(f"{length} long, {len(one.station)} points, borders {blur:.1f} px soft")
+        for measurement in self.measured:
+            length = (
+                f"{1e3 * measurement.length:.2f} mm"
+                if measurement.metric
+                else f"{measurement.length:.0f} px"
+            )
+            blur = measurement.edge.blur_px
+            parts.append(
+                f"{length} long, {len(measurement.station)} points, borders {blur:.1f} px soft"
+            )
         text = f"{name}: " + "; ".join(parts)
         if self.scissors is not None:
             text += f"; open by {np.degrees(self.scissors.opening):.1f} deg"
@@ -68,11 +74,11 @@ class BladePhoto:
 
 def by_blade(photos: Sequence[BladePhoto]) -> dict[str, list[BladeMeasurement]]:
     """Measurements of all photographs by blade's name, in alphabetical order."""
-    found: dict[str, list[BladeMeasurement]] = {}
+    measurements: dict[str, list[BladeMeasurement]] = {}
     for photo in photos:
         for name, measured in zip(photo.names, photo.measured, strict=True):
-            found.setdefault(name, []).append(measured)
-    return dict(sorted(found.items()))
+            measurements.setdefault(name, []).append(measured)
+    return dict(sorted(measurements.items()))
 
 
 @dataclass(frozen=True)
@@ -161,7 +167,7 @@ def photograph_scissors(
     if not scissors.blades:
         return BladePhoto(photo, view, outline, (), scissors)
     view, measured, lengths = measure_pair(light, view, scissors.blades, photo.source, priors)
-    blades = tuple(one.parts for one in measured)
+    blades = tuple(measurement.parts for measurement in measured)
     along = float(blades[0].axis @ blades[1].axis)
     opening = float(np.arccos(np.clip(along, -1.0, 1.0)))
     scissors = replace(scissors, blades=blades, opening=opening)

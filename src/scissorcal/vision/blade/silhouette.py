@@ -99,7 +99,7 @@ class Silhouette:
         cv2.fillPoly(whole, [np.rint(self.grid(self.outer)).astype(np.int32)], 255)
         metal = float(np.median(self.relative[self.mask > 0]))
         inner = cv2.erode(whole, np.ones((3, 3), np.uint8))
-        found = []
+        outlines = []
         for share in _LEVELS:
             level = metal + share * (1.0 - metal)
             bright = ((self.relative > level) & (inner > 0)).astype(np.uint8)
@@ -107,8 +107,8 @@ class Silhouette:
             for contour in contours:
                 if cv2.contourArea(contour) > 12.0:
                     place = np.asarray(contour, dtype=np.float64).reshape(-1, 2)
-                    found.append(place * self.pixel + np.asarray(self.origin))
-        return found
+                    outlines.append(place * self.pixel + np.asarray(self.origin))
+        return outlines
 
     def grid(self, points: Array) -> Array:
         """Places (n, 2) of sheet points in the flat picture, in its pixels."""
@@ -141,13 +141,13 @@ def _flat(light: Light, view: View, pixel: float) -> Light:
     x, y = np.meshgrid(np.linspace(0, columns - 1, coarse[0]), np.linspace(0, rows - 1, coarse[1]))
     points = np.column_stack([x.ravel() * pixel + left, y.ravel() * pixel + top])
     there = view.to_pixels(points).reshape(coarse[1], coarse[0], 2)
-    seen = zoom(there, (rows / coarse[1], columns / coarse[0], 1.0), order=1)
-    spacing = float(np.nanmedian(np.abs(np.diff(seen[..., 0], axis=1)))) + float(
-        np.nanmedian(np.abs(np.diff(seen[..., 1], axis=1)))
+    pixels = zoom(there, (rows / coarse[1], columns / coarse[0], 1.0), order=1)
+    spacing = float(np.nanmedian(np.abs(np.diff(pixels[..., 0], axis=1)))) + float(
+        np.nanmedian(np.abs(np.diff(pixels[..., 1], axis=1)))
     )
     if spacing > 1.5:
         light = np.asarray(cv2.GaussianBlur(light, (0, 0), 0.4 * spacing), dtype=np.float32)
-    x, y = np.moveaxis(np.nan_to_num(seen, nan=-1.0).astype(np.float32), -1, 0)
+    x, y = np.moveaxis(np.nan_to_num(pixels, nan=-1.0).astype(np.float32), -1, 0)
     return np.asarray(
         cv2.remap(light, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE),
         dtype=np.float32,
@@ -207,10 +207,10 @@ def _outlined(
 ) -> Silhouette:
     import cv2
 
-    found, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    if not found:
+    contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    if not contours:
         raise InputError(f"{source}: nothing is on the sheet.")
-    areas = [cv2.contourArea(c) if tree[0][i][3] < 0 else 0.0 for i, c in enumerate(found)]
+    areas = [cv2.contourArea(c) if tree[0][i][3] < 0 else 0.0 for i, c in enumerate(contours)]
     order = np.argsort(areas)[::-1]
     main = int(order[0])
     if areas[main] < _LEAST_SHARE * mask.size:
@@ -220,23 +220,25 @@ def _outlined(
         return np.asarray(contour.reshape(-1, 2) * pixel + np.asarray(origin), dtype=np.float64)
 
     holes = [
-        place(c) for i, c in enumerate(found) if tree[0][i][3] == main and cv2.contourArea(c) > 20.0
+        place(c)
+        for i, c in enumerate(contours)
+        if tree[0][i][3] == main and cv2.contourArea(c) > 20.0
     ]
-    others = [place(np.asarray(found[i])) for i in order[1:] if areas[i] > 0.2 * areas[main]]
-    own = np.zeros_like(mask)
-    cv2.drawContours(own, found, main, 255, cv2.FILLED)
-    edge = found[main].reshape(-1, 2)
+    others = [place(np.asarray(contours[i])) for i in order[1:] if areas[i] > 0.2 * areas[main]]
+    filled = np.zeros_like(mask)
+    cv2.drawContours(filled, contours, main, 255, cv2.FILLED)
+    edge = contours[main].reshape(-1, 2)
     rows, columns = mask.shape
     out = (edge[:, 0] <= 1) | (edge[:, 1] <= 1) | (edge[:, 0] >= columns - 2)
     out |= edge[:, 1] >= rows - 2
     return Silhouette(
-        place(np.asarray(found[main])),
+        place(np.asarray(contours[main])),
         tuple(holes),
         tuple(others),
         place(edge[out]),
         pixel,
         origin,
-        np.asarray(own & mask, dtype=np.uint8),
+        np.asarray(filled & mask, dtype=np.uint8),
         relative,
     )
 

@@ -59,10 +59,12 @@ class PlainView:
     @property
     def uncertainty(self) -> str:
         tilt = np.degrees(np.hypot(*self.lean[:2]))
-        seen = f"the blades' lengths suggest a tilt of {tilt:.1f} deg, which is allowed for"
+        tilt_sentence = (
+            f"the blades' lengths suggest a tilt of {tilt:.1f} deg, which is allowed for"
+        )
         if self.scale is None:
-            return f"No mat: the shape has no scale, and {seen}."
-        return f"No mat: the scale is as stated, and {seen}."
+            return f"No mat: the shape has no scale, and {tilt_sentence}."
+        return f"No mat: the scale is as stated, and {tilt_sentence}."
 
     @property
     def values(self) -> Array:
@@ -166,18 +168,18 @@ def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePrio
     where no mat, another target, or too little of it is seen, or where the camera is not that of
     the photograph.
     """
-    seen = find_board(photo, BLADE_MAT)
-    if len(seen.ids) < 4 * LEAST_MARKERS:
+    detection = find_board(photo, BLADE_MAT)
+    if len(detection.ids) < 4 * LEAST_MARKERS:
         raise InputError(
-            f"{photo.source} shows {len(seen.ids) // 4} of the {BLADE_MAT.name}'s "
+            f"{photo.source} shows {len(detection.ids) // 4} of the {BLADE_MAT.name}'s "
             f"{len(BLADE_MAT.ids)} markers sharply; {LEAST_MARKERS} are needed. Photograph the "
             "whole mat, in focus and without glare."
         )
     height, width = photo.image.shape[:2]
-    seen = replace(seen, pixels=photo.within(seen.pixels))
+    detection = replace(detection, pixels=photo.within(detection.pixels))
     printed = (0.01 * priors.print_scale_sd_percent) ** 2 * np.eye(2)
     if camera is None:
-        return _homography_view(seen, (width, height), printed, photo.source)
+        return _homography_view(detection, (width, height), printed, photo.source)
     if (camera.width, camera.height) != (photo.width, photo.height):
         raise InputError(
             f"{photo.source} has {photo.width} x {photo.height} pixels, but the camera was fitted "
@@ -185,7 +187,7 @@ def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePrio
         )
     if photo.reduction > 1:
         camera = camera.scaled(width, height)
-    return _camera_view(seen, camera, printed, photo.source)
+    return _camera_view(detection, camera, printed, photo.source)
 
 
 @dataclass(frozen=True)
@@ -262,10 +264,10 @@ class HomographyView(_MatView):
         return np.asarray(bent * _half(self.size) + _middle(self.size))
 
 
-def _camera_view(seen: Detection, camera: Camera, printed: Array, source: str) -> CameraView:
+def _camera_view(detection: Detection, camera: Camera, printed: Array, source: str) -> CameraView:
     import cv2
 
-    corners = Corners.of(seen)
+    corners = Corners.of(detection)
     try:
         board = locate_board(corners, camera)
     except ValueError as error:
@@ -275,11 +277,11 @@ def _camera_view(seen: Detection, camera: Camera, printed: Array, source: str) -
     pose = np.concatenate([np.ravel(turn), np.asarray(board.pose.translation_m)])
     residual, slope = project_pose(pose, corners.where(whole), camera)
     J, inner = slope[:, :6], slope[:, 6:]
-    own, spread = _covariance(J, residual.ravel())
+    measured, spread = _covariance(J, residual.ravel())
     follow = -np.linalg.solve(J.T @ J, J.T @ inner)
     known = np.zeros((9, 9)) if camera.covariance is None else camera.covariance
     covariance = np.zeros((17, 17))
-    covariance[:6, :6] = own + follow @ known @ follow.T
+    covariance[:6, :6] = measured + follow @ known @ follow.T
     covariance[:6, 6:15] = follow @ known
     covariance[6:15, :6] = covariance[:6, 6:15].T
     covariance[6:15, 6:15] = known
@@ -289,12 +291,12 @@ def _camera_view(seen: Detection, camera: Camera, printed: Array, source: str) -
 
 
 def _homography_view(
-    seen: Detection, size: tuple[int, int], printed: Array, source: str
+    detection: Detection, size: tuple[int, int], printed: Array, source: str
 ) -> HomographyView:
     import cv2
     from scipy.optimize import least_squares
 
-    sheet, pixels = seen.points[:, :2], seen.pixels
+    sheet, pixels = detection.points[:, :2], detection.pixels
     start, _ = cv2.findHomography(_straightened(pixels, 0.0, size), sheet, 0)
     if start is None:
         raise InputError(f"{source}: the mat's markers do not fit a flat sheet.")
@@ -314,9 +316,9 @@ def _homography_view(
         solved = least_squares(miss, solved.x, x_scale="jac", method="lm")
     # what a lens does beyond one radial term is smooth: no more pieces of it than parameters
     J = np.asarray(solved.jac)
-    own, spread = _covariance(J, np.asarray(solved.fun), len(J) / J.shape[1])
+    measured, spread = _covariance(J, np.asarray(solved.fun), len(J) / J.shape[1])
     covariance = np.zeros((11, 11))
-    covariance[:9, :9] = own
+    covariance[:9, :9] = measured
     covariance[9:, 9:] = printed
     words = (
         "No camera fit: a homography and one radial term, with corner residuals of "

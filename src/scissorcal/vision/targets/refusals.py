@@ -145,26 +145,28 @@ def _other_target(grey: Picture, board: Board) -> str | None:
         _, ids, _ = cv2.aruco.ArucoDetector(dictionary(name)).detectMarkers(grey)
         return [] if ids is None else [int(marker) for marker in np.ravel(ids)]
 
-    own = getattr(board, "dictionary", None)
+    dictionary_name = getattr(board, "dictionary", None)
     counts = targets_of(ids_of(DICTIONARY))
     counts.pop(board.name, None)
-    if counts and (board in TARGETS or not _share_markers(own, DICTIONARY)):
+    if counts and (board in TARGETS or not _share_markers(dictionary_name, DICTIONARY)):
         return f"the {next(iter(counts))}"
-    if own is not None and own != DICTIONARY:
-        wrong = [marker for marker in ids_of(own) if marker not in getattr(board, "ids", ())]
+    if dictionary_name is not None and dictionary_name != DICTIONARY:
+        wrong = [
+            marker for marker in ids_of(dictionary_name) if marker not in getattr(board, "ids", ())
+        ]
         if wrong:
-            return f"markers of {own} with other numbers ({min(wrong)}-{max(wrong)})"
+            return f"markers of {dictionary_name} with other numbers ({min(wrong)}-{max(wrong)})"
     for name in (*_OTHERS, *_APRIL):
-        if not _share_markers(own, name) and len(ids_of(name)) >= 2:
+        if not _share_markers(dictionary_name, name) and len(ids_of(name)) >= 2:
             return f"markers of {name}"
     return None
 
 
-def _share_markers(one: str | None, other: str) -> bool:
+def _share_markers(first_name: str | None, second_name: str) -> bool:
     """Whether two dictionaries begin with the same markers, as DICT_4X4_50 and DICT_4X4_250."""
-    if one is None:
+    if first_name is None:
         return False
-    first, second = dictionary(one).bytesList, dictionary(other).bytesList
+    first, second = dictionary(first_name).bytesList, dictionary(second_name).bytesList
     shared = min(len(first), len(second))
     return first.shape[1:] == second.shape[1:] and bool(np.all(first[:shared] == second[:shared]))
 
@@ -173,12 +175,12 @@ def _plain_chessboard(grey: Picture, board: Board) -> bool:
     """Whether the picture shows a chessboard other than the board with its markers unread."""
     import cv2
 
-    own = (board.columns - 1, board.rows - 1) if isinstance(board, CharucoBoard) else None
+    inner = (board.columns - 1, board.rows - 1) if isinstance(board, CharucoBoard) else None
     sizes = ((9, 6), (8, 6), (7, 6), (8, 5), (7, 5), (6, 5), (6, 4), (7, 4))
     return any(
         cv2.findChessboardCorners(grey, size, flags=cv2.CALIB_CB_FAST_CHECK)[0]
         for size in sizes
-        if size not in (own, own and own[::-1])
+        if size not in (inner, inner and inner[::-1])
     )
 
 
@@ -198,8 +200,8 @@ def misread_sentence(grey: Picture, board: Board, name: str) -> str | None:
     if board.kind == "chessboard":
         return None
     for looks, remedy, picture in _copies(grey):
-        seen = _seen(picture, board)
-        layout = _layout(seen, board)
+        markers = _seen(picture, board)
+        layout = _layout(markers, board)
         if layout == board and not looks:
             return None
         if layout is not None:
@@ -228,27 +230,29 @@ def _seen(grey: Picture, board: MarkedBoard) -> Seen:
     import cv2
 
     corners, ids, _ = cv2.aruco.ArucoDetector(dictionary(board.dictionary)).detectMarkers(grey)
-    found = np.zeros(0, np.int64) if ids is None else np.asarray(ids, dtype=np.int64).ravel()
+    numbers = np.zeros(0, np.int64) if ids is None else np.asarray(ids, dtype=np.int64).ravel()
     places = np.array(corners, dtype=np.float64).reshape(-1, 4, 2)
-    own = np.isin(found, board.ids) if board in TARGETS else found >= 0
-    return Seen(found[own], places[own])
+    of_board = np.isin(numbers, board.ids) if board in TARGETS else numbers >= 0
+    return Seen(numbers[of_board], places[of_board])
 
 
-def _layout(seen: Seen, board: MarkedBoard) -> MarkedBoard | None:
+def _layout(markers: Seen, board: MarkedBoard) -> MarkedBoard | None:
     """The layout that most markers fit; the named one of several, and None of several others."""
-    least = max(LEAST_MARKERS, LEAST_SHARE * len(seen.ids))
-    if len(seen.ids) < least:
+    least = max(LEAST_MARKERS, LEAST_SHARE * len(markers.ids))
+    if len(markers.ids) < least:
         return None
     named: list[MarkedBoard] = [board]
-    own = board if isinstance(board, CharucoBoard) and board not in TARGETS else None
-    if own is not None:
-        named += _same_squares(own)
-    counts = [(_fitting(seen, one), one) for one in named]
-    if own is not None and max(count for count, _ in counts) < len(seen.ids):
-        counts += [(_fitting(seen, one), one) for one in _other_columns(seen, own)]
+    square_board = board if isinstance(board, CharucoBoard) and board not in TARGETS else None
+    if square_board is not None:
+        named += _same_squares(square_board)
+    counts = [(_fitting(markers, layout), layout) for layout in named]
+    if square_board is not None and max(count for count, _ in counts) < len(markers.ids):
+        counts += [
+            (_fitting(markers, layout), layout) for layout in _other_columns(markers, square_board)
+        ]
     most = max(count for count, _ in counts)
-    best = [one for count, one in counts if count == most]
-    known = [one for one in best if one in named]
+    best = [layout for count, layout in counts if count == most]
+    known = [layout for layout in best if layout in named]
     if most < least:
         return None
     if board in best:
@@ -268,11 +272,11 @@ def _same_squares(board: CharucoBoard) -> Iterator[CharucoBoard]:
         yield replace(turned, legacy=not turned.legacy)
 
 
-def _other_columns(seen: Seen, board: CharucoBoard) -> Iterator[CharucoBoard]:
+def _other_columns(markers: Seen, board: CharucoBoard) -> Iterator[CharucoBoard]:
     """Boards of other numbers of columns, with as many rows as the largest number needs."""
-    if not len(seen.ids):
+    if not len(markers.ids):
         return
-    needed = int(seen.ids.max()) - board.first_id + 1
+    needed = int(markers.ids.max()) - board.first_id + 1
     for columns in range(3, MOST_COLUMNS + 1):
         if columns in (board.columns, board.rows):
             continue
@@ -282,22 +286,22 @@ def _other_columns(seen: Seen, board: CharucoBoard) -> Iterator[CharucoBoard]:
         yield replace(board, columns=columns, rows=even, legacy=True)
 
 
-def _fitting(seen: Seen, board: MarkedBoard) -> int:
+def _fitting(markers: Seen, board: MarkedBoard) -> int:
     """How many markers one homography brings to their places on the board."""
     import cv2
 
     places = dict(zip(board.ids, _marker_places(board), strict=False))
-    has = [int(one) in places for one in seen.ids]
+    has = [int(number) in places for number in markers.ids]
     if sum(has) < LEAST_MARKERS:
         return 0
-    wanted = np.concatenate([places[int(one)] for one in seen.ids[has]])
+    wanted = np.concatenate([places[int(number)] for number in markers.ids[has]])
     pitch = board.square_m if isinstance(board, CharucoBoard) else board.marker_m
     within = WITHIN_SQUARES * pitch
-    found = seen.corners[has].reshape(-1, 2)
-    matrix, _ = cv2.findHomography(found, wanted, cv2.RANSAC, within, maxIters=_SEARCHES)
+    corners = markers.corners[has].reshape(-1, 2)
+    matrix, _ = cv2.findHomography(corners, wanted, cv2.RANSAC, within, maxIters=_SEARCHES)
     if np.shape(matrix) != (3, 3):
         return 0
-    mapped = cv2.perspectiveTransform(found[None], np.asarray(matrix))[0]
+    mapped = cv2.perspectiveTransform(corners[None], np.asarray(matrix))[0]
     off = np.linalg.norm(mapped - wanted, axis=1).reshape(-1, 4).max(axis=1)
     return int(np.sum(off < within))
 
@@ -305,9 +309,9 @@ def _fitting(seen: Seen, board: MarkedBoard) -> int:
 def _marker_places(board: MarkedBoard) -> list[Array]:
     """Corners (4, 2) of each marker, in the order of its numbers."""
     if isinstance(board, CharucoBoard):
-        found = board.as_opencv().getObjPoints()
-        return [np.asarray(one, dtype=np.float64)[:, :2] for one in found]
-    return [board.marker_corners(one)[:, :2] for one in board.ids]
+        outlines = board.as_opencv().getObjPoints()
+        return [np.asarray(outline, dtype=np.float64)[:, :2] for outline in outlines]
+    return [board.marker_corners(outline)[:, :2] for outline in board.ids]
 
 
 def _what(looks: str, remedy: str, board: MarkedBoard, layout: MarkedBoard) -> str:
@@ -318,13 +322,13 @@ def _what(looks: str, remedy: str, board: MarkedBoard, layout: MarkedBoard) -> s
     name = f"name it --board {words}"
     if layout.columns not in (board.columns, board.rows):
         rows = words.replace(f"x{layout.rows}:", "xROWS:", 1)
-        found = (
+        layout_words = (
             f"with {layout.columns} columns of squares: count its rows, and name it --board {rows}"
         )
     elif layout.columns != board.columns:
-        found = f"with {layout.columns} columns and {layout.rows} rows, not as named: {name}"
+        layout_words = f"with {layout.columns} columns and {layout.rows} rows, not as named: {name}"
     elif layout.legacy:
-        found = f"as OpenCV before 4.6 drew it: {name}"
+        layout_words = f"as OpenCV before 4.6 drew it: {name}"
     else:
-        found = f"as OpenCV draws it since 4.6: {name}"
-    return f"{looks}, and {found}; {remedy}" if looks else found
+        layout_words = f"as OpenCV draws it since 4.6: {name}"
+    return f"{looks}, and {layout_words}; {remedy}" if looks else layout_words

@@ -65,18 +65,18 @@ def path_data(text: str, most: int) -> tuple[str, int]:
         letter, at = command[1], command.end()
         takes, is_first = _TAKES[letter.lower()], True
         while is_first or (takes and _ARGUMENT.match(text, at)):
-            said = []
+            numbers = []
             for place in range(takes):
                 kind = _FLAG if takes == 7 and place in (3, 4) else _ARGUMENT
-                found = kind.match(text, at)
-                if not found or (found[1] and is_first and not place):
+                argument = kind.match(text, at)
+                if not argument or (argument[1] and is_first and not place):
                     raise _no_path(text, at)
-                said.append(finite(found[2]))
-                at = found.end()
+                numbers.append(finite(argument[2]))
+                at = argument.end()
             count += letter not in "zZ" or before in "zZ"  # to close adds no point
             if count > most:
                 return "", count
-            pen.draw(letter, said)
+            pen.draw(letter, numbers)
             before = letter
             letter = {"m": "l", "M": "L"}.get(letter, letter)
             is_first = False
@@ -88,11 +88,11 @@ def points(text: str, most: int) -> tuple[str, int]:
     made: list[str] = []
     at = 0
     while not END.match(text, at) and len(made) <= 2 * most:
-        found = _ARGUMENT.match(text, at)
-        if not found or (found[1] and not at):
+        number = _ARGUMENT.match(text, at)
+        if not number or (number[1] and not at):
             raise ValueError(f'its points are no numbers at "{text[at : at + 20]}": draw it anew')
-        made.append(repr(finite(found[2])))
-        at = found.end()
+        made.append(repr(finite(number[2])))
+        at = number.end()
     if len(made) % 2 and len(made) <= 2 * most:
         raise ValueError("its points end with an x without y: draw it anew")
     return (
@@ -156,38 +156,38 @@ def _no_path(text: str, at: int) -> ValueError:
 
 def user_length(text: str, key: str) -> float:
     """A length in user units; one relative to a page or a font is refused by its unit."""
-    found = _WITH_UNIT.fullmatch(text.strip())
-    if not found or len(text) > LONGEST_NUMBER:
+    length = _WITH_UNIT.fullmatch(text.strip())
+    if not length or len(text) > LONGEST_NUMBER:
         raise ValueError(f'its {key}="{text[:40]}" is no length: state a number')
-    unit = found[2].lower()
+    unit = length[2].lower()
     if unit and unit not in _MM:
-        raise ValueError(f'its {key}="{text[:40]}" is relative ({found[2][:20]}): state a number')
-    return finite(found[1]) * (_MM[unit] / MM_PER_PX if unit else 1.0)
+        raise ValueError(f'its {key}="{text[:40]}" is relative ({length[2][:20]}): state a number')
+    return finite(length[1]) * (_MM[unit] / MM_PER_PX if unit else 1.0)
 
 
 def page_length_mm(text: str, key: str) -> float:
     """A length of the page, above 0 and in a unit that has a size."""
-    found = _WITH_UNIT.fullmatch(text.strip())
-    unit = found[2] if found else ""
-    if not found or unit not in _MM or unit == "px" or not finite(found[1]) > 0.0:
+    length = _WITH_UNIT.fullmatch(text.strip())
+    unit = length[2] if length else ""
+    if not length or unit not in _MM or unit == "px" or not finite(length[1]) > 0.0:
         raise ValueError(
             f'its {key} is "{text[:40]}": state it with a unit, such as {key}="80mm", so that '
             "lengths are known"
         )
-    return finite(found[1]) * _MM[unit]
+    return finite(length[1]) * _MM[unit]
 
 
 def view_to_mm(attributes: Mapping[str, str]) -> Matrix:
     """The matrix from user units of a page to mm: width, height, viewBox, preserveAspectRatio."""
     width, height = (page_length_mm(attributes.get(key, ""), key) for key in ("width", "height"))
-    said = attributes.get("viewBox")
-    if said is None:
+    view_box = attributes.get("viewBox")
+    if view_box is None:
         return (MM_PER_PX, 0.0, 0.0, MM_PER_PX, 0.0, 0.0)
-    words = re.split(r"[\s,]+", said.strip())
-    box = [finite(one) for one in words if _is_number(one)]
+    words = re.split(r"[\s,]+", view_box.strip())
+    box = [finite(word) for word in words if _is_number(word)]
     if not len(words) == len(box) == 4 or not min(box[2:]) > 0.0:
         raise ValueError(
-            f'its viewBox is "{said[:40]}": state four numbers, the last two above 0, so that '
+            f'its viewBox is "{view_box[:40]}": state four numbers, the last two above 0, so that '
             "lengths are known"
         )
     x, y = width / box[2], height / box[3]
@@ -251,20 +251,27 @@ def _arguments(call: re.Match[str], name: str, css: bool) -> list[float]:
     """The numbers of a function of a transform: lengths in user units, angles in degrees."""
     inner = call[3].strip()
     texts = inner.split(",") if css else re.split(r"\s*,\s*|\s+", inner)
-    found = []
+    arguments = []
     for place, text in enumerate(texts):
-        one = _WITH_UNIT.fullmatch(text.strip())
-        if not one:
+        argument = _WITH_UNIT.fullmatch(text.strip())
+        if not argument:
             raise ValueError(f"its transform has {call[0].strip()[:40]}, no numbers: {_PLAIN}")
-        factor = 1.0 if not one[2] else _factor(name, place, one[2].lower()) if css else None
-        is_bare = css and not one[2] and name not in ("matrix", "scale") and finite(one[1]) != 0.0
+        factor = (
+            1.0 if not argument[2] else _factor(name, place, argument[2].lower()) if css else None
+        )
+        is_bare = (
+            css
+            and not argument[2]
+            and name not in ("matrix", "scale")
+            and finite(argument[1]) != 0.0
+        )
         if factor is None or is_bare:
-            what = "has no unit" if is_bare else f"has the unit {one[2][:20]}"
+            what = "has no unit" if is_bare else f"has the unit {argument[2][:20]}"
             raise ValueError(f"its transform {call[0].strip()[:40]} {what}: {_PLAIN}")
-        found.append(finite(one[1]) * factor)
-    if len(found) not in _COUNTS[name] or (css and name == "rotate" and len(found) != 1):
+        arguments.append(finite(argument[1]) * factor)
+    if len(arguments) not in _COUNTS[name] or (css and name == "rotate" and len(arguments) != 1):
         raise ValueError(f"its transform has {call[0].strip()[:40]}, too many or too few: {_PLAIN}")
-    return found
+    return arguments
 
 
 def _factor(name: str, place: int, unit: str) -> float | None:
