@@ -122,7 +122,8 @@ def import_table(
     sentences = list(table.notes)
     sentences += _opening_goes_on(samples, table, joint)
     if rate_Hz is not None:
-        _set_regular_clock(samples, rate_Hz)
+        samples["sequence"] = np.arange(table.length)
+        _set_times(samples, np.rint(samples["sequence"] * (1e6 / rate_Hz)).astype(np.int64))
     else:
         table, wrapped = _clock_goes_on(table, quantities["time"].factor)
         sentences += wrapped
@@ -184,12 +185,6 @@ def _check_request(
         raise InputError(f"A rate of {rate_Hz} Hz is not possible; give 1 MHz or less.")
     if min_travel is not None and not 0 < min_travel < math.inf:
         raise InputError(f"A least travel of {min_travel} is not possible; give a positive number.")
-
-
-def _set_regular_clock(samples: NDArray[np.void], rate_Hz: float) -> None:
-    index = np.arange(len(samples))
-    samples["sequence"] = index
-    _set_times(samples, np.rint(index * (1e6 / rate_Hz)).astype(np.int64))
 
 
 def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_gaps: bool) -> None:
@@ -259,9 +254,8 @@ def _clock_goes_on(table: Table, factor: float) -> tuple[Table, list[str]]:
         f"The clock begins at {begins} again at {_listed(table, places)}, after {length}: it was "
         "continued."
     )
-    return replace(table, columns={**table.columns, "time": replace(clock, values=values)}), [
-        sentence
-    ]
+    columns = {**table.columns, "time": replace(clock, values=values)}
+    return replace(table, columns=columns), [sentence]
 
 
 def _opening_goes_on(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
