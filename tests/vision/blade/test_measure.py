@@ -10,8 +10,12 @@ from benchmarks.photographs import Glare
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.borders import PicturedBlade
 from scissorcal.vision.blade.measure import measure_blade
-from scissorcal.vision.blade.photo import photograph_blade, photograph_scissors
-from scissorcal.vision.blade.picture import NickMark, blade_picture
+from scissorcal.vision.blade.photo import (
+    NickMark,
+    blade_picture,
+    photograph_blade,
+    photograph_scissors,
+)
 from scissorcal.vision.blade.silhouette import lone_blade
 from scissorcal.vision.blade.view import CameraView
 from scissorcal.vision.photo import Photo

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.edge.result import BladeFit
-from scissorcal.vision.blade.photo import BladePhoto
-from scissorcal.vision.blade.picture import NickMark, blade_picture
+from scissorcal.vision.blade.photo import BladePhoto, NickMark, blade_picture
 
 
 def edge_picture(photo: BladePhoto, fits: Mapping[str, BladeFit]) -> NDArray[np.uint8]:

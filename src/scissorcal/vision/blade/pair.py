@@ -37,18 +37,6 @@ _BEYOND_PX = 3.0
 _SD_PX = 0.5
 
 
-@dataclass(frozen=True)
-class _Tip:
-    """Where the metal ends: ``station`` on the blade's axis with its ``sd``, in sheet units.
-
-    ``border`` (n, 2) is the end's border on the sheet, for pictures.
-    """
-
-    station: float
-    sd: float
-    border: Array
-
-
 SEARCH = 0.1
 """Largest distance, in blade lengths, of the outline of scissors from the metal, by shadows."""
 
@@ -123,8 +111,7 @@ def _of_metal(blade: PicturedBlade) -> BladeParts:
     """The parts with the tip of the metal in place of the outline's, which may be a shadow's."""
     edge, back = (find_border(blade, side, BEFORE_TIP, SEARCH) for side in get_args(Side))
     sides = [blade.view.to_sheet(border.pixels) for border in (edge, back)]
-    tip = _metal_end(blade, sides, max(edge.blur_px, back.blur_px))
-    return replace(blade.parts, length=tip.station, tip_sd=tip.sd, end=tip.border)
+    return _with_metal_end(blade, sides, max(edge.blur_px, back.blur_px))
 
 
 def _lengths(view: View, pixels: Array, values: Array | None = None) -> tuple[float, float]:
@@ -172,8 +159,8 @@ def _in_view(parts: BladeParts, old: View, new: View) -> BladeParts:
     )
 
 
-def _metal_end(blade: PicturedBlade, sides: Sequence[Array], soft: float) -> _Tip:
-    """Find the tip of a blade of which edge and back (n, 2), on the sheet, are known before it.
+def _with_metal_end(blade: PicturedBlade, sides: Sequence[Array], soft: float) -> BladeParts:
+    """The parts of a blade with the tip of its metal; its edge and back (n, 2) are known before.
 
     From a place within the metal short of the tip, the outermost sharp border is followed around
     the end (by the best path over directions). A cast shadow ends beyond the metal with a soft
@@ -204,7 +191,8 @@ def _metal_end(blade: PicturedBlade, sides: Sequence[Array], soft: float) -> _Ti
     rows = np.arange(len(turn))
     border = parts.points(station[rows, path], offset[rows, path])
     ahead = station[rows, path]
-    return _Tip(float(ahead.max()), float(np.hypot(_SD_PX, soft)) * pixel, border)
+    sd = float(np.hypot(_SD_PX, soft)) * pixel
+    return replace(parts, length=float(ahead.max()), tip_sd=sd, end=border)
 
 
 def _offset_at(side: Array, station: float) -> float:

@@ -44,7 +44,7 @@ MOST_COLUMNS = 40
 
 
 @dataclass(frozen=True)
-class Seen:
+class _Markers:
     """Markers of a picture: numbers (n,) and corners (n, 4, 2) in pixels."""
 
     ids: NDArray[np.int64]
@@ -225,7 +225,7 @@ def _copies(grey: Picture) -> Iterator[tuple[str, str, Picture]]:
     yield "mirrored, with black and white swapped", f"{mirror}; {negative}", 255 - flipped
 
 
-def _seen(grey: Picture, board: MarkedBoard) -> Seen:
+def _seen(grey: Picture, board: MarkedBoard) -> _Markers:
     """Markers of the board's dictionary; of a target of scissorcal its own numbers alone."""
     import cv2
 
@@ -233,10 +233,10 @@ def _seen(grey: Picture, board: MarkedBoard) -> Seen:
     numbers = np.zeros(0, np.int64) if ids is None else np.asarray(ids, dtype=np.int64).ravel()
     places = np.array(corners, dtype=np.float64).reshape(-1, 4, 2)
     of_board = np.isin(numbers, board.ids) if board in TARGETS else numbers >= 0
-    return Seen(numbers[of_board], places[of_board])
+    return _Markers(numbers[of_board], places[of_board])
 
 
-def _layout(markers: Seen, board: MarkedBoard) -> MarkedBoard | None:
+def _layout(markers: _Markers, board: MarkedBoard) -> MarkedBoard | None:
     """The layout that most markers fit; the named one of several, and None of several others."""
     least = max(LEAST_MARKERS, LEAST_SHARE * len(markers.ids))
     if len(markers.ids) < least:
@@ -272,7 +272,7 @@ def _same_squares(board: CharucoBoard) -> Iterator[CharucoBoard]:
         yield replace(turned, legacy=not turned.legacy)
 
 
-def _other_columns(markers: Seen, board: CharucoBoard) -> Iterator[CharucoBoard]:
+def _other_columns(markers: _Markers, board: CharucoBoard) -> Iterator[CharucoBoard]:
     """Boards of other numbers of columns, with as many rows as the largest number needs."""
     if not len(markers.ids):
         return
@@ -286,7 +286,7 @@ def _other_columns(markers: Seen, board: CharucoBoard) -> Iterator[CharucoBoard]
         yield replace(board, columns=columns, rows=even, legacy=True)
 
 
-def _fitting(markers: Seen, board: MarkedBoard) -> int:
+def _fitting(markers: _Markers, board: MarkedBoard) -> int:
     """How many markers one homography brings to their places on the board."""
     import cv2
 
