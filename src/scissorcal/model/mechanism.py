@@ -289,20 +289,20 @@ def surface_constraint(
     turn = np.asarray(rotation, dtype=np.float64)
     start = np.asarray(origin, dtype=np.float64)
 
-    def seen(q: Array) -> tuple[float, Array, Array, float]:
+    def level_at(q: Array) -> tuple[float, Array, Array, float]:
         level, gradient, hessian = surface.at(turn.T @ (point.place(q) - start))
         return level, turn @ gradient, turn @ hessian @ turn.T, float(np.linalg.norm(gradient))
 
     def value(q: Array) -> Array:
-        level, _, _, length = seen(q)
+        level, _, _, length = level_at(q)
         return np.array([level / length])
 
     def jacobian(q: Array) -> Array:
-        _, gradient, _, length = seen(q)
+        _, gradient, _, length = level_at(q)
         return np.asarray(gradient @ point.jacobian(q) / length)[None, :]
 
     def bias(q: Array, rates: Array) -> Array:
-        _, gradient, hessian, length = seen(q)
+        _, gradient, hessian, length = level_at(q)
         velocity = point.velocity(q, rates)
         along = gradient @ point.acceleration_bias(q, rates)
         return np.array([(along + velocity @ hessian @ velocity) / length])

@@ -334,7 +334,7 @@ def _range(ends: list[Array], spare: Array | float = 0.0) -> Bounds:
     return np.minimum(*ends) - spare, np.maximum(*ends) + spare
 
 
-def _products(one: Bounds, other: Bounds) -> Bounds:
+def _products(first: Bounds, second: Bounds) -> Bounds:
     """Bounds of a product."""
-    ends = [a * b for a in one for b in other]
+    ends = [a * b for a in first for b in second]
     return np.minimum.reduce(ends), np.maximum.reduce(ends)

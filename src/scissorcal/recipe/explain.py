@@ -75,14 +75,16 @@ def explain(
     unknown = [_path(item) for item in details if item["type"] == "extra_forbidden"]
     meant = {path: _suggest(path, model, document) for path in unknown[:_MOST_COMPARED]}
     excused = {(*path[:-1], key) for path, key in meant.items() if key is not None}
-    details = [one for one in details if one["type"] != "missing" or _path(one) not in excused]
+    details = [
+        detail for detail in details if detail["type"] != "missing" or _path(detail) not in excused
+    ]
     mistakes = [_mistake(item, meant, model) for item in details[:MOST_MISTAKES]]
-    slips = {one.path: one.slip for one in unlikely}
-    mistakes = [(path, f"{said} {slips.get(path, '')}".rstrip()) for path, said in mistakes]
+    slips = {detail.path: detail.slip for detail in unlikely}
+    mistakes = [(path, f"{words} {slips.get(path, '')}".rstrip()) for path, words in mistakes]
     wrong = {path[:depth] for path, _ in mistakes for depth in range(1, len(path) + 1)}
-    alone = [one for one in unlikely if one.path not in wrong]
+    alone = [detail for detail in unlikely if detail.path not in wrong]
     count = len(details) + len(alone)
-    mistakes = [*((one.path, one.told) for one in alone), *mistakes][:MOST_MISTAKES]
+    mistakes = [*((detail.path, detail.told) for detail in alone), *mistakes][:MOST_MISTAKES]
     lines = key_lines(text, [_given(document, path) for path, _ in mistakes])
     ordered = sorted(zip(lines, mistakes, strict=True), key=lambda pair: pair[0] or 0)
     return Mistakes(
@@ -280,9 +282,9 @@ def _model_within(annotation: Any) -> type[BaseModel] | None:
         return annotation
     if isinstance(annotation, types.UnionType) or typing.get_origin(annotation) is typing.Union:
         for member in typing.get_args(annotation):
-            found = _model_within(member)
-            if found is not None:
-                return found
+            inner = _model_within(member)
+            if inner is not None:
+                return inner
     return None
 
 
@@ -337,14 +339,14 @@ def key_lines(text: str, paths: Sequence[Sequence[str | int]]) -> list[int | Non
     parser itself does the reading: a statement ends at the first line where the text up to there
     parses again, so the statement that first brings the key begins right after the one before.
     """
-    found: list[int | None] = [None] * len(paths)
+    lines: list[int | None] = [None] * len(paths)
     for start, _, document in _statements(text):
         for index, path in enumerate(paths):
-            if found[index] is None and _has(document, path):
-                found[index] = start
-        if None not in found:
+            if lines[index] is None and _has(document, path):
+                lines[index] = start
+        if None not in lines:
             break
-    return found
+    return lines
 
 
 def broken_statement(text: str) -> int:

@@ -60,9 +60,9 @@ def _checked(
 ) -> Model:
     error = None
     try:
-        found = model.model_validate(document)
+        checked = model.model_validate(document)
         if not unlikely:
-            return found
+            return checked
     except ValidationError as raised:
         error = raised
     raise InputError(_message(source, explain(error, unlikely, document, text, model)))
@@ -91,19 +91,19 @@ def _parse(text: str, source: str) -> dict[str, Any]:
         line = broken_statement(text)
         where = f", in what begins on line {line}"
     shown = text.splitlines()[line - 1].strip() if line and line <= len(text.splitlines()) else ""
-    seen = f' It reads: "{shown[:80]}".' if shown else ""
+    reads = f' It reads: "{shown[:80]}".' if shown else ""
     hint = _syntax_hint(shown, reason)
-    raise InputError(f"{source}{where}: this is not valid TOML: {reason}.{seen}{hint}")
+    raise InputError(f"{source}{where}: this is not valid TOML: {reason}.{reads}{hint}")
 
 
 def _bounded(document: dict[str, Any]) -> dict[str, Any]:
     """The document; ValueError where a whole number is larger than any float."""
     waiting: list[Any] = [document]
     while waiting:
-        one = waiting.pop()
-        if isinstance(one, dict | list):
-            waiting += one.values() if isinstance(one, dict) else one
-        elif isinstance(one, int) and abs(one) > sys.float_info.max:
+        item = waiting.pop()
+        if isinstance(item, dict | list):
+            waiting += item.values() if isinstance(item, dict) else item
+        elif isinstance(item, int) and abs(item) > sys.float_info.max:
             raise ValueError("a whole number has more than 308 digits")
     return document
 

@@ -101,11 +101,11 @@ def capture_cost(recipe: Recipe, kind: CaptureKind) -> CaptureCost:
             f"excitation_s = {capture.friction.excitation_s:g}"
         )
     elif kind == "friction-advance":
-        own = capture.friction_advance
-        seconds = _slides_s(recipe) + own.excitation_s + capture.handling_s
+        slides = capture.friction_advance
+        seconds = _slides_s(recipe) + slides.excitation_s + capture.handling_s
         causes = (
-            f"capture.friction_advance.speeds_mm_per_s = {_listed(own.speeds_mm_per_s)}, "
-            f"repeats = {own.repeats}, excitation_s = {own.excitation_s:g}"
+            f"capture.friction_advance.speeds_mm_per_s = {_listed(slides.speeds_mm_per_s)}, "
+            f"repeats = {slides.repeats}, excitation_s = {slides.excitation_s:g}"
         )
     else:
         pieces = capture.cut.sheets if recipe.scene.cut else 1
@@ -150,8 +150,8 @@ def _sweeps_s(recipe: Recipe) -> float:
         for begun in (0, 1)
     )
     back = glide_time(high - low, APPROACH_SPEED, TURN_ACCELERATION)
-    every = first * ((repeats + 1) // 2) + second * (repeats // 2)
-    return every + back + 2.0 * DWELL_S + SETTLE_S
+    strokes_s = first * ((repeats + 1) // 2) + second * (repeats // 2)
+    return strokes_s + back + 2.0 * DWELL_S + SETTLE_S
 
 
 def _sweep_s(speed: float, travel: float, from_middle: bool) -> float:
@@ -168,14 +168,14 @@ def _sweep_s(speed: float, travel: float, from_middle: bool) -> float:
 
 
 def _slides_s(recipe: Recipe) -> float:
-    own = recipe.capture.friction_advance
-    length = 1e-3 * own.travel_mm
-    one = sum(
+    slides = recipe.capture.friction_advance
+    length = 1e-3 * slides.travel_mm
+    pass_s = sum(
         2.0 * (glide_time(length, 1e-3 * speed, ADVANCE_ACCELERATION) + DWELL_S)
-        for speed in own.speeds_mm_per_s
+        for speed in slides.speeds_mm_per_s
     )
     back = glide_time(length, ADVANCE_SPEED, ADVANCE_ACCELERATION)
-    return own.repeats * one + back + 2.0 * DWELL_S + SETTLE_S
+    return slides.repeats * pass_s + back + 2.0 * DWELL_S + SETTLE_S
 
 
 def _strokes_s(recipe: Recipe) -> float:

@@ -197,12 +197,12 @@ def unlikely_numbers(document: Mapping[str, Any]) -> list[Unlikely]:
     """
     meant = document.get("unusual", ())
     meant = [key for key in meant if isinstance(key, str)] if isinstance(meant, list) else []
-    found = [Unlikely(("unusual",), _no_range(key)) for key in meant if key not in QUANTITY_OF]
+    unlikely = [Unlikely(("unusual",), _no_range(key)) for key in meant if key not in QUANTITY_OF]
     for key in QUANTITY_OF:
         if key not in meant:
             for path, value in _values(document, key.split("."), ()):
-                found += _judged(key, path, value)
-    return found
+                unlikely += _judged(key, path, value)
+    return unlikely
 
 
 def bounds(key: str) -> tuple[float, float]:
@@ -302,7 +302,9 @@ def _others(unit: Unit) -> list[Unit]:
     if unit.name == "percent":
         return [_SHARE]
     names = next((names for names in _SLIPS if unit.name in names), ())
-    return [one for one in map(parse_unit, names) if one is not None and one.name != unit.name]
+    return [
+        other for other in map(parse_unit, names) if other is not None and other.name != unit.name
+    ]
 
 
 def _label(unit: Unit) -> str:
@@ -318,8 +320,8 @@ def _largest(value: Any) -> float | None:
     if isinstance(value, Mapping):
         value = value.get("median")
     if isinstance(value, list):
-        sizes = [_largest(one) for one in value]
-        return max((one for one in sizes if one is not None), default=None)
+        sizes = [_largest(item) for item in value]
+        return max((item for item in sizes if item is not None), default=None)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         return None
     return abs(float(value))

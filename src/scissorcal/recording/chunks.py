@@ -100,10 +100,10 @@ class ChunkPlaces:
 
     def _search(self) -> Iterator[int]:
         data = self._data
-        found = data.find(_ZSTD_FIELD, _ZSTD_FIELD_AT)
-        while found >= 0:
-            offset = found - _ZSTD_FIELD_AT
+        field = data.find(_ZSTD_FIELD, _ZSTD_FIELD_AT)
+        while field >= 0:
+            offset = field - _ZSTD_FIELD_AT
             opcode, length = HEAD.unpack_from(data, offset)
             if opcode == 6 and offset + HEAD.size + length <= len(data):
                 yield offset
-            found = data.find(_ZSTD_FIELD, found + 1)
+            field = data.find(_ZSTD_FIELD, field + 1)

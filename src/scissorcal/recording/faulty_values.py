@@ -272,7 +272,7 @@ def _apart(values: Array) -> set[float]:
     levels, counts = np.unique(values, return_counts=True)
     if len(levels) < FEWEST_LEVELS:
         return set()
-    found: set[float] = set()
+    apart: set[float] = set()
     for sign in (1, -1):
         # From an end inwards; halves, because the largest numbers have no difference.
         level, count = levels[::sign], counts[::sign]
@@ -283,9 +283,9 @@ def _apart(values: Array) -> set[float]:
             far, held = away > FAR * inside, int(count[:kinds].sum())
             usual = held <= MOST_MARKED * len(values) and count[:kinds].min() > 1
             if away > inside and (far or usual) and not any(_rests(values, x) for x in marks):
-                found |= set(marks.tolist())
+                apart |= set(marks.tolist())
                 break
-    return found
+    return apart
 
 
 def _rests(values: Array, level: float) -> bool:

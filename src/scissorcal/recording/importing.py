@@ -343,25 +343,25 @@ def _label(
     samples["stroke"] = labels.stroke_of_sample
     counts = Counter(stroke.kind for stroke in labels.strokes)
     unit = joint.position_unit
-    found = (
+    stroke_sentence = (
         f"{counts['closing']} closing and {counts['opening']} opening strokes were found, of at "
         f"least {chosen.travel:.3g} {unit} ({chosen.reason})."
     )
-    said, span, noise = [], float(np.ptp(opening)), noise_of(opening)
+    sentences, span, noise = [], float(np.ptp(opening)), noise_of(opening)
     if NOISE_OF_STROKE * noise > max(MOST_NOISE_SHARE * span, chosen.travel):
-        said.append(
+        sentences.append(
             f"The opening goes to and fro by {noise:.3g} {unit} (standard deviation) from sample "
             f"to sample, in a range of {span:.3g} {unit}: strokes found in it may be noise. Check "
             "that the column is of one sensor."
         )
-    travels = [np.ptp(opening[labels.stroke_of_sample == one.index]) for one in labels.strokes]
+    travels = [np.ptp(opening[labels.stroke_of_sample == label.index]) for label in labels.strokes]
     if len(travels) > MANY and np.median(travels) < SHORT_SHARE * span:
-        said.append(
+        sentences.append(
             f"Half of the {len(travels)} strokes travel less than {np.median(travels):.3g} {unit}, "
             f"where the range is {span:.3g} {unit}: if these are no strokes of yours, give a "
             "larger --min-travel."
         )
-    return labels.strokes, found, said
+    return labels.strokes, stroke_sentence, sentences
 
 
 def _sizes(

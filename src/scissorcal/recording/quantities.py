@@ -164,11 +164,11 @@ def _of_force(unit: str) -> tuple[str, float]:
     """
     if unit in _POUNDS_N:
         return "N", _POUNDS_N[unit]
-    found = _GRAMS.match(unit)
-    if not found:
+    grams_unit = _GRAMS.match(unit)
+    if not grams_unit:
         return unit, 1.0
-    grams = {"": 1.0, "k": 1e3, "m": 1e-3}[found["prefix"]]
-    return f"N{found['length'] or ''}", grams * 1e-3 * G_N_PER_KG
+    grams = {"": 1.0, "k": 1e3, "m": 1e-3}[grams_unit["prefix"]]
+    return f"N{grams_unit['length'] or ''}", grams * 1e-3 * G_N_PER_KG
 
 
 def _contradiction(table: Table, channel: str, heading: str | None, stated: str | None) -> str:

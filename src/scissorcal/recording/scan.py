@@ -105,19 +105,19 @@ class Scan:
 
     def telemetry(self, channel: TelemetryChannel) -> NDArray[np.void]:
         """All rows of a channel beside the samples, shape (N,), each with its ``host_time_ns``."""
-        found = [e for e in self.events if isinstance(e, Telemetry) and e.channel == channel]
-        blocks = [rows_of(channel, event.messages) for event in found]
+        events = [e for e in self.events if isinstance(e, Telemetry) and e.channel == channel]
+        blocks = [rows_of(channel, event.messages) for event in events]
         none = rows_of(channel, np.zeros(0, dtype=channel.message_dtype))
         return np.concatenate([none, *blocks])
 
     def telemetry_rows(self) -> dict[str, int]:
         """How many rows each channel beside the samples has, by its topic."""
-        found: dict[str, int] = {}
+        rows: dict[str, int] = {}
         for event in self.events:
             if isinstance(event, Telemetry):
                 topic = event.channel.topic
-                found[topic] = found.get(topic, 0) + len(event.messages)
-        return found
+                rows[topic] = rows.get(topic, 0) + len(event.messages)
+        return rows
 
     def notes(self) -> tuple[str, ...]:
         """The sentences that the writer left."""
@@ -142,10 +142,10 @@ def scan_file(path: Path) -> Scan:
     if walk.metadata is None:
         raise InputError(_why_no_recording(path, walk))
     if walk.finished:
-        found = sum(len(event) for event in walk.events if isinstance(event, np.ndarray))
-        if walk.stated_count is not None and walk.stated_count != found:
+        read = sum(len(event) for event in walk.events if isinstance(event, np.ndarray))
+        if walk.stated_count is not None and walk.stated_count != read:
             walk.damage.append(
-                f"{walk.stated_count - found} of {walk.stated_count} samples cannot be read."
+                f"{walk.stated_count - read} of {walk.stated_count} samples cannot be read."
             )
     more = len(walk.damage) - MOST_DAMAGE
     if more > 1:

@@ -109,8 +109,8 @@ def parquet_headings(path: Path, data: bytes | None = None) -> list[str]:
     """The names of a Parquet file's columns. Raises InputError as `read_parquet` does."""
     require_pyarrow()
     data = read_foreign(path, PARQUET) if data is None else data
-    found: list[str] = parse_isolated(f"{__name__}:load_headings", data, path, PARQUET)
-    return found
+    headings: list[str] = parse_isolated(f"{__name__}:load_headings", data, path, PARQUET)
+    return headings
 
 
 def load_headings(data: bytes) -> list[str]:
@@ -131,7 +131,7 @@ def load_columns(data: bytes, numbers: list[int], path: str) -> list[tuple[str, 
         )
     names = file.schema_arrow.names
     table = file.read(columns=[names[number] for number in numbers], use_threads=False)
-    found = []
+    columns_read = []
     for number in numbers:
         heading = names[number]
         column = table.column(heading)
@@ -143,8 +143,8 @@ def load_columns(data: bytes, numbers: list[int], path: str) -> list[tuple[str, 
                 f"{path}, column {heading!r} holds {column.type}, not numbers. Convert it, or "
                 "name another column."
             )
-        found.append((heading, column.cast(pa.float64(), safe=False).to_numpy()))
-    return found
+        columns_read.append((heading, column.cast(pa.float64(), safe=False).to_numpy()))
+    return columns_read
 
 
 def require_pyarrow() -> tuple[Any, Any]:
@@ -224,15 +224,15 @@ def _load_hdf5(data: bytes) -> Mapping[str, Any]:
     import h5py
 
     def read(group: Any) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        variables: dict[str, Any] = {}
         for name, item in group.items():
             if name.startswith("#"):
                 continue
             if isinstance(item, h5py.Group):
-                found[name] = read(item)
+                variables[name] = read(item)
             elif item.dtype.kind in "fiub" and item.attrs.get("MATLAB_class") != b"char":
-                found[name] = np.asarray(item).T
-        return found
+                variables[name] = np.asarray(item).T
+        return variables
 
     with h5py.File(h5py.h5f.open_file_image(data), "r") as file:
         return read(file)

@@ -227,10 +227,10 @@ def frame_rows(
 
 def _cdr_names(*names: str) -> bytes:
     """Strings as CDR has them: length with the final zero, at multiples of 4 bytes; then to 8."""
-    found = b""
+    encoded = b""
     for name in names:
-        found += bytes(-len(found) % 4)
-        found += struct.pack("<I", len(name) + 1) + name.encode() + b"\0"
-    if not _NAMES - 8 < len(found) <= _NAMES:
-        raise ValueError(f"names of frames take {_NAMES} bytes, not {len(found)}: {names}")
-    return found
+        encoded += bytes(-len(encoded) % 4)
+        encoded += struct.pack("<I", len(name) + 1) + name.encode() + b"\0"
+    if not _NAMES - 8 < len(encoded) <= _NAMES:
+        raise ValueError(f"names of frames take {_NAMES} bytes, not {len(encoded)}: {names}")
+    return encoded

@@ -118,8 +118,8 @@ def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True)
 def picture_size(path: Path) -> tuple[int, int]:
     """Width and height in pixels by the header alone; raises InputError as `read_photo` does."""
     data = read_foreign(path, PHOTOGRAPH)
-    found = parse_isolated(f"{__name__}:decode_size", data, path, PHOTOGRAPH, path=str(path))
-    return found[0], found[1]
+    size = parse_isolated(f"{__name__}:decode_size", data, path, PHOTOGRAPH, path=str(path))
+    return size[0], size[1]
 
 
 PictureShape = tuple[int, int, int]
@@ -131,16 +131,16 @@ def same_shape(photo: Photo, shape: PictureShape | None) -> PictureShape:
 
     A photograph of another size or orientation would be one of another camera to the fit.
     """
-    own = (photo.width, photo.height, photo.orientation)
-    if shape is None or own == shape:
-        return own
-    if own[:2] != shape[:2]:
+    taken = (photo.width, photo.height, photo.orientation)
+    if shape is None or taken == shape:
+        return taken
+    if taken[:2] != shape[:2]:
         raise InputError(
-            f"{photo.source} has {own[0]} x {own[1]} pixels, the photographs before it "
+            f"{photo.source} has {taken[0]} x {taken[1]} pixels, the photographs before it "
             f"{shape[0]} x {shape[1]}: a fit takes one size, without zoom."
         )
     raise InputError(
-        f"{photo.source} has the EXIF orientation {own[2]}, the photographs before it "
+        f"{photo.source} has the EXIF orientation {taken[2]}, the photographs before it "
         f"{shape[2]}: hold the camera the same way for all."
     )
 
@@ -193,8 +193,10 @@ def _check_png(data: bytes) -> None:
     while at + 12 <= len(data):
         (length,) = struct.unpack_from(">I", data, at)
         name, end = data[at + 4 : at + 8], at + 8 + length
-        own = name[:1].isupper()  # what only adds to a picture begins with a small letter
-        if own and zlib.crc32(data[at + 4 : end]) != int.from_bytes(data[end : end + 4], "big"):
+        is_needed = name[:1].isupper()  # what only adds to a picture begins with a small letter
+        if is_needed and zlib.crc32(data[at + 4 : end]) != int.from_bytes(
+            data[end : end + 4], "big"
+        ):
             raise ValueError(f"the checksum of the part at byte {at} does not match")
         if name == b"IEND":
             return
@@ -298,10 +300,10 @@ def _origin(spare: tuple[int, int], orientation: int) -> tuple[int, int]:
 
 def _orientation(opened: "Image.Image") -> int:
     try:
-        found = opened.getexif().get(_EXIF_ORIENTATION, 1)
+        stated = opened.getexif().get(_EXIF_ORIENTATION, 1)
     except (ValueError, KeyError, TypeError, OSError, SyntaxError, struct.error):
         return 1
-    return found if isinstance(found, int) and 1 <= found <= 8 else 1
+    return stated if isinstance(stated, int) and 1 <= stated <= 8 else 1
 
 
 def _reduction(width: int, height: int, max_pixels: int) -> int:

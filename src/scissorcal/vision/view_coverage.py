@@ -58,11 +58,11 @@ class ViewCoverage:
 
     def sentence(self) -> str:
         """Sentence on what is covered and what is still wanted."""
-        seen = (
+        coverage = (
             f"places {len(self.places)} of {len(PLACES)}, sizes {len(self.sizes)} of {len(SIZES)}, "
             f"slants {len(self.slants)} of {len(SLANTS)}"
         )
-        return f"{seen}; wanted: {', '.join(self.wanted)}" if self.wanted else seen
+        return f"{coverage}; wanted: {', '.join(self.wanted)}" if self.wanted else coverage
 
 
 def slant_of(detection: Detection, width: int, height: int) -> tuple[float, float]:

@@ -108,16 +108,16 @@ def _sizes(points: Array) -> list[tuple[int, int]]:
     """Numbers of intervals along x and y that may be tried, the fewest first."""
     sides = _box(points)[:, 1] - _box(points)[:, 0]
     narrowest = _GAPS_PER_INTERVAL * point_spacing(points)
-    found: list[tuple[int, int]] = []
+    sizes: list[tuple[int, int]] = []
     width = float(sides.max())
-    while width >= narrowest or not found:
+    while width >= narrowest or not sizes:
         n, m = (max(1, math.ceil(side / width - 1e-9)) for side in sides)
-        if found and (n + 3) * (m + 3) > _WEIGHTS_PER_POINT * len(points):
+        if sizes and (n + 3) * (m + 3) > _WEIGHTS_PER_POINT * len(points):
             break
-        if (n, m) not in found:
-            found.append((n, m))
+        if (n, m) not in sizes:
+            sizes.append((n, m))
         width /= math.sqrt(2.0)
-    return found
+    return sizes
 
 
 def _fit(points: Array, sd: Array, intervals: tuple[int, int]) -> SplineFit:

@@ -119,11 +119,11 @@ def curvatures(surface: Surface, points: ArrayLike) -> Array:
     """
     unit = normal(surface, points)
     length = np.linalg.norm(surface.gradient(points), axis=-1)
-    one, other = tangents(unit)
+    first, second = tangents(unit)
     bend = surface.hessian(points)
     a, b, c = (
         np.einsum("...i,...ij,...j->...", left, bend, right) / length
-        for left, right in ((one, one), (one, other), (other, other))
+        for left, right in ((first, first), (first, second), (second, second))
     )
     mean, half = 0.5 * (a + c), np.hypot(0.5 * (a - c), b)
     return np.stack((mean - half, mean + half), axis=-1)
@@ -138,9 +138,9 @@ def tangents(unit: Array) -> tuple[Array, Array]:
     sign = np.copysign(1.0, z)
     a = -1.0 / (sign + z)
     b = x * y * a
-    one = np.stack((1.0 + sign * x * x * a, sign * b, -sign * x), axis=-1)
-    other = np.stack((b, sign + y * y * a, -y), axis=-1)
-    return one, other
+    first = np.stack((1.0 + sign * x * x * a, sign * b, -sign * x), axis=-1)
+    second = np.stack((b, sign + y * y * a, -y), axis=-1)
+    return first, second
 
 
 _ROUNDING = 1e-13

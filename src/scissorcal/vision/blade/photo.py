@@ -248,10 +248,10 @@ def _blade(
     back = blade.back.pixels[np.argsort(blade.parts.frame(view.to_sheet(blade.back.pixels))[:, 0])]
     canvas.line(back, END)
     canvas.cross(blade.pivot_px, PIVOT)
-    seen = on_picture(blade.station, blade.offset)
+    points = on_picture(blade.station, blade.offset)
     station = np.linspace(blade.station[0], blade.station[-1], 400)
     canvas.line(on_picture(station, edge(station)), EDGE)
-    factor = _arrows(canvas, seen, on_picture(blade.station, edge(blade.station)))
+    factor = _arrows(canvas, points, on_picture(blade.station, edge(blade.station)))
     for mark in marks:
         here = float(np.interp(mark.station, blade.station, blade.offset))
         place = on_picture(np.array([mark.station]), np.array([here]))[0]
@@ -260,13 +260,13 @@ def _blade(
     return factor
 
 
-def _arrows(canvas: Canvas, seen: Array, fitted: Array) -> float:
+def _arrows(canvas: Canvas, points: Array, fitted: Array) -> float:
     """Draw residuals from the fitted edge, enlarged; returns the factor."""
-    off = seen - fitted
+    off = points - fitted
     usual = float(np.quantile(np.linalg.norm(off, axis=1), 0.9)) * canvas.scale
     factor = float(np.clip(_ARROW_PX / max(usual, 1e-6), 1.0, 1000.0))
     factor = float(f"{factor:.1g}")
-    step = max(len(seen) // _MOST_ARROWS, 1)
+    step = max(len(points) // _MOST_ARROWS, 1)
     longest = 4.0 * _ARROW_PX / canvas.scale / factor
     for base, gap in zip(fitted[::step], off[::step], strict=True):
         size = float(np.linalg.norm(gap))

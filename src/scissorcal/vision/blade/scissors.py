@@ -112,12 +112,12 @@ def _refuse_others(shape: Silhouette, source: str) -> None:
 
 def _rings(shape: Silhouette) -> tuple[Array, ...]:
     size = float(np.ptp(shape.outer, axis=0).max())
-    found = []
+    rings = []
     for hole in shape.holes:
         _, sides, _ = cv2.minAreaRect(hole.astype(np.float32))
         if min(sides) > _RING_SHARE * size:
-            found.append(hole)
-    return tuple(found)
+            rings.append(hole)
+    return tuple(rings)
 
 
 def _prongs(outline: Array) -> str:
@@ -191,13 +191,13 @@ def _open(
         axis = line[1] * np.sign(line[1] @ axis)
         up = np.array([axis[1], -axis[0]])
         up = up * np.sign(np.median((back - pivot) @ up) - np.median((edge - pivot) @ up))
-        own = BladeParts(pivot, axis, up, edge, back, np.empty((0, 2)), 0.0, sd)
-        stop = float(own.frame(np.concatenate([edge, back]))[:, 0].max())
-        clear = own.frame(crotch[None])[0, 0] + _CLEAR_OF_CROTCH * stop
+        rough = BladeParts(pivot, axis, up, edge, back, np.empty((0, 2)), 0.0, sd)
+        stop = float(rough.frame(np.concatenate([edge, back]))[:, 0].max())
+        clear = rough.frame(crotch[None])[0, 0] + _CLEAR_OF_CROTCH * stop
         last = stop * (1.0 - _TIP_SHARE)
-        edge, back = (_between(own, side, clear, last) for side in (own.edge, own.back))
+        edge, back = (_between(rough, side, clear, last) for side in (rough.edge, rough.back))
         halved = (max(OPEN_FIRST, clear / stop), BACK_LAST)
-        blades.append(replace(own, edge=edge, back=back, length=stop, halved=halved))
+        blades.append(replace(rough, edge=edge, back=back, length=stop, halved=halved))
     cosine = float(np.clip(blades[0].axis @ blades[1].axis, -1.0, 1.0))
     opening = float(np.arccos(cosine))
     if min(len(b.edge) for b in blades) < 20 or opening < LEAST_OPENING:
@@ -237,10 +237,10 @@ def _closed(shape: Silhouette, tip: Array, handles: Array, rings: tuple[Array, .
 
 
 def _pivot(shape: Silhouette, guess: Array, length: float) -> tuple[Array, float, bool]:
-    found = _best_screw(shape, guess[None], length, _SCREW_NEAR)
-    if found is None:
+    screw = _best_screw(shape, guess[None], length, _SCREW_NEAR)
+    if screw is None:
         return guess, _GUESS_SD_SHARE * length, False
-    return found[0], 0.2 * found[1], True
+    return screw[0], 0.2 * screw[1], True
 
 
 def _best_screw(
@@ -353,8 +353,8 @@ def lamp_direction(shape: Silhouette, scissors: Scissors) -> float | None:
     if len(rows) < 50 or not len(scissors.blades):
         return None
     places = np.zeros((int(nearest.max()) + 1, 2))
-    own = np.nonzero(inside)
-    places[nearest[own]] = np.column_stack([own[1], own[0]])
+    inner = np.nonzero(inside)
+    places[nearest[inner]] = np.column_stack([inner[1], inner[0]])
     away = np.column_stack([columns, rows]) - places[nearest[rows, columns]]
     weight = dark[rows, columns]
     total = float(np.sum(weight * np.linalg.norm(away, axis=1)))

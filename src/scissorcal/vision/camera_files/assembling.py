@@ -190,15 +190,17 @@ def _refuse_part_of_picture(facts: Facts, width: float, height: float) -> None:
 
 def _matrix(facts: Facts) -> tuple[Array, str]:
     """The matrix (3, 3) and its place."""
-    matrices = [(one.place, _square(one)) for one in facts.get("matrix")]
-    for one in facts.get("intrinsics"):
-        values = array_at(one)
+    matrices = [(entry.place, _square(entry)) for entry in facts.get("matrix")]
+    for entry in facts.get("intrinsics"):
+        values = array_at(entry)
         if values.ndim == 1 and values.size not in (4, 9):
             raise RefusedError(
                 f"it has {values.size} numbers; fx, fy, cx and cy are needed. Save the file again.",
-                one.place,
+                entry.place,
             )
-        matrices.append((one.place, _of_four(*values) if values.shape == (4,) else _square(one)))
+        matrices.append(
+            (entry.place, _of_four(*values) if values.shape == (4,) else _square(entry))
+        )
     for place, other in matrices[1:]:
         if not np.allclose(other, matrices[0][1], rtol=1e-6, atol=1e-6, equal_nan=True):
             raise RefusedError(f"states {matrices[0][0]} and {place}, which differ. Keep one.")
@@ -216,15 +218,15 @@ def _named(facts: Facts, name: str, matrices: list[tuple[str, Array]]) -> float 
     """fx, fy, cx or cy by its name, of a list of two, or of a matrix; all must agree."""
     at = {"fx": (0, 0), "fy": (1, 1), "cx": (0, 2), "cy": (1, 2)}[name]
     stated = [(place, float(K[at])) for place, K in matrices]
-    stated += [(one.place, number_at(one)) for one in facts.get(name)]
+    stated += [(entry.place, number_at(entry)) for entry in facts.get(name)]
     focal = name in ("fx", "fy")
-    stated += [(one.place, number_at(one)) for one in facts.get("f") if focal]
-    for one in facts.get("focal" if focal else "centre"):
-        structured = isinstance(one.value, (list, dict))
-        values = [number_at(one)] * 2 if focal and not structured else list(vector_at(one))
+    stated += [(entry.place, number_at(entry)) for entry in facts.get("f") if focal]
+    for entry in facts.get("focal" if focal else "centre"):
+        structured = isinstance(entry.value, (list, dict))
+        values = [number_at(entry)] * 2 if focal and not structured else list(vector_at(entry))
         if len(values) != 2:
-            raise RefusedError("it is not two numbers.", one.place)
-        stated.append((one.place, float(values[int(name in ("fy", "cy"))])))
+            raise RefusedError("it is not two numbers.", entry.place)
+        stated.append((entry.place, float(values[int(name in ("fy", "cy"))])))
     return _agreed(stated)
 
 

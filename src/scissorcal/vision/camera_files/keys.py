@@ -104,10 +104,10 @@ def facts_of(tree: dict[str, Any]) -> Facts:
     _sort(tree, "", facts)
     while facts.blocks:
         names = [name for name, _ in facts.blocks]
-        own = [entry.place for entry in facts.get(*words.OWN)][:1]
-        if len(names + own) > 1:
+        outer = [entry.place for entry in facts.get(*words.OWN)][:1]
+        if len(names + outer) > 1:
             raise RefusedError(
-                f"has {len(names + own)} cameras ({shown(own + names)}): keep only the rig's."
+                f"has {len(names + outer)} cameras ({shown(outer + names)}): keep only the rig's."
             )
         name, block = facts.blocks.pop()
         _sort(block, f"{name}.", facts)
@@ -198,7 +198,7 @@ def _is_group(value: Any) -> bool:
 def _camera_in(value: Any) -> dict[str, Any]:
     """The mapping with a camera that a value is, or has as its only part; else an empty one."""
     if isinstance(value, list):
-        cameras = [one for one in value if isinstance(one, dict) and _holds_camera(one)]
+        cameras = [item for item in value if isinstance(item, dict) and _holds_camera(item)]
         if len(cameras) > 1:
             raise RefusedError(f"has {len(cameras)} cameras in one list: keep only the rig's.")
         return cameras[0] if cameras and len(value) == 1 else {}

@@ -61,13 +61,13 @@ def read_camera_file(path: Path) -> CameraFile:
         raise InputError(f"{where} {refused.sentence}") from None
 
 
-def _one_of(found: list[CameraFile]) -> CameraFile:
+def _one_of(cameras: list[CameraFile]) -> CameraFile:
     """The camera that all documents of a file state."""
-    if not found:
+    if not cameras:
         raise RefusedError("is not a camera file of OpenCV, ROS or Kalibr: it holds nothing.")
-    if any(one.camera != found[0].camera for one in found):
-        raise RefusedError(f"has {len(found)} documents with different cameras. Keep one.")
-    return found[0]
+    if any(file.camera != cameras[0].camera for file in cameras):
+        raise RefusedError(f"has {len(cameras)} documents with different cameras. Keep one.")
+    return cameras[0]
 
 
 def _documents(text: str) -> list[Any]:
@@ -85,7 +85,7 @@ def _documents(text: str) -> list[Any]:
 def _read(tree: Any, text: str) -> CameraFile:
     while isinstance(tree, list) and len(tree) == 1:
         tree = tree[0]
-    if isinstance(tree, list) and any(isinstance(one, dict) for one in tree):
+    if isinstance(tree, list) and any(isinstance(item, dict) for item in tree):
         raise RefusedError(f"has {len(tree)} cameras in one list: keep only the rig's.")
     if not isinstance(tree, dict):
         raise RefusedError("is not a camera file of OpenCV, ROS or Kalibr: it has no names.")
@@ -158,7 +158,7 @@ def refuse_other_names(tree: Mapping[str, Any]) -> None:
 def origin_of(tree: Mapping[str, Any], text: str) -> str:
     """The program that wrote a file, by its keys; "no named program" where they tell none."""
     parts = [value for value in tree.values() if isinstance(value, Mapping)]
-    parts += [one for value in tree.values() if isinstance(value, list) for one in value]
+    parts += [item for value in tree.values() if isinstance(value, list) for item in value]
     inner = [key for part in parts if isinstance(part, Mapping) for key in part]
     names = {plain(key) for key in [*tree, *inner]}
     if "projectionparameters" in names:

@@ -181,11 +181,11 @@ def array_at(entry: Entry) -> NDArray[np.float64]:
     """
     value = entry.value
     try:
-        found = matrix_of(value)
+        matrix = matrix_of(value)
     except ValueError as error:
         raise RefusedError(f"it is {error}. Save the file again.", entry.place) from None
-    if found is not None:
-        return found
+    if matrix is not None:
+        return matrix
     if isinstance(value, dict):
         return _with_rows(Entry(entry.place, value))
     if not isinstance(value, list):
@@ -196,11 +196,11 @@ def array_at(entry: Entry) -> NDArray[np.float64]:
 
 def vector_at(entry: Entry) -> NDArray[np.float64]:
     """Numbers in one row or column; raises RefusedError where they have several of both."""
-    found = array_at(entry)
-    if sum(side > 1 for side in found.shape) > 1:
-        shape = " x ".join(map(str, found.shape))
+    values = array_at(entry)
+    if sum(side > 1 for side in values.shape) > 1:
+        shape = " x ".join(map(str, values.shape))
         raise RefusedError(f"it is {shape} numbers where one row is needed.", entry.place)
-    return found.ravel()
+    return values.ravel()
 
 
 def size_at(entry: Entry) -> tuple[float, float]:
@@ -210,10 +210,10 @@ def size_at(entry: Entry) -> tuple[float, float]:
         if stated is None:
             raise RefusedError(f"{short(entry.value)!r} is no width and height.", entry.place)
         return float(stated[1]), float(stated[2])
-    found = vector_at(entry)
-    if len(found) not in (2, 3) or (len(found) == 3 and found[2] not in (1.0, 3.0)):
+    sides = vector_at(entry)
+    if len(sides) not in (2, 3) or (len(sides) == 3 and sides[2] not in (1.0, 3.0)):
         raise RefusedError("it is not a width and a height.", entry.place)
-    return float(found[0]), float(found[1])
+    return float(sides[0]), float(sides[1])
 
 
 def _with_rows(entry: Entry) -> NDArray[np.float64]:
@@ -237,12 +237,12 @@ def _with_rows(entry: Entry) -> NDArray[np.float64]:
 
 
 def _flat(value: list[Any], place: str) -> tuple[list[float], tuple[int, ...]]:
-    if any(isinstance(one, list) for one in value):
-        parts = [_flat(one, place) if isinstance(one, list) else ([], (-1,)) for one in value]
+    if any(isinstance(item, list) for item in value):
+        parts = [_flat(item, place) if isinstance(item, list) else ([], (-1,)) for item in value]
         shapes = {shape for _, shape in parts}
         if len(shapes) > 1 or (-1,) in shapes:
             raise RefusedError("its rows differ in length.", place)
         return [number for part, _ in parts for number in part], (len(parts), *shapes.pop())
     if len(value) > MOST_NUMBERS:
         raise RefusedError(f"it has {len(value)} numbers.", place)
-    return [number_at(Entry(place, one)) for one in value], (len(value),)
+    return [number_at(Entry(place, item)) for item in value], (len(value),)

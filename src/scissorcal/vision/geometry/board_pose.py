@@ -154,15 +154,15 @@ def _both(corners: Corners, camera: Camera) -> list[Array]:
     _, turns, shifts, _ = cv2.solvePnPGeneric(
         corners.points - middle, rays[:, None, :], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
     )
-    found = []
+    poses = []
     for turn, shift in zip(turns, shifts, strict=True):
         matrix = cv2.Rodrigues(turn)[0]
         translation = shift.ravel() - matrix @ middle
         if np.all(np.isfinite(translation)):
-            found.append(np.concatenate([turn.ravel(), translation]))
-    if not found:
+            poses.append(np.concatenate([turn.ravel(), translation]))
+    if not poses:
         raise ValueError("no pose in front of the camera explains the corners")
-    return found
+    return poses
 
 
 def project_pose(pose: Array, corners: Corners, camera: Camera) -> tuple[Array, Array]:
@@ -206,8 +206,8 @@ def _refine(start: Array, corners: Corners, camera: Camera, used: NDArray[np.boo
     return _Refined(pose, residuals, slope, float(np.sum(residuals[used] ** 2)))
 
 
-def _square(found: _Refined) -> float:
-    return found.square
+def _square(refined: _Refined) -> float:
+    return refined.square
 
 
 def near(residuals: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -222,17 +222,19 @@ def _components(
 ) -> tuple[float, float]:
     """Variances of a coordinate: independent between frames, and constant for a corner."""
     frames = len(np.unique(corners.frame[used]))
-    seen = residuals[used]
+    kept_residuals = residuals[used]
     labels, place = np.unique(corners.corner[used], return_inverse=True)
     count = np.bincount(place)
-    spare = 2 * len(seen) - 6
+    spare = 2 * len(kept_residuals) - 6
     least = LEAST_SD_PX**2
     if frames == 1:
         usual = priors.corner_weight * priors.corner_sd_px**2
-        found = (usual + float(np.sum(seen**2))) / (priors.corner_weight + spare)
-        return max(found, least), 0.0
-    mean = np.stack([np.bincount(place, seen[:, k]) / count for k in (0, 1)], axis=1)
-    within = float(np.sum((seen - mean[place]) ** 2)) / max(2 * (len(seen) - len(labels)), 1)
+        variance = (usual + float(np.sum(kept_residuals**2))) / (priors.corner_weight + spare)
+        return max(variance, least), 0.0
+    mean = np.stack([np.bincount(place, kept_residuals[:, k]) / count for k in (0, 1)], axis=1)
+    within = float(np.sum((kept_residuals - mean[place]) ** 2)) / max(
+        2 * (len(kept_residuals) - len(labels)), 1
+    )
     between = float(np.sum(count * np.sum(mean**2, axis=1))) / max(2 * len(labels) - 6, 1)
     kept = max((between - within) / float(count.mean()), 0.0)
     return max(within, least / 2), max(kept, least / 2)
@@ -256,8 +258,8 @@ def _covariance(
     turn[:3, :3] = left_jacobian(best.pose[:3])
     gain = turn @ inverse
     printed = print_slopes(best.pose, best.slope, corners)[np.repeat(used, 2)]
-    own = gain @ spread @ gain.T
-    return np.asarray(own), -gain @ by_pose.T @ slope[:, 6:15], -gain @ by_pose.T @ printed
+    by_noise = gain @ spread @ gain.T
+    return np.asarray(by_noise), -gain @ by_pose.T @ slope[:, 6:15], -gain @ by_pose.T @ printed
 
 
 def _ratio(worse: float, better: float) -> float:

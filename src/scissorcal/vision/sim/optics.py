@@ -200,10 +200,10 @@ def _kernel(outline: NDArray[np.float64], half: int) -> Picture:
     return np.asarray(covered / covered.sum(), dtype=np.float32)
 
 
-def _convolved(one: Picture, other: Picture) -> Picture:
-    room = (other.shape[0] - 1) // 2
-    wide = np.pad(one, room)
-    return np.asarray(cv2.filter2D(wide, -1, other, borderType=cv2.BORDER_CONSTANT))
+def _convolved(first: Picture, second: Picture) -> Picture:
+    room = (second.shape[0] - 1) // 2
+    wide = np.pad(first, room)
+    return np.asarray(cv2.filter2D(wide, -1, second, borderType=cv2.BORDER_CONSTANT))
 
 
 def _tone(linear: Picture, contrast: float) -> Picture:

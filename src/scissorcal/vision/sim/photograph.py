@@ -105,9 +105,9 @@ def render(
 
 def _cast_shadow(radiance: Picture, layer: Layer, lens: Lens) -> None:
     moved = [np.asarray(outline) + layer.shadow_m for outline in layer.outlines_m]
-    seen = _seen(moved, layer, lens)
+    outlines = _seen(moved, layer, lens)
     soft = layer.shadow_soft_m * lens.focal_px / float(layer.pose.shift_m[2])
-    box = _box(seen, lens, int(np.ceil(3.0 * soft)) + 1)
+    box = _box(outlines, lens, int(np.ceil(3.0 * soft)) + 1)
     if box is None:
         return
     left, top, right, bottom = box
@@ -117,7 +117,7 @@ def _cast_shadow(radiance: Picture, layer: Layer, lens: Lens) -> None:
         max(int(np.ceil((bottom - top) / small)), 1),
     )
     scale = np.array([size[0] / (right - left), size[1] / (bottom - top)])
-    share = coverage([(o - (left, top) + 0.5) * scale - 0.5 for o in seen], *size)
+    share = coverage([(o - (left, top) + 0.5) * scale - 0.5 for o in outlines], *size)
     if soft > 0.05:
         share = np.asarray(cv2.GaussianBlur(share, (0, 0), soft / small), dtype=np.float32)
     share = np.asarray(cv2.resize(share, (right - left, bottom - top)), dtype=np.float32)
@@ -159,8 +159,8 @@ def _seen(outlines: Sequence[Array], layer: Layer, lens: Lens) -> list[Array]:
     return np.split(lens.sees(fine, layer.pose), ends[joints])
 
 
-def _box(seen: Sequence[Array], lens: Lens, room: int) -> Box | None:
-    points = np.concatenate([o[np.isfinite(o).all(axis=1)] for o in seen] or [np.empty((0, 2))])
+def _box(outlines: Sequence[Array], lens: Lens, room: int) -> Box | None:
+    points = np.concatenate([o[np.isfinite(o).all(axis=1)] for o in outlines] or [np.empty((0, 2))])
     if not len(points):
         return None
     low, high = points.min(axis=0) - room, points.max(axis=0) + room + 1

@@ -128,10 +128,10 @@ def render_card_photographs(
     """
     scene = sim_plate_scene(recipe, seed, rig_plate)
     stances = [(advance, opening) for advance in ADVANCES_MM for opening in OPENINGS_DEG]
-    found = {folder / f"rig-{n:02d}.jpg": stance for n, stance in enumerate(stances, start=1)}
-    for path, stance in found.items():
+    stance_of = {folder / f"rig-{n:02d}.jpg": stance for n, stance in enumerate(stances, start=1)}
+    for path, stance in stance_of.items():
         path.write_bytes(_plate_jpeg(scene, PLATE_BOARD, stance, recipe, path, seed))
-    return found
+    return stance_of
 
 
 def render_frame(

@@ -229,8 +229,8 @@ def targets_of(ids: Iterable[int]) -> dict[str, int]:
     >>> targets_of([41, 42, 3, 249])
     {'blade mat': 2, 'camera board': 1}
     """
-    found = [int(marker) for marker in ids]
-    counts = {board.name: sum(marker in board.ids for marker in found) for board in TARGETS}
+    numbers = [int(marker) for marker in ids]
+    counts = {board.name: sum(marker in board.ids for marker in numbers) for board in TARGETS}
     return {name: counts[name] for name in sorted(counts, key=lambda n: -counts[n]) if counts[name]}
 
 
@@ -251,22 +251,22 @@ def board_from_words(words: str) -> CharucoBoard | Chessboard:
     """
     if words == "camera":
         return CAMERA_BOARD
-    if found := _CHESSBOARD.fullmatch(words):
-        columns, rows, square = int(found[1]), int(found[2]), float(found[3])
+    if match := _CHESSBOARD.fullmatch(words):
+        columns, rows, square = int(match[1]), int(match[2]), float(match[3])
         if min(columns, rows) >= 3 and square > 0.0:
             _refuse_metres(square, words)
             return Chessboard(f"chessboard {columns}x{rows}", columns, rows, 1e-3 * square)
-    elif found := _CHARUCO.fullmatch(words):
+    elif match := _CHARUCO.fullmatch(words):
         columns, rows, square, marker = (
-            int(found[1]),
-            int(found[2]),
-            float(found[3]),
-            float(found[4]),
+            int(match[1]),
+            int(match[2]),
+            float(match[3]),
+            float(match[4]),
         )
         if min(columns, rows) >= 3 and 0.0 < marker < square:
             _refuse_metres(square, words)
             return _charuco(
-                columns, rows, 1e-3 * square, 1e-3 * marker, found[5], found[6] is not None
+                columns, rows, 1e-3 * square, 1e-3 * marker, match[5], match[6] is not None
             )
     raise InputError(f"{words!r} is not a board: give {FORMS}, for example chessboard:9x6:25.")
 

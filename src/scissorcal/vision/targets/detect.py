@@ -174,11 +174,11 @@ def _charuco(grey: Picture, board: CharucoBoard) -> tuple[Integers, Array]:
 
 
 def _marker_board(grey: Picture, board: MarkerBoard) -> tuple[Integers, Array]:
-    seen = find_markers(grey, board.dictionary, board)
-    own = np.isin(seen.ids, board.ids) & seen.sharp
-    first = 4 * (seen.ids[own] - board.first_id)
+    markers = find_markers(grey, board.dictionary, board)
+    of_board = np.isin(markers.ids, board.ids) & markers.sharp
+    first = 4 * (markers.ids[of_board] - board.first_id)
     ids = (first[:, None] + np.arange(4)).ravel()
-    return ids, seen.corners[own].reshape(-1, 2)
+    return ids, markers.corners[of_board].reshape(-1, 2)
 
 
 def _chessboard(grey: Picture, board: Chessboard, window_px: int | None) -> tuple[Integers, Array]:
@@ -256,18 +256,18 @@ def refine_marker_corners(
     """
     if not len(corners):
         return corners, np.zeros(0, dtype=np.bool_)
-    found = np.array(corners, dtype=np.float64)
+    refined = np.array(corners, dtype=np.float64)
     linear = linear_light(grey)
     side = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).min(axis=1)
     good = side >= _LEAST_SIDE_PX
     for _ in range(_ROUNDS):
-        lines, spread = _side_lines(linear, found, module)
+        lines, spread = _side_lines(linear, refined, module)
         crossing = _crossings(lines)
         jump = np.linalg.norm(crossing - corners, axis=2).max(axis=1)
         good &= spread.max(axis=1) < _WORST_LINE_PX
         good &= jump < np.maximum(0.5 * module * side, 2.0)
-        found = np.where(good[:, None, None], crossing, corners)
-    return found, good
+        refined = np.where(good[:, None, None], crossing, corners)
+    return refined, good
 
 
 def linear_light(grey: NDArray[np.uint8]) -> NDArray[np.float32]:

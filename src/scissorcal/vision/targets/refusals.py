@@ -60,7 +60,7 @@ _OTHERS = ("DICT_4X4_250", "DICT_6X6_250", "DICT_7X7_250", "DICT_ARUCO_ORIGINAL"
 _APRIL = ("DICT_APRILTAG_36h11",)
 
 
-def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str:
+def no_board_sentence(photo: Photo, board: Board, corners: int, least: int) -> str:
     """Sentence that says what a photograph shows instead of ``board``.
 
     The board in another layout, mirrored or inverted; another target of scissorcal, markers of
@@ -73,10 +73,10 @@ def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str
             f"{name} has only {photo.width} x {photo.height} pixels: take photographs of at least "
             "640 x 480."
         )
-    if not found and (misread := misread_sentence(grey, board, name)):
+    if not corners and (misread := misread_sentence(grey, board, name)):
         return misread
     other = _other_target(grey, board)
-    if other and not found:
+    if other and not corners:
         return f"{name} shows {other}, not the {board.name}: {_use(board)}."
     blur = sharpest_edge_px(photo.grey)
     if blur > BLURRED_PX:
@@ -84,11 +84,11 @@ def no_board_sentence(photo: Photo, board: Board, found: int, least: int) -> str
             f"{name} is too blurred: its sharpest edges are {2.56 * blur:.0f} px wide. Focus on "
             f"the {board.name}, hold the camera still and give more light."
         )
-    if not found and not isinstance(board, Chessboard) and _plain_chessboard(grey, board):
+    if not corners and not isinstance(board, Chessboard) and _plain_chessboard(grey, board):
         return f"{name} shows a plain chessboard, not the {board.name}: {_use(board)}."
-    if found:
+    if corners:
         return (
-            f"{name} shows {found} corners of the {board.name}; {least} are needed. Show the whole "
+            f"{name} shows {corners} corners of the {board.name}; {least} are needed. Show the whole "
             "board at 40 px per square or more, without glare or fingers."
         )
     if isinstance(board, Chessboard):

@@ -302,7 +302,11 @@ def _rectangles(sheet: Sheet) -> list[str]:
     drawn = []
     for level in sorted({shape.level for shape in sheet.rectangles}):
         drawn.append(f"{level:.4f} g")
-        drawn += [_rectangle(sheet, one) for one in sheet.rectangles if one.level == level]
+        drawn += [
+            _rectangle(sheet, rectangle)
+            for rectangle in sheet.rectangles
+            if rectangle.level == level
+        ]
         drawn.append("f")
     return drawn
 
