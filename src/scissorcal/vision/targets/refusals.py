@@ -88,8 +88,8 @@ def no_board_sentence(photo: Photo, board: Board, corners: int, least: int) -> s
         return f"{name} shows a plain chessboard, not the {board.name}: {_use(board)}."
     if corners:
         return (
-            f"{name} shows {corners} corners of the {board.name}; {least} are needed. Show the whole "
-            "board at 40 px per square or more, without glare or fingers."
+            f"{name} shows {corners} corners of the {board.name}; {least} are needed. Show the "
+            "whole board at 40 px per square or more, without glare or fingers."
         )
     if isinstance(board, Chessboard):
         return (
