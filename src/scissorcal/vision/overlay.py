@@ -35,7 +35,7 @@ def detection_overlay(photo: Photo, detection: Detection) -> Picture:
 
 
 def residual_overlay(
-    photo: Photo, pixels: Array, residuals: Array, words: str = "", axes: Array | None = None
+    photo: Photo, pixels: Array, residuals: Array, axes: Array | None = None
 ) -> Picture:
     """Draw residuals of corners as arrows, with a scale bar.
 
@@ -59,7 +59,7 @@ def residual_overlay(
     bar = _round_length(0.1 * width / magnified)
     canvas.bar(round(bar * magnified), f"{bar:g} px")
     rms = float(np.sqrt(np.mean(length**2)))
-    canvas.title(f"{photo.source}: {rms:.2f} px rms {words}".rstrip())
+    canvas.title(f"{photo.source}: {rms:.2f} px rms")
     return canvas.picture
 
 

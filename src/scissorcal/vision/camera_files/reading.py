@@ -183,7 +183,7 @@ def origin_of(tree: Mapping[str, Any], text: str) -> str:
     return "no named program"
 
 
-def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "camera") -> Path:
+def write_camera_file(camera: Camera, path: Path, style: Style) -> Path:
     """Write a camera as OpenCV (.yml, .yaml, .xml or .json) or ROS camera_info (.yaml).
 
     Neither format holds a covariance. The file is written atomically. Raises
@@ -192,7 +192,7 @@ def write_camera_file(camera: Camera, path: Path, style: Style, name: str = "cam
     endings = (".yml", ".yaml", ".xml", ".json") if style == "opencv" else (".yaml", ".yml")
     if path.suffix.lower() not in endings:
         raise InputError(f"{path} must end in one of {', '.join(endings)} for {style}.")
-    text = _opencv_text(camera, path.suffix.lower()) if style == "opencv" else _ros(camera, name)
+    text = _opencv_text(camera, path.suffix.lower()) if style == "opencv" else _ros(camera)
     try:
         with replacing(path) as part:
             part.write_text(text, "utf-8")
@@ -212,7 +212,7 @@ def _opencv_text(camera: Camera, ending: str) -> str:
     return str(storage.releaseAndGetString())
 
 
-def _ros(camera: Camera, name: str) -> str:
+def _ros(camera: Camera) -> str:
     import yaml
 
     count = len(camera.distortion)
@@ -225,7 +225,7 @@ def _ros(camera: Camera, name: str) -> str:
     facts = {
         "image_width": camera.width,
         "image_height": camera.height,
-        "camera_name": name,
+        "camera_name": "camera",
         "camera_matrix": matrix(camera.matrix, 3, 3),
         "distortion_model": "plumb_bob" if count == 5 else "rational_polynomial",
         "distortion_coefficients": matrix(camera.distortion, 1, count),

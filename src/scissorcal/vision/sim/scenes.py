@@ -100,6 +100,7 @@ _RING = (-0.075, -0.022, 0.022, 0.015)
 
 
 PAPER, INK = 0.85, 0.04
+MARGIN_M = 0.012
 
 
 LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -182,14 +183,13 @@ def target_layers(
     board: Board,
     pose: Pose,
     *,
-    margin_m: float = 0.012,
     print_scale: tuple[float, float] = (1.0, 1.0),
     ids: Sequence[int] | None = None,
 ) -> list[Layer]:
     """The sheet and its ink. ``print_scale`` is the printer's scale error by axis; ``ids`` leaves
     out all other markers."""
     scale = np.asarray(print_scale)
-    sheet = _rectangle(-margin_m, -margin_m, board.width_m + margin_m, board.height_m + margin_m)
+    sheet = _rectangle(-MARGIN_M, -MARGIN_M, board.width_m + MARGIN_M, board.height_m + MARGIN_M)
     ink = [outline * scale for outline in _ink(board, ids)]
     return [Layer([sheet], pose, PAPER), Layer(ink, pose, INK)]
 
