@@ -84,21 +84,21 @@ class FrictionPriors(Section):
 
     def adopted(self, kind: JointKind) -> float:
         """Standard deviation of what an adopted term adds at the reference motion."""
-        prior: NormalPrior = getattr(self, adopted_key(kind))
+        prior: NormalPrior = getattr(self, _adopted_key(kind))
         return prior.sd
 
     def zero(self, kind: JointKind) -> float:
         """Standard deviation of the drive's zero where no idle second shows it."""
-        prior: NormalPrior = getattr(self, zero_key(kind))
+        prior: NormalPrior = getattr(self, _zero_key(kind))
         return prior.sd
 
 
-def adopted_key(kind: JointKind) -> str:
+def _adopted_key(kind: JointKind) -> str:
     """The recipe's name of the prior that adopted terms share."""
     return "adopted_Nm" if kind == "rotary" else "adopted_N"
 
 
-def zero_key(kind: JointKind) -> str:
+def _zero_key(kind: JointKind) -> str:
     """The recipe's name of the prior of the drive's zero."""
     return "zero_Nm" if kind == "rotary" else "zero_N"
 
@@ -109,9 +109,9 @@ def _section(name: str, kind: JointKind) -> type[FrictionPriors]:
     for term in PARAMETERS.values():
         if term.prior is not None:
             fields[term.prior_key(kind)] = _field(term.transform, term.prior, kind, term.meaning)
-    fields[adopted_key(kind)] = _field(IDENTITY, ADOPTED, kind, "effort of an adopted term")
+    fields[_adopted_key(kind)] = _field(IDENTITY, ADOPTED, kind, "effort of an adopted term")
     zero = "zero of the drive without an idle second"
-    fields[zero_key(kind)] = _field(IDENTITY, ZERO, kind, zero)
+    fields[_zero_key(kind)] = _field(IDENTITY, ZERO, kind, zero)
     made = create_model(name, __base__=FrictionPriors, **fields)
     made.__doc__ = f"Priors of a friction fit to a {kind} joint."
     return made

@@ -68,7 +68,7 @@ def quantity(
     """
     column = table.columns[channel]
     target = "s" if channel == "time" else unit_of(channel, joint)
-    factor = 1.0 if scale is None else scale_factor(table, channel, scale)
+    factor = 1.0 if scale is None else _scale_factor(table, channel, scale)
     heading_unit = _unit_in(column.heading)
     stated = heading_unit if unit is None else unit
     heading = shortened(column.heading)
@@ -94,7 +94,7 @@ def quantity(
     )
 
 
-def scale_factor(table: Table, channel: str, scale: str | float) -> float:
+def _scale_factor(table: Table, channel: str, scale: str | float) -> float:
     """Work out a scale: a number, or numbers and single variables of the file joined by * and /.
 
     "gtau", "-1*gtau", "gtau/1000". Raises InputError where a name is unknown or the result is

@@ -43,7 +43,7 @@ def read_table(
     """
     suffix = path.suffix.lower()
     if suffix == ".mat":
-        table = read_mat(path, wanted)
+        table = _read_mat(path, wanted)
     elif suffix in (".parquet", ".pq"):
         table = read_parquet(path, wanted)
     else:
@@ -157,7 +157,7 @@ def require_pyarrow() -> tuple[Any, Any]:
     return pa, pq
 
 
-def read_mat(path: Path, wanted: Wanted) -> Table:
+def _read_mat(path: Path, wanted: Wanted) -> Table:
     """Read variables of a MATLAB file as columns.
 
     A column is named as the variable is; ``data.q`` is a field of a structure, ``X[2]`` the third

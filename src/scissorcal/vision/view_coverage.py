@@ -65,7 +65,7 @@ class ViewCoverage:
         return f"{coverage}; wanted: {', '.join(self.wanted)}" if self.wanted else coverage
 
 
-def slant_of(detection: Detection, width: int, height: int) -> tuple[float, float]:
+def _slant_of(detection: Detection, width: int, height: int) -> tuple[float, float]:
     """How a board is turned from square-on, to the right and up (rad), by the usual camera.
 
     That is enough to classify slants.
@@ -105,7 +105,7 @@ def _size(detection: Detection, width: int, height: int) -> str:
 
 
 def _slant(detection: Detection, width: int, height: int) -> str:
-    right, up = slant_of(detection, width, height)
+    right, up = _slant_of(detection, width, height)
     if max(abs(right), abs(up)) < _SQUARE_ON:
         return SLANTS[0]
     if abs(right) > abs(up):

@@ -122,7 +122,7 @@ def _sizes(points: Array) -> list[tuple[int, int]]:
 
 def _fit(points: Array, sd: Array, intervals: tuple[int, int]) -> SplineFit:
     (a, b), (c, d) = _box(points)
-    return fit_spline(points, sd, (float(a), float(b)), (float(c), float(d)), intervals)
+    return _fit_spline(points, sd, (float(a), float(b)), (float(c), float(d)), intervals)
 
 
 def _box(points: Array) -> Array:
@@ -136,7 +136,7 @@ def _vertical_sd(surface: HeightField, points: Array, noise_m: float) -> Array:
     return np.asarray(noise_m * np.linalg.norm(surface.gradient(points), axis=-1))
 
 
-def fit_spline(
+def _fit_spline(
     points: Array,
     sd: Array,
     x_m: tuple[float, float],

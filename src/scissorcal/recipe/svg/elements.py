@@ -159,7 +159,7 @@ class _Shapes:
         for stack in (self._places, self._visibility, self._hidden):
             stack.pop()
         if name.rpartition(" ")[2] == "style":
-            refuse_style_sheet("".join(self._style or ()))
+            _refuse_style_sheet("".join(self._style or ()))
             self._style = None
 
     def said(self, text: str) -> None:
@@ -176,17 +176,17 @@ class _Shapes:
         """Take an element that nothing around it hides."""
         if tag in REFUSED_WHERE_SHOWN and not is_root:
             raise ValueError(REFUSED_WHERE_SHOWN[tag])
-        style = style_properties(attributes.get("style", ""), is_root=is_root)
-        if hiding_value(style, attributes, "display") == "none":
+        style = _style_properties(attributes.get("style", ""), is_root=is_root)
+        if _hiding_value(style, attributes, "display") == "none":
             self._hidden[-1] = True
             return
-        visibility = hiding_value(style, attributes, "visibility")
+        visibility = _hiding_value(style, attributes, "visibility")
         self._visibility[-1] = visibility or self._visibility[-1]
         if tag in SHAPES and self._visibility[-1] in ("hidden", "collapse"):
             return
         if tag not in SHAPES and tag not in CONTAINERS:
             raise ValueError(f"it has <{tag[:40]}>, which is not read: remove it")
-        refuse_attributes(tag, attributes, is_root=is_root)
+        _refuse_attributes(tag, attributes, is_root=is_root)
         if "transform" in style:
             placed = paths.transform(style["transform"], css=True)
         else:
@@ -293,7 +293,7 @@ def _parse(parser: Any, data: bytes) -> None:
         raise ValueError(f"it is not well-formed XML: {error}") from None
 
 
-def refuse_attributes(tag: str, keys: dict[str, str], *, is_root: bool = False) -> None:
+def _refuse_attributes(tag: str, keys: dict[str, str], *, is_root: bool = False) -> None:
     """Raise ValueError for an attribute of a shown element that is not understood, by its name."""
     for key, value in keys.items():
         of_element = SHAPES.get(tag, _ROOT if is_root else _LINK if tag == "a" else ())
@@ -304,7 +304,7 @@ def refuse_attributes(tag: str, keys: dict[str, str], *, is_root: bool = False) 
         _refuse_property(key, value, f"as an attribute of <{tag}>")
 
 
-def style_properties(style: str, *, is_root: bool = False) -> dict[str, str]:
+def _style_properties(style: str, *, is_root: bool = False) -> dict[str, str]:
     """Properties of a style attribute that place or hide a shape; others change only its looks.
 
     Raises ValueError for one that is not understood, by its name.
@@ -322,7 +322,7 @@ def style_properties(style: str, *, is_root: bool = False) -> dict[str, str]:
     return properties
 
 
-def refuse_style_sheet(text: str) -> None:
+def _refuse_style_sheet(text: str) -> None:
     """Raise ValueError for a <style> that places or hides shapes, or is not understood."""
     for key, value in _declarations(text, "in a <style>"):
         if key in _HIDING:
@@ -330,7 +330,7 @@ def refuse_style_sheet(text: str) -> None:
         _refuse_property(key, value, "in a <style>")
 
 
-def hiding_value(properties: dict[str, str], attributes: dict[str, str], key: str) -> str:
+def _hiding_value(properties: dict[str, str], attributes: dict[str, str], key: str) -> str:
     """The value of display or visibility of an element; "" where it is inherited."""
     value = properties.get(key, attributes.get(key, "")).strip().lower()
     return "" if value == "inherit" else value

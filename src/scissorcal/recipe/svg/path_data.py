@@ -165,7 +165,7 @@ def user_length(text: str, key: str) -> float:
     return finite(length[1]) * (_MM[unit] / MM_PER_PX if unit else 1.0)
 
 
-def page_length_mm(text: str, key: str) -> float:
+def _page_length_mm(text: str, key: str) -> float:
     """A length of the page, above 0 and in a unit that has a size."""
     length = _WITH_UNIT.fullmatch(text.strip())
     unit = length[2] if length else ""
@@ -179,7 +179,7 @@ def page_length_mm(text: str, key: str) -> float:
 
 def view_to_mm(attributes: Mapping[str, str]) -> Matrix:
     """The matrix from user units of a page to mm: width, height, viewBox, preserveAspectRatio."""
-    width, height = (page_length_mm(attributes.get(key, ""), key) for key in ("width", "height"))
+    width, height = (_page_length_mm(attributes.get(key, ""), key) for key in ("width", "height"))
     view_box = attributes.get("viewBox")
     if view_box is None:
         return (MM_PER_PX, 0.0, 0.0, MM_PER_PX, 0.0, 0.0)

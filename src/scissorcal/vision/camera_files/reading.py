@@ -54,7 +54,7 @@ def read_camera_file(path: Path) -> CameraFile:
     """
     text = read_foreign_text(path, CAMERA)
     try:
-        refuse_other_text(text)
+        _refuse_other_text(text)
         return _one_of([_read(tree, text) for tree in _documents(text)])
     except RefusedError as refused:
         where = f"{path}, {refused.place}:" if refused.place else f"{path}"
@@ -89,7 +89,7 @@ def _read(tree: Any, text: str) -> CameraFile:
         raise RefusedError(f"has {len(tree)} cameras in one list: keep only the rig's.")
     if not isinstance(tree, dict):
         raise RefusedError("is not a camera file of OpenCV, ROS or Kalibr: it has no names.")
-    refuse_other_names(tree)
+    _refuse_other_names(tree)
     facts = facts_of(tree)
     camera, notes = camera_of(facts)
     return CameraFile(camera, origin_of(tree, text), _rms(facts), notes)
@@ -100,7 +100,7 @@ def _rms(facts: Facts) -> float | None:
     return next((value for value in values if value is not None and math.isfinite(value)), None)
 
 
-def refuse_other_text(text: str) -> None:
+def _refuse_other_text(text: str) -> None:
     """Raise RefusedError on a text of a known program that is no YAML, JSON or XML of a camera."""
     if _COLMAP.match(text) or text.startswith("# Camera list with one line of data per camera"):
         raise RefusedError(
@@ -137,7 +137,7 @@ def refuse_other_text(text: str) -> None:
         )
 
 
-def refuse_other_names(tree: Mapping[str, Any]) -> None:
+def _refuse_other_names(tree: Mapping[str, Any]) -> None:
     """Raise RefusedError on names of MATLAB, whose first pixel is at 1, 1, or of Android."""
     inner = [key for value in tree.values() if isinstance(value, Mapping) for key in value]
     names = {*tree, *inner}

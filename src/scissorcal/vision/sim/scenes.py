@@ -226,7 +226,7 @@ def blade_layer(
     print. ``look`` are fields of `Layer`.
     """
     look = {"reflectance": STEEL, "brushed": 0.04, "grain": turn, **look}
-    outlines = [on_sheet(outline, pivot_m, turn) for outline in shape.outlines()]
+    outlines = [_on_sheet(outline, pivot_m, turn) for outline in shape.outlines()]
     return Layer(outlines, pose, **look)
 
 
@@ -252,14 +252,14 @@ def scissors_layers(
         for outline in outlines:
             mirrored = outline * (1.0, side)
             mirrored = mirrored if side > 0 else mirrored[::-1]
-            placed.append(on_sheet(mirrored, pivot_m, turn - 0.5 * side * opening))
+            placed.append(_on_sheet(mirrored, pivot_m, turn - 0.5 * side * opening))
         layers.append(Layer(placed, pose, **{"grain": turn - 0.5 * side * opening, **look}))
     screw = 0.9 * upper.hole_m * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
     layers.append(Layer([screw + np.asarray(pivot_m)], pose, _SCREW))
     return layers
 
 
-def on_sheet(points: ArrayLike, pivot_m: tuple[float, float], turn: float) -> Array:
+def _on_sheet(points: ArrayLike, pivot_m: tuple[float, float], turn: float) -> Array:
     """Take points of a blade's frame, y upward, to the sheet's, whose y points down."""
     c, s = np.cos(turn), np.sin(turn)
     flipped = np.asarray(points, dtype=np.float64) * (1.0, -1.0)

@@ -144,7 +144,7 @@ def find_markers(grey: Picture, dictionary_name: str, board: MarkedBoard | None 
         return Markers(np.zeros(0, np.int64), np.zeros((0, 4, 2)), np.zeros(0, np.bool_))
     rough = np.array([corner.reshape(4, 2) for corner in corners], dtype=np.float64)
     cells = int(dictionary(dictionary_name).markerSize) + 2
-    fine, sharp = refine_marker_corners(grey, rough, 1.0 / cells)
+    fine, sharp = _refine_marker_corners(grey, rough, 1.0 / cells)
     return Markers(np.asarray(ids, dtype=np.int64).ravel(), fine, sharp)
 
 
@@ -240,7 +240,7 @@ def _side_px(board: Board, ids: Integers, pixels: Array) -> float:
     return float(np.median(sides)) if sides else float("nan")
 
 
-def refine_marker_corners(
+def _refine_marker_corners(
     grey: NDArray[np.uint8], corners: Array, module: float
 ) -> tuple[Array, Flags]:
     """Move corners (n, 4, 2) of dark square markers to the intersections of their sides.

@@ -73,12 +73,12 @@ def no_board_sentence(photo: Photo, board: Board, corners: int, least: int) -> s
             f"{name} has only {photo.width} x {photo.height} pixels: take photographs of at least "
             "640 x 480."
         )
-    if not corners and (misread := misread_sentence(grey, board, name)):
+    if not corners and (misread := _misread_sentence(grey, board, name)):
         return misread
     other = _other_target(grey, board)
     if other and not corners:
         return f"{name} shows {other}, not the {board.name}: {_use(board)}."
-    blur = sharpest_edge_px(photo.grey)
+    blur = _sharpest_edge_px(photo.grey)
     if blur > BLURRED_PX:
         return (
             f"{name} is too blurred: its sharpest edges are {2.56 * blur:.0f} px wide. Focus on "
@@ -96,7 +96,7 @@ def no_board_sentence(photo: Photo, board: Board, corners: int, least: int) -> s
             f"{name} shows no chessboard of {board.columns} x {board.rows} inner corners: show "
             "the whole board with its white border, and check the number of corners."
         )
-    if count := markers_seen(grey, board):
+    if count := _markers_seen(grey, board):
         return (
             f"{name} shows {count} markers of the {board.name}, but too few, or not where that has "
             "them: show the whole board, and check its columns, rows and marker numbers."
@@ -107,7 +107,7 @@ def no_board_sentence(photo: Photo, board: Board, corners: int, least: int) -> s
     )
 
 
-def sharpest_edge_px(grey: Picture) -> float:
+def _sharpest_edge_px(grey: Picture) -> float:
     """Standard deviation in pixels of the blur of the sharpest edges of a picture.
 
     A step blurred by a Gaussian has a steepest slope of its height over sqrt(2 pi) times its
@@ -192,7 +192,7 @@ def _use(board: Board) -> str:
     return "photograph that one"
 
 
-def misread_sentence(grey: Picture, board: Board, name: str) -> str | None:
+def _misread_sentence(grey: Picture, board: Board, name: str) -> str | None:
     """What of the named board does not fit the picture ``name``; None where that is unknown.
 
     A right board that is too small, blurred or covered has other causes: None.
@@ -209,7 +209,7 @@ def misread_sentence(grey: Picture, board: Board, name: str) -> str | None:
     return None
 
 
-def markers_seen(grey: Picture, board: MarkedBoard) -> int:
+def _markers_seen(grey: Picture, board: MarkedBoard) -> int:
     """How many markers with numbers of the board a picture shows."""
     return len(_seen(grey, board).ids)
 

@@ -259,11 +259,11 @@ def sheet_png(sheet: Sheet) -> bytes:
     """Give a sheet as a grey PNG whose resolution is stated in it."""
     stream = io.BytesIO()
     inch = PIXELS_PER_MM * 25.4
-    sheet_picture(sheet).save(stream, format="PNG", dpi=(inch, inch), compress_level=6)
+    _sheet_picture(sheet).save(stream, format="PNG", dpi=(inch, inch), compress_level=6)
     return stream.getvalue()
 
 
-def sheet_picture(sheet: Sheet) -> "Image.Image":
+def _sheet_picture(sheet: Sheet) -> "Image.Image":
     """Draw a sheet at `PIXELS_PER_MM`."""
     scale = PIXELS_PER_MM
     picture = Image.new("L", (round(sheet.width * scale), round(sheet.height * scale)), 255)
