@@ -5,6 +5,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d, median_filter
+from scipy.optimize import least_squares
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
@@ -226,8 +228,6 @@ def find_hole(blade: PicturedBlade) -> BorderPoints | None:
 
 def fit_circle(points: Array) -> tuple[Array, float]:
     """Centre (2,) and radius of the circle with the least squared distances from points (n, 2)."""
-    from scipy.optimize import least_squares
-
     middle = points.mean(axis=0)
     away = points - middle
     size = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
@@ -241,8 +241,6 @@ def fit_circle(points: Array) -> tuple[Array, float]:
 
 def _thinned(frame: Array) -> tuple[Array, Array]:
     """One offset per station, smoothed over a few flat pixels."""
-    from scipy.ndimage import median_filter
-
     order = np.argsort(frame[:, 0])
     s, e = frame[order, 0], frame[order, 1]
     cells = np.linspace(s[0], s[-1], max(len(s) // 4, 10))
@@ -254,8 +252,6 @@ def _thinned(frame: Array) -> tuple[Array, Array]:
 
 def _with_normals(blade: PicturedBlade, s: Array, e: Array, outward: float) -> tuple[Array, Array]:
     """Points in the picture and unit normals there that lead out of the blade."""
-    from scipy.ndimage import gaussian_filter1d
-
     view, parts = blade.view, blade.parts
     smooth = gaussian_filter1d(e, 8.0, mode="nearest")
     points = view.to_pixels(parts.points(s, e))

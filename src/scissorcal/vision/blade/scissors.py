@@ -5,6 +5,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
@@ -98,8 +99,6 @@ def find_scissors(shape: Silhouette, source: str, *, whole: bool = False) -> Sci
 
 def _refuse_others(shape: Silhouette, source: str) -> None:
     """Refuse further objects; a handle that bright metal separates from the rest is near it."""
-    from scipy.spatial import cKDTree
-
     size = float(np.ptp(shape.outer, axis=0).max())
     tree = cKDTree(shape.outer)
     away = [float(np.min(tree.query(other)[0])) for other in shape.others]

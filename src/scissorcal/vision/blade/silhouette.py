@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import zoom
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
@@ -93,8 +95,6 @@ class Silhouette:
 
         The same patch may come more than once.
         """
-        import cv2
-
         whole = np.zeros_like(self.mask)
         cv2.fillPoly(whole, [np.rint(self.grid(self.outer)).astype(np.int32)], 255)
         metal = float(np.median(self.relative[self.mask > 0]))
@@ -131,9 +131,6 @@ def silhouette(light: Light, view: View, source: str, *, longest: int = LONGEST)
 
 
 def _flat(light: Light, view: View, pixel: float) -> Light:
-    import cv2
-    from scipy.ndimage import zoom
-
     left, top, right, bottom = view.bounds
     columns, rows = int((right - left) / pixel), int((bottom - top) / pixel)
     # distortion varies slowly: every eighth pixel is projected, those between are interpolated
@@ -184,8 +181,6 @@ def _sheet_light(flat: Light) -> Light:
 
 
 def _dark(relative: Light, source: str) -> Mask:
-    import cv2
-
     smooth = np.asarray(cv2.GaussianBlur(relative, (0, 0), 1.0))
     level = np.clip(smooth * 170.0, 0, 255).astype(np.uint8)
     threshold, _ = cv2.threshold(level, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
@@ -205,8 +200,6 @@ def _dark(relative: Light, source: str) -> Mask:
 def _outlined(
     mask: Mask, relative: Light, pixel: float, origin: tuple[float, float], source: str
 ) -> Silhouette:
-    import cv2
-
     contours, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     if not contours:
         raise InputError(f"{source}: nothing is on the sheet.")
@@ -347,8 +340,6 @@ def _pivot_hole(shape: Silhouette, source: str) -> Array:
 
 
 def _refuse_others(shape: Silhouette, source: str) -> None:
-    import cv2
-
     if shape.others:
         raise InputError(
             f"{source}: {1 + len(shape.others)} objects of a blade's size are on the mat; one "

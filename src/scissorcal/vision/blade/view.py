@@ -6,7 +6,9 @@ The sheet is the mat with its markers, or bare, under a camera that is held abov
 from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
+import cv2
 import numpy as np
+from scipy.optimize import least_squares
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
@@ -217,8 +219,6 @@ class CameraView(_MatView):
         return np.concatenate([self.pose, self.camera.parameters, np.ones(2)])
 
     def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
-        import cv2
-
         v = self.values if values is None else values
         rays = _with_intrinsics(self.camera, v[6:-2]).rays(pixels)
         rotation = cv2.Rodrigues(v[:3])[0]
@@ -228,8 +228,6 @@ class CameraView(_MatView):
         return np.asarray((origin[:2] - directions[:, :2] * reach[:, None]) * v[-2:])
 
     def to_pixels(self, points: Array) -> Array:
-        import cv2
-
         rotation = cv2.Rodrigues(self.pose[:3])[0]
         return self.camera.project(points @ rotation[:, :2].T + self.pose[3:6])
 
@@ -265,8 +263,6 @@ class HomographyView(_MatView):
 
 
 def _camera_view(detection: Detection, camera: Camera, printed: Array, source: str) -> CameraView:
-    import cv2
-
     corners = Corners.of(detection)
     try:
         board = locate_board(corners, camera)
@@ -293,9 +289,6 @@ def _camera_view(detection: Detection, camera: Camera, printed: Array, source: s
 def _homography_view(
     detection: Detection, size: tuple[int, int], printed: Array, source: str
 ) -> HomographyView:
-    import cv2
-    from scipy.optimize import least_squares
-
     sheet, pixels = detection.points[:, :2], detection.pixels
     start, _ = cv2.findHomography(_straightened(pixels, 0.0, size), sheet, 0)
     if start is None:

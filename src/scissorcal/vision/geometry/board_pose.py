@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -147,8 +148,6 @@ class _Refined:
 
 
 def _both(corners: Corners, camera: Camera) -> list[Array]:
-    import cv2
-
     middle = np.append(corners.points[:, :2].mean(axis=0), 0.0)
     rays = camera.rays(corners.pixels)
     _, turns, shifts, _ = cv2.solvePnPGeneric(
@@ -170,8 +169,6 @@ def project_pose(pose: Array, corners: Corners, camera: Camera) -> tuple[Array, 
 
     The slopes are by the pose, then by the camera's parameters.
     """
-    import cv2
-
     pixels, slope = cv2.projectPoints(
         corners.points, pose[:3], pose[3:], camera.matrix, camera.coefficients
     )
@@ -190,8 +187,6 @@ def print_slopes(pose: Array, slope: Array, corners: Corners) -> Array:
 
 def _refine(start: Array, corners: Corners, camera: Camera, used: NDArray[np.bool_]) -> _Refined:
     """Minimise the reprojection error of the corners used (Levenberg-Marquardt)."""
-    import cv2
-
     turn, shift = cv2.solvePnPRefineLM(
         corners.points[used],
         corners.pixels[used],
@@ -269,7 +264,5 @@ def _ratio(worse: float, better: float) -> float:
 
 def _apart(a: _Refined, b: _Refined) -> bool:
     """Whether two refined poses are different ones and not one found twice."""
-    import cv2
-
     turn = cv2.Rodrigues(cv2.Rodrigues(a.pose[:3])[0] @ cv2.Rodrigues(b.pose[:3])[0].T)[0]
     return float(np.linalg.norm(turn)) > 1e-3

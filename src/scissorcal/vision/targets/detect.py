@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -129,8 +130,6 @@ def find_markers(grey: Picture, dictionary_name: str, board: MarkedBoard | None 
     Markers are read with twice the default pixels per cell, which finds those blurred by half a
     cell; corners are then measured from the markers' sides.
     """
-    import cv2
-
     detector = cv2.aruco.ArucoDetector(dictionary(dictionary_name), _reading())
     corners, ids, rejected = detector.detectMarkers(grey)
     if board is not None and ids is not None and len(ids) >= 2 and len(rejected):
@@ -149,8 +148,6 @@ def find_markers(grey: Picture, dictionary_name: str, board: MarkedBoard | None 
 
 
 def _reading() -> Any:
-    import cv2
-
     settings = cv2.aruco.DetectorParameters()
     settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     settings.perspectiveRemovePixelPerCell = 8
@@ -159,8 +156,6 @@ def _reading() -> Any:
 
 
 def _charuco(grey: Picture, board: CharucoBoard) -> tuple[Integers, Array]:
-    import cv2
-
     settings = cv2.aruco.CharucoParameters()
     settings.tryRefineMarkers = True
     detector = cv2.aruco.CharucoDetector(
@@ -182,8 +177,6 @@ def _marker_board(grey: Picture, board: MarkerBoard) -> tuple[Integers, Array]:
 
 
 def _chessboard(grey: Picture, board: Chessboard, window_px: int | None) -> tuple[Integers, Array]:
-    import cv2
-
     size = (board.columns, board.rows)
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
     found, corners = cv2.findChessboardCorners(grey, size, flags=flags)
@@ -216,8 +209,6 @@ def _windows(corners: Array, window_px: int | None) -> Array:
 
 
 def _refined(grey: Picture, corner: Array, window: int) -> Array:
-    import cv2
-
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
     given = corner.astype(np.float32).reshape(1, 1, 2)
     found = cv2.cornerSubPix(grey, given, (window, window), (-1, -1), criteria)
@@ -294,8 +285,6 @@ def _side_lines(linear: NDArray[np.float32], corners: Array, module: float) -> t
 
 def _half_way(linear: NDArray[np.float32], places: Array, outward: Array, reach: Array) -> Array:
     """How far outward of each place (n, 4, places) the light is half way; NaN where it never is."""
-    import cv2
-
     count = 2 * int(np.ceil(2.0 * float(reach.max()))) + 1
     step = np.linspace(-1.0, 1.0, count)
     offset = reach[:, :, None] * step

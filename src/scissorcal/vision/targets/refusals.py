@@ -8,6 +8,7 @@ columns and rows swapped, and other numbers of columns.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -114,8 +115,6 @@ def _sharpest_edge_px(grey: Picture) -> float:
     standard deviation; heights and slopes are taken from the picture's extremes. Infinite for a
     picture of one shade.
     """
-    import cv2
-
     smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 1.0)
     low, high = np.percentile(smooth, [2.0, 98.0])
     slope = np.hypot(cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)) / 8.0
@@ -128,8 +127,6 @@ def _sharpest_edge_px(grey: Picture) -> float:
 
 def _reduced(grey: Picture) -> Picture:
     """A reduced picture, in which many searches are fast."""
-    import cv2
-
     zoom = _REDUCED_PX / max(grey.shape)
     if zoom >= 1.0:
         return grey
@@ -139,7 +136,6 @@ def _reduced(grey: Picture) -> Picture:
 
 def _other_target(grey: Picture, board: Board) -> str | None:
     """Name another target, or markers of another dictionary, in the picture."""
-    import cv2
 
     def ids_of(name: str) -> list[int]:
         _, ids, _ = cv2.aruco.ArucoDetector(dictionary(name)).detectMarkers(grey)
@@ -173,8 +169,6 @@ def _share_markers(first_name: str | None, second_name: str) -> bool:
 
 def _plain_chessboard(grey: Picture, board: Board) -> bool:
     """Whether the picture shows a chessboard other than the board with its markers unread."""
-    import cv2
-
     inner = (board.columns - 1, board.rows - 1) if isinstance(board, CharucoBoard) else None
     sizes = ((9, 6), (8, 6), (7, 6), (8, 5), (7, 5), (6, 5), (6, 4), (7, 4))
     return any(
@@ -227,8 +221,6 @@ def _copies(grey: Picture) -> Iterator[tuple[str, str, Picture]]:
 
 def _seen(grey: Picture, board: MarkedBoard) -> _Markers:
     """Markers of the board's dictionary; of a target of scissorcal its own numbers alone."""
-    import cv2
-
     corners, ids, _ = cv2.aruco.ArucoDetector(dictionary(board.dictionary)).detectMarkers(grey)
     numbers = np.zeros(0, np.int64) if ids is None else np.asarray(ids, dtype=np.int64).ravel()
     places = np.array(corners, dtype=np.float64).reshape(-1, 4, 2)
@@ -288,8 +280,6 @@ def _other_columns(markers: _Markers, board: CharucoBoard) -> Iterator[CharucoBo
 
 def _fitting(markers: _Markers, board: MarkedBoard) -> int:
     """How many markers one homography brings to their places on the board."""
-    import cv2
-
     places = dict(zip(board.ids, _marker_places(board), strict=False))
     has = [int(number) in places for number in markers.ids]
     if sum(has) < LEAST_MARKERS:
