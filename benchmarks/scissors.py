@@ -18,6 +18,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from benchmarks.photographs import CastShadow, Lamp, TexturedLayer, random_looks
 
 from scissorcal.calibration.edge.fit import fit_blade
 from scissorcal.errors import InputError
@@ -25,13 +26,9 @@ from scissorcal.vision.blade.photo import BladePhoto, by_blade, photograph_sciss
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import (
     BladeShape,
-    CastShadow,
-    Lamp,
-    Layer,
     Lens,
     Pose,
     as_jpeg,
-    random_looks,
     render,
     scissors_layers,
 )
@@ -128,7 +125,7 @@ def photographed(
 
     white = rng.uniform(0.7, 0.9)
     far = 0.3 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    sheet = Layer(
+    sheet = TexturedLayer(
         [far],
         pose,
         white,

@@ -30,7 +30,7 @@ from scissorcal.render.admission import rendered_tables
 from scissorcal.tracking.contacts import TipContacts
 from scissorcal.tracking.rotation import pose_error
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.seen_plate import SeenPlate
+from scissorcal.vision.geometry.rig_frame import SeenPlate
 from scissorcal.vision.live import Frame
 from scissorcal.vision.sim.sim_camera import SIM_LENS
 from scissorcal.workday.tracking.feeds import idle_rig

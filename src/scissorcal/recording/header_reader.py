@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import IO
 
-from scissorcal.foreign import open_foreign, reading
+from scissorcal.foreign import reading
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording.header import (
     FORMAT,
@@ -31,19 +31,6 @@ _STATISTICS = struct.Struct("<QHIIIIQQ")
 _METADATA_INDEX = struct.Struct("<QQ")
 
 
-def read_header(path: str | Path) -> RecordingHeader:
-    """Read what a recording says about itself, without its samples.
-
-    A finished file has an index at its end, so that a few kilobytes are read (some milliseconds).
-    A file that was cut off or damaged is read whole, as `read_recording` does. Raises InputError
-    as that does.
-    """
-    path = Path(path)
-    with open_foreign(path, RECORDING) as stream:
-        header = _from_index(stream)
-    return header or _from_scan(path)
-
-
 def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
     """Read by the index of a finished file; None where there is none or anything is odd."""
     end = stream.seek(0, 2) - len(MAGIC) - _FOOTER.size
@@ -54,7 +41,7 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
             return None
         stream.seek(start)
         summary = stream.read(end - start)
-        found: dict[str, list[dict[str, str]]] = {}
+        records: dict[str, list[dict[str, str]]] = {}
         count = duration_ns = None
         room = end
         for opcode, body in _records(summary):
@@ -69,11 +56,11 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
                     return None
                 stream.seek(offset + HEAD.size)
                 name, entries = _metadata(stream.read(length - HEAD.size))
-                found.setdefault(name, []).append(entries)
-        described = [e for e in found.get(METADATA_NAME, ()) if _is_sound(e)]
+                records.setdefault(name, []).append(entries)
+        described = [e for e in records.get(METADATA_NAME, ()) if _is_sound(e)]
         if count is None or duration_ns is None or not described:
             return None
-        notes = tuple(entries.get("note", "") for entries in found.get(NOTE_NAME, ()))
+        notes = tuple(entries.get("note", "") for entries in records.get(NOTE_NAME, ()))
         return _header(described[-1], notes, count, duration_ns * 1e-9)
     except Exception:  # noqa: BLE001 - without a sound index, the scan says what is wrong
         return None

@@ -7,7 +7,7 @@ import pytest
 
 from scissorcal.calibration.edge import fit as edge_fit
 from scissorcal.calibration.edge.candidates import MOST_EVALUATIONS, compare_edges
-from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
+from scissorcal.calibration.edge.cells import EdgeCells, cells_each, edge_cells
 from scissorcal.calibration.edge.fit import fit_blade, merged_nicks
 from scissorcal.calibration.edge.model import (
     SEARCH_EVALUATIONS,
@@ -15,14 +15,14 @@ from scissorcal.calibration.edge.model import (
     EdgeEvidence,
     basis_of,
 )
-from scissorcal.calibration.edge.result import BladeResult
+from scissorcal.calibration.edge.result import BladeResult, FoundNick
 from scissorcal.errors import InputError
 from scissorcal.inference import SamplingStatus
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import load_recipe
 from scissorcal.vision.blade.borders import BorderPoints
 from scissorcal.vision.blade.measure import BladeMeasurement
-from scissorcal.vision.blade.parts import BladeParts
+from scissorcal.vision.blade.silhouette import BladeParts
 
 LENGTH = 0.075
 

@@ -162,14 +162,14 @@ def test_no_recording_at_all_is_refused():
 def emps() -> Recording:
     if not EMPS.is_file():
         pytest.skip(f"real data absent: {EMPS.name} is not beside the project")
-    from scissorcal.recording import import_table
+    from scissorcal.recording import ImportOptions, import_table
 
     return import_table(
         EMPS,
         columns={"opening": "qm", "motor_torque": "vir", "time": "t"},
         units={"opening": "m", "motor_torque": "N", "time": "s"},
         scale={"motor_torque": "gtau"},
-        joint=Joint("linear"),
+        options=ImportOptions(joint=Joint("linear")),
     )
 
 

@@ -8,8 +8,7 @@ from scipy.stats import chi2
 from scissorcal.vision.geometry.board_pose import Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference
-from scissorcal.vision.geometry.rig_frame import RigPose
-from scissorcal.vision.geometry.seen_plate import seen_plate
+from scissorcal.vision.geometry.rig_frame import RigPose, seen_plate
 from scissorcal.vision.targets.boards import PLATE_BOARD
 
 LENS = (0.05, -0.1, 0.0, 0.0, 0.0)

@@ -24,7 +24,7 @@ from scissorcal.calibration.camera.uncertainty import (
     pixel_map,
 )
 from scissorcal.errors import MissingError
-from scissorcal.recipe.photograph_priors import CameraPriors
+from scissorcal.recipe.priors import CameraPriors
 from scissorcal.vision.geometry.camera import Camera, usual_camera
 from scissorcal.vision.targets.detect import Detection
 

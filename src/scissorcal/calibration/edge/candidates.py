@@ -22,7 +22,7 @@ from scissorcal.inference.infer import infer
 from scissorcal.inference.posterior import Effort
 from scissorcal.inference.status import SamplingStatus
 from scissorcal.model import Edge, EdgeBelief
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 
 POLYNOMIAL = ("offset_m", "taper_rad", "curvature_per_m", "bend_per_m2")
 

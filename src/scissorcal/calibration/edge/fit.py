@@ -7,13 +7,13 @@ import numpy as np
 
 from scissorcal.aliases import Array, Progress
 from scissorcal.calibration.edge.candidates import EdgeComparison, compare_edges
-from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
+from scissorcal.calibration.edge.cells import EdgeCells, cells_each, edge_cells
 from scissorcal.calibration.edge.checks import blade_verdicts
-from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow
+from scissorcal.calibration.edge.result import Band, BladeFit, FoundNick, PhotographRow
 from scissorcal.errors import InputError
 from scissorcal.inference import Effort
 from scissorcal.model import EdgeBelief, draw_edges, edge_height
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.blade.measure import BladeMeasurement
 from scissorcal.vision.blade.modes import smooth_slope

@@ -10,7 +10,7 @@ from scissorcal.calibration.edge.cells import EdgeCells
 from scissorcal.inference import Cluster, Optimum, Problem
 from scissorcal.inference.status import SearchStatus
 from scissorcal.model.bspline import spline_design
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 
 Family = Literal["line", "arc", "cubic", "spline"]
 

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.edge.result import BladeFit
-from scissorcal.vision.blade.photo import BladePhoto
-from scissorcal.vision.blade.picture import NickMark, blade_picture
+from scissorcal.vision.blade.photo import BladePhoto, NickMark, blade_picture
 
 
 def edge_picture(photo: BladePhoto, fits: Mapping[str, BladeFit]) -> NDArray[np.uint8]:
@@ -24,10 +23,7 @@ def edge_picture(photo: BladePhoto, fits: Mapping[str, BladeFit]) -> NDArray[np.
                 for nick in fit.nicks
             ]
         )
-    source = photo.photo.source
-    return blade_picture(
-        photo.photo, photo.view, photo.outline, photo.measured, edges, marks, source
-    )
+    return blade_picture(photo, edges, marks)
 
 
 def _scaled_edge(fit: BladeFit, unit: float) -> Callable[[Array], Array]:

@@ -12,7 +12,7 @@ from scissorcal.calibration.camera.there import CameraThere
 from scissorcal.calibration.plate.checks import plate_verdicts
 from scissorcal.calibration.plate.result import Halves, PlateFit, PlateView
 from scissorcal.errors import InputError, MissingError, VerdictError
-from scissorcal.recipe.photograph_priors import PlatePriors
+from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference

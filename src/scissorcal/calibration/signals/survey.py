@@ -13,8 +13,8 @@ from scissorcal.calibration.signals.sensors import (
     held_sentence,
     mark_sentence,
 )
+from scissorcal.recording.faulty_values import lone_excursion
 from scissorcal.recording.layout import unit_of
-from scissorcal.recording.marks import lone_excursion
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.summarising import Gaps, find_gaps
 

@@ -5,8 +5,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
-from scissorcal.vision.live import Frame
-from scissorcal.vision.track import Tracked
+from scissorcal.vision.live import Frame, Tracked
 
 CLOSE_S = 2.0
 

@@ -4,14 +4,12 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from scissorcal.recipe.photograph_priors import PlatePriors
+from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.rig_frame import RigPose
-from scissorcal.vision.geometry.seen_plate import SeenPlate, seen_plate
-from scissorcal.vision.live import Frame
+from scissorcal.vision.geometry.rig_frame import RigPose, SeenPlate, seen_plate
+from scissorcal.vision.live import Frame, State, Tracked, track
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
-from scissorcal.vision.track import State, Tracked, track
 
 TARGETS = ("", PLATE_BOARD.name, PLATE_STRIP.name)
 """Names of targets, in the order of their numbers in a recording."""

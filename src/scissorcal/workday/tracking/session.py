@@ -15,7 +15,7 @@ from scissorcal.tracking.delay import DelayFit, measure_delay
 from scissorcal.tracking.follow import ContactSource, FollowedRow, PlateFollower, SeenPose
 from scissorcal.tracking.settings import CameraErrors, TrackingSettings, settings_of
 from scissorcal.tracking.tracker import Outcome, PoseEstimate
-from scissorcal.vision.track import STATES, State
+from scissorcal.vision.live import STATES, State
 from scissorcal.workday.tracking.pictures import PlatePicture
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackChannels
 

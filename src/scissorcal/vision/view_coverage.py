@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from scissorcal.aliases import Array
@@ -57,20 +58,18 @@ class ViewCoverage:
 
     def sentence(self) -> str:
         """Sentence on what is covered and what is still wanted."""
-        seen = (
+        coverage = (
             f"places {len(self.places)} of {len(PLACES)}, sizes {len(self.sizes)} of {len(SIZES)}, "
             f"slants {len(self.slants)} of {len(SLANTS)}"
         )
-        return f"{seen}; wanted: {', '.join(self.wanted)}" if self.wanted else seen
+        return f"{coverage}; wanted: {', '.join(self.wanted)}" if self.wanted else coverage
 
 
-def slant_of(detection: Detection, width: int, height: int) -> tuple[float, float]:
+def _slant_of(detection: Detection, width: int, height: int) -> tuple[float, float]:
     """How a board is turned from square-on, to the right and up (rad), by the usual camera.
 
     That is enough to classify slants.
     """
-    import cv2
-
     matrix = usual_camera(width, height).matrix
     _, turns, _, _ = cv2.solvePnPGeneric(
         detection.points, detection.pixels, matrix, None, flags=cv2.SOLVEPNP_IPPE
@@ -106,7 +105,7 @@ def _size(detection: Detection, width: int, height: int) -> str:
 
 
 def _slant(detection: Detection, width: int, height: int) -> str:
-    right, up = slant_of(detection, width, height)
+    right, up = _slant_of(detection, width, height)
     if max(abs(right), abs(up)) < _SQUARE_ON:
         return SLANTS[0]
     if abs(right) > abs(up):

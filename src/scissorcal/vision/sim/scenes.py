@@ -1,5 +1,6 @@
-"""Blades with exactly known edges, for rendering."""
+"""What the rendered camera sees: printed targets, blades with known edges, plate and card."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -7,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scissorcal.aliases import Array
-from scissorcal.vision.sim.lens import Pose
+from scissorcal.vision.sim.optics import Pose, about
 from scissorcal.vision.sim.photograph import Layer
+from scissorcal.vision.targets.boards import RIG_MARKERS, Board, Chessboard, MarkedBoard
+from scissorcal.vision.targets.sheet import board_ink
 
 STEEL = 0.28
 _SCREW = 0.12
@@ -69,24 +72,6 @@ class BladeShape:
         edge = self.edge_at(s)
         return np.asarray(edge + (straight - edge) * np.sqrt(1.0 - near**2))
 
-    def centreline_turn(self) -> float:
-        """How far this frame must be turned for its x axis to halve the blade, in radians.
-
-        Halving means: least squares through the pivot over 30 to 80 % of the blade's length.
-        """
-        turn = 0.0
-        s = np.linspace(0.0, self.length_m, 4001)
-        for _ in range(6):
-            c, n = np.cos(turn), np.sin(turn)
-            along = np.linspace(0.3, 0.8, 501) * self.length_m
-            lower, upper = (
-                np.interp(along, c * s + n * y, c * y - n * s)
-                for y in (self.edge_at(s), self.back_at(s))
-            )
-            middle = 0.5 * (lower + upper)
-            turn += float(np.arctan(np.sum(middle * along) / np.sum(along**2)))
-        return turn
-
     def outlines(self, *, tail: Array | None = None) -> list[Array]:
         """The body's outline and the pivot's hole, polygons in the blade's frame.
 
@@ -110,6 +95,124 @@ class BladeShape:
         return [outline, self.hole_m * np.column_stack([np.cos(_ROUND), -np.sin(_ROUND)])]
 
 
+_RING = (-0.075, -0.022, 0.022, 0.015)
+"""Centre x, y and half axes of a handle's ring in the blade's frame."""
+
+
+PAPER, INK = 0.85, 0.04
+MARGIN_M = 0.012
+
+
+LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""A level plate in the rig's frame: its upper face looks along y, in which the blades close."""
+
+
+@dataclass(frozen=True)
+class PlateScene:
+    """True poses. The card moves with a blade; ``rig_card`` is its pose at no advance and blade
+    angle zero. The target is on the plate's upper face at ``plate_target``."""
+
+    camera_rig: Pose
+    rig_card: Pose
+    rig_plate: Pose
+    plate_target: Pose
+
+    @property
+    def camera_plate(self) -> Pose:
+        """The plate as the camera has it."""
+        return chained(self.camera_rig, self.rig_plate)
+
+    def layers(
+        self, target: MarkedBoard, advance_m: float = 0.0, blade_angle: float = 0.0
+    ) -> list[Layer]:
+        """The target on the plate, and the card at the rig's stance."""
+        stance = Pose(about(2, blade_angle), np.array([advance_m, 0.0, 0.0]))
+        card = chained(self.camera_rig, stance, self.rig_card)
+        lying = chained(self.camera_plate, self.plate_target)
+        return [*target_layers(RIG_MARKERS, card), *target_layers(target, lying)]
+
+
+def plate_scene(
+    rng: np.random.Generator, place_m: tuple[float, float] = (0.0, 0.0), turn: float = 0.0
+) -> PlateScene:
+    """Draw a scene: the camera above and aside, plate and card slightly displaced.
+
+    ``place_m`` is the place of the pattern's upper left corner on the plate, ``turn`` (rad) the
+    rotation of its upper edge.
+    """
+    eye = np.array([0.15, 0.7, 0.75]) + rng.normal(0.0, 0.05, 3)
+    to_rig = _looking(eye / np.linalg.norm(eye))
+    middle = np.array([0.09, 0.03, 0.04])
+    camera_rig = Pose(to_rig, np.array([0.0, 0.0, rng.uniform(0.4, 0.46)]) - to_rig @ middle)
+    facing = np.diag([1.0, -1.0, -1.0]) @ _leaned(rng, 0.05)
+    centre = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])
+    card = np.array([0.03, 0.075, 0.0]) + np.append(rng.normal(0.0, 2e-3, 2), 0.0)
+    lying = LEVEL @ _leaned(rng, 0.02)
+    near_edge = np.array([0.03, 0.0, 0.012]) + rng.normal(0.0, 1.5e-3, 3)
+    pattern = about(2, turn) @ np.diag([1.0, -1.0, -1.0])
+    return PlateScene(
+        camera_rig,
+        Pose(facing, card - facing @ centre),
+        Pose(lying, near_edge),
+        Pose(pattern, np.array([*place_m, 0.0])),
+    )
+
+
+def chained(*poses: Pose) -> Pose:
+    """One pose after the other, the outermost first."""
+    rotation, shift = np.eye(3), np.zeros(3)
+    for pose in reversed(poses):
+        rotation, shift = pose.rotation @ rotation, pose.rotation @ shift + pose.shift_m
+    return Pose(rotation, shift)
+
+
+def _looking(towards_eye: Array) -> Array:
+    """Rotation into a camera that looks from a direction, its x axis near the rig's."""
+    forward = -towards_eye
+    right = np.array([1.0, 0.0, 0.0]) - forward * forward[0]
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(forward, right), forward])
+
+
+def _leaned(rng: np.random.Generator, size: float) -> Array:
+    angles = rng.normal(0.0, size, 3)
+    return np.asarray(about(0, angles[0]) @ about(1, angles[1]) @ about(2, angles[2]))
+
+
+def target_layers(
+    board: Board,
+    pose: Pose,
+    *,
+    print_scale: tuple[float, float] = (1.0, 1.0),
+    ids: Sequence[int] | None = None,
+) -> list[Layer]:
+    """The sheet and its ink. ``print_scale`` is the printer's scale error by axis; ``ids`` leaves
+    out all other markers."""
+    scale = np.asarray(print_scale)
+    sheet = _rectangle(-MARGIN_M, -MARGIN_M, board.width_m + MARGIN_M, board.height_m + MARGIN_M)
+    ink = [outline * scale for outline in _ink(board, ids)]
+    return [Layer([sheet], pose, PAPER), Layer(ink, pose, INK)]
+
+
+def _ink(board: Board, ids: Sequence[int] | None) -> list[Array]:
+    if isinstance(board, Chessboard):
+        size = board.square_m
+        return [
+            _rectangle(c * size, r * size, (c + 1) * size, (r + 1) * size)
+            for r in range(board.rows + 1)
+            for c in range(board.columns + 1)
+            if (r + c) % 2 == 0
+        ]
+    return [
+        1e-3 * _rectangle(part.x, part.y, part.x + part.width, part.y + part.height)
+        for part in board_ink(board, ids=ids)
+    ]
+
+
+def _rectangle(left: float, top: float, right: float, bottom: float) -> Array:
+    return np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+
+
 def blade_layer(
     shape: BladeShape,
     pose: Pose,
@@ -123,7 +226,7 @@ def blade_layer(
     print. ``look`` are fields of `Layer`.
     """
     look = {"reflectance": STEEL, "brushed": 0.04, "grain": turn, **look}
-    outlines = [on_sheet(outline, pivot_m, turn) for outline in shape.outlines()]
+    outlines = [_on_sheet(outline, pivot_m, turn) for outline in shape.outlines()]
     return Layer(outlines, pose, **look)
 
 
@@ -134,8 +237,6 @@ def scissors_layers(
     pose: Pose,
     pivot_m: tuple[float, float],
     turn: float = 0.0,
-    *,
-    rings: bool = True,
     **look: Any,
 ) -> list[Layer]:
     """Both blades, open by ``opening`` about one pivot, with ring handles behind it.
@@ -146,30 +247,23 @@ def scissors_layers(
     look = {"reflectance": STEEL, "brushed": 0.04, **look}
     layers = []
     for shape, side in ((replace(lower, hole_m=0.0), -1.0), (upper, 1.0)):
-        tail = _handle(shape) if rings else None
-        outlines = shape.outlines(tail=tail)
-        if rings:
-            outlines.append(_ring_hole())
+        outlines = [*shape.outlines(tail=_handle(shape)), _ring_hole()]
         placed = []
         for outline in outlines:
             mirrored = outline * (1.0, side)
             mirrored = mirrored if side > 0 else mirrored[::-1]
-            placed.append(on_sheet(mirrored, pivot_m, turn - 0.5 * side * opening))
+            placed.append(_on_sheet(mirrored, pivot_m, turn - 0.5 * side * opening))
         layers.append(Layer(placed, pose, **{"grain": turn - 0.5 * side * opening, **look}))
     screw = 0.9 * upper.hole_m * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
     layers.append(Layer([screw + np.asarray(pivot_m)], pose, _SCREW))
     return layers
 
 
-def on_sheet(points: ArrayLike, pivot_m: tuple[float, float], turn: float) -> Array:
+def _on_sheet(points: ArrayLike, pivot_m: tuple[float, float], turn: float) -> Array:
     """Take points of a blade's frame, y upward, to the sheet's, whose y points down."""
     c, s = np.cos(turn), np.sin(turn)
     flipped = np.asarray(points, dtype=np.float64) * (1.0, -1.0)
     return np.asarray(flipped @ np.array([[c, s], [-s, c]]) + np.asarray(pivot_m))
-
-
-_RING = (-0.075, -0.022, 0.022, 0.015)
-"""Centre x, y and half axes of a handle's ring in the blade's frame."""
 
 
 def _handle(shape: BladeShape) -> Array:
