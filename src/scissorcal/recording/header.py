@@ -8,11 +8,7 @@ import struct
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
-
-from scissorcal.foreign import open_foreign
-from scissorcal.foreign.formats import RECORDING
 
 Kind = Literal["friction", "friction-advance", "cut", "render", "control", "track"]
 """What was recorded: empty motion of the blades, of the sledge, cuts and presses, a rendering, a
@@ -96,23 +92,3 @@ def checksum(entries: Mapping[str, str]) -> str:
     body = {key: value for key, value in entries.items() if key != "crc32"}
     text = json.dumps(body, sort_keys=True, ensure_ascii=False)
     return f"{zlib.crc32(text.encode()):08x}"
-
-
-def checksum(entries: Mapping[str, str]) -> str:
-    """Return the CRC-32, in hexadecimal, of all entries of the metadata but the checksum itself."""
-    body = {key: value for key, value in entries.items() if key != "crc32"}
-    text = json.dumps(body, sort_keys=True, ensure_ascii=False)
-    return f"{zlib.crc32(text.encode()):08x}"
-
-
-def read_header(path: str | Path) -> RecordingHeader:
-    """Read what a recording says about itself, without its samples.
-
-    A finished file has an index at its end, so that a few kilobytes are read (some milliseconds).
-    A file that was cut off or damaged is read whole, as `read_recording` does. Raises InputError
-    as that does.
-    """
-    path = Path(path)
-    with open_foreign(path, RECORDING) as stream:
-        header = _from_index(stream)
-    return header or _from_scan(path)

@@ -31,6 +31,19 @@ _STATISTICS = struct.Struct("<QHIIIIQQ")
 _METADATA_INDEX = struct.Struct("<QQ")
 
 
+def read_header(path: str | Path) -> RecordingHeader:
+    """Read what a recording says about itself, without its samples.
+
+    A finished file has an index at its end, so that a few kilobytes are read (some milliseconds).
+    A file that was cut off or damaged is read whole, as `read_recording` does. Raises InputError
+    as that does.
+    """
+    path = Path(path)
+    with open_foreign(path, RECORDING) as stream:
+        header = _from_index(stream)
+    return header or _from_scan(path)
+
+
 def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
     """Read by the index of a finished file; None where there is none or anything is odd."""
     end = stream.seek(0, 2) - len(MAGIC) - _FOOTER.size
