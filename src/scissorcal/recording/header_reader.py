@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import IO
 
-from scissorcal.foreign import reading
+from scissorcal.foreign import open_foreign, reading
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording.header import (
     FORMAT,
