@@ -7,8 +7,8 @@ other units only those count whose everyday values lie outside the everyday rang
 ever refused.
 
 The everyday range of each quantity stands here alone: what rigs, materials and hands of this kind
-usually have, in SI units and radians; a share is a number between 0 and 1. ``scissorcal bench
-extremes`` calls a state everyday by them.
+usually have, in SI units and radians; a share is a number between 0 and 1.
+``benchmarks/extremes`` calls a state everyday by them.
 """
 
 import difflib
