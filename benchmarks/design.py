@@ -55,6 +55,7 @@ from scissorcal.device import capture as rig_capture
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.probe import probe
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.device.sim.truth import varied
 from scissorcal.device.trajectory import friction_plan
@@ -98,7 +99,8 @@ class FirstRig:
         rng = np.random.default_rng(seed)
         specimen = varied(load_specimen(self.recipe.specimen or ""), rng)
         self._link = LockstepLink(specimen, rng.spawn(1)[0])
-        self._probe = probe(self._link, self.recipe)
+        self._session = RigSession(self._link, self.recipe)
+        self._session = replace(self._session, probe=probe(self._session))
         self.identity = self._link.identity
 
     def capture(self, kind: Kind, recipe: Recipe) -> Recording:
@@ -106,11 +108,9 @@ class FirstRig:
         text = recipe_path(self.name).read_text(encoding="utf-8")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"{kind}.mcap"
-            with rig_capture.open_writer(path, kind, self._link, recipe, text) as writer:
-                if kind == "friction":
-                    rig_capture.capture_friction(self._link, recipe, writer, probe=self._probe)
-                else:
-                    rig_capture.capture_cut(self._link, recipe, writer, probe=self._probe)
+            session = replace(self._session, recipe=recipe, recipe_toml=text)
+            with rig_capture.open_writer(session, kind, path) as writer:
+                rig_capture.capture(session, kind, writer)
             return read_recording(path)
 
 

@@ -173,25 +173,29 @@ def track() -> None:
 
 def render_on(link: Any, path: Path, seconds: float) -> Any:
     """Render the package for some seconds, strokes of the device's own hand."""
+    from scissorcal.device.session import RigSession
     from scissorcal.package import open_package
-    from scissorcal.render import VirtualStrokes, open_writer, render
+    from scissorcal.render import Rendering, VirtualStrokes, open_writer, render
 
     package = open_package(Path("package.zip"), warn=False)
-    strokes = VirtualStrokes(1000, 0.6)
-    with open_writer(path, link, package) as writer:
-        return render(link, package, seconds=seconds, strokes=strokes, writer=writer)
+    how = Rendering(seconds, VirtualStrokes(1000, 0.6))
+    session = RigSession(link, package.recipe)
+    with open_writer(session, package, path) as writer:
+        return render(session, package, how, writer=writer)
 
 
 def capture_on(link: Any, path: Path, seconds: float) -> Any:
     """Capture friction for about some seconds."""
     from tests.device.recipes import changed
 
-    from scissorcal.device.capture import capture_friction, open_writer
+    from scissorcal.device.capture import capture, open_writer
+    from scissorcal.device.session import RigSession
 
     friction = {"speeds_rad_per_s": (1.0,), "repeats": 1, "excitation_s": max(seconds - 5.0, 1.0)}
     recipe = changed("paper-80gsm", capture__friction=friction)
-    with open_writer(path, "friction", link, recipe, "") as writer:
-        return capture_friction(link, recipe, writer).motion
+    session = RigSession(link, recipe)
+    with open_writer(session, "friction", path) as writer:
+        return capture(session, "friction", writer).motion
 
 
 def print_ratios(found: list[dict[str, Any]], rate: int, load: str) -> None:

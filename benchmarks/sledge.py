@@ -18,8 +18,9 @@ import numpy as np
 
 from scissorcal.calibration.friction.advance import fit_friction_advance
 from scissorcal.calibration.result import FitResult
-from scissorcal.device.capture import capture_friction_advance, open_writer
+from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
@@ -96,8 +97,9 @@ def first_rig(seed: int) -> Run:
     recipe = builtin_recipe(RECIPE)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "friction-advance.mcap"
-        with open_writer(path, "friction-advance", link, recipe, "") as writer:
-            capture_friction_advance(link, recipe, writer)
+        session = RigSession(link, recipe)
+        with open_writer(session, "friction-advance", path) as writer:
+            capture(session, "friction-advance", writer)
         return Run(truth, read_recording(path), recipe)
 
 

@@ -19,6 +19,7 @@ from tests.workday.track_world import a_recipe, an_eye
 
 from scissorcal.aliases import Array
 from scissorcal.control.surface_path import map_contour
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import Specimen
 from scissorcal.kernel import ControlFlag
 from scissorcal.model.mechanism import AxisLaw
@@ -32,7 +33,7 @@ from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.inputs import REST_RATE_RAD_PER_S
 from scissorcal.workday.tracking.pictures import PlatePicture
 from scissorcal.workday.tracking.pose_source import TrackedPose
-from scissorcal.workday.tracking.session import RigDrive, TrackSession
+from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackAbout
 
@@ -88,7 +89,7 @@ def run(
         return (eye.picture(found) for found in eye.locate(world.frames(now_s)))
 
     source = TrackedPose(session, due)
-    with idle_rig(world.link, recipe) as motion:
+    with idle_rig(RigSession(world.link, recipe)) as motion:
         world.begin(motion, taps=False)
         world.keep_plate()
         begun = motion.now_s
@@ -109,9 +110,8 @@ def _session(recipe: Recipe, truth: Specimen) -> TrackSession:
     delay = recipe.plate.tracking.camera_delay_ms
     about = TrackAbout("sim", "rig", "a" * 16, SIM_LENS.width, SIM_LENS.height, delay)
     contacts = TipContacts(rig.tip, axis)
-    return TrackSession(
-        recipe, Plane(), about, drive=RigDrive(0.06), contacts=contacts, least_N=0.5 * FORCE_N
-    )
+    facts = TrackFacts(Plane(), about, RigDrive(0.06), contacts, least_N=0.5 * FORCE_N)
+    return TrackSession(recipe, facts)
 
 
 def path_error(job: Run, places: Array) -> Array:

@@ -20,7 +20,7 @@ import json
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ from scissorcal.device.capture_by_parts import capture_by_parts
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.probe import probe
-from scissorcal.device.probe.result import ProbeResult
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.device.sim.truth import average_torque, true_parameters, varied
 from scissorcal.device.trajectory import friction_plan
@@ -104,14 +104,15 @@ def captured(seed: int, effort: Effort) -> Day:
     rng = np.random.default_rng(seed)
     specimen = varied(load_specimen(recipe.specimen or ""), rng)
     link = LockstepLink(specimen, rng.spawn(1)[0])
-    found = probe(link, recipe)
+    session = RigSession(link, recipe)
+    session = replace(session, probe=probe(session))
     plans = friction_plan(recipe, link.identity), cut_plan(recipe, link.identity)
     listed = (seconds_at_rig(recipe, plans[0]) / 60.0, seconds_at_rig(recipe, plans[1]) / 60.0)
     spent: list[float] = []
-    swept, first = _capture(link, found, recipe, "friction", Earlier(), listed[0], spent)
+    swept, first = _capture(session, "friction", Earlier(), listed[0], spent)
     friction = fit_friction((swept,), recipe.fit.friction, effort=effort, rng=rng)
     earlier = Earlier(friction_recordings=(swept,), friction=friction)
-    strokes, second = _capture(link, found, recipe, "cut", earlier, listed[1], spent)
+    strokes, second = _capture(session, "cut", earlier, listed[1], spent)
     median_s = float(np.median(spent))
     return Day(seed, name, specimen, listed, swept, strokes, friction, (first, second), median_s)
 
@@ -147,19 +148,17 @@ def judged(day: Day, effort: Effort) -> Row:
 
 
 def _capture(
-    link: LockstepLink,
-    probed: ProbeResult,
-    recipe: Recipe,
+    session: RigSession,
     kind: CaptureKind,
     earlier: Earlier,
     minutes: float,
     spent: list[float],
 ) -> tuple[Recording, UntilMark]:
     """Capture until the tolerance; ``spent`` gets the processor seconds of each choice."""
-    slowest = sweep_bounds(recipe, link.identity, probed)[1] if kind == "friction" else 0.0
-    choice = UntilTolerance(
-        kind, recipe, link.identity, earlier, Limits(minutes), slowest_sweep=slowest
-    )
+    recipe, identity = session.recipe, session.identity
+    slowest = sweep_bounds(recipe, identity, session.probe)[1] if kind == "friction" else 0.0
+    limits = Limits(minutes, slowest_sweep=slowest)
+    choice = UntilTolerance(kind, recipe, identity, earlier, limits)
 
     def timed(recorded: Recording, advance: float) -> Any:
         began = time.process_time()
@@ -170,11 +169,10 @@ def _capture(
     text = recipe_path(recipe.name).read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{kind}.mcap"
-        with open_writer(path, kind, link, recipe, text, by_parts=True) as writer:
-            longest_s = 60.0 * minutes
-            capture_by_parts(
-                link, choice.recipe, kind, writer, timed, longest_s=longest_s, probe=probed
-            )
+        kept = replace(session, recipe_toml=text)
+        with open_writer(kept, kind, path, by_parts=True) as writer:
+            offered = replace(kept, recipe=choice.recipe)
+            capture_by_parts(offered, kind, writer, timed, longest_s=60.0 * minutes)
         return read_recording(path), choice.marks[-1]
 
 

@@ -1,15 +1,13 @@
 """Commands that probe a virtual rig first get what one probe of it found, made once in a run."""
 
 from hashlib import sha256
-from typing import Any
 
 import numpy as np
 import pytest
 
-from scissorcal.device.link import Link
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.result import ProbeResult
-from scissorcal.recipe.schema import Recipe
+from scissorcal.device.session import RigSession
 from scissorcal.workday.runs import probe
 from scissorcal.workday.workspace import Workspace
 from tests.made_once import made_once
@@ -26,16 +24,19 @@ def probed_once(
     """Probe each virtual rig once in a run; a test marked ``probes`` probes by itself."""
     real = probe.probe_into
 
-    def kept(workspace: Workspace, link: Link, recipe: Recipe, **how: Any) -> ProbeResult:
+    def kept(workspace: Workspace, session: RigSession, then: str = "") -> ProbeResult:
+        link, recipe = session.link, session.recipe
         if type(link) is not LockstepLink or recipe.specimen is None:
-            return real(workspace, link, recipe, **how)
+            return real(workspace, session, then)
         own = LockstepLink(recipe.specimen, np.random.default_rng(SEED))
         if own.identity != link.identity:
-            return real(workspace, link, recipe, **how)
+            return real(workspace, session, then)
         told = f"{recipe.specimen} {recipe.rig.model_dump_json()}"
         key = sha256(told.encode()).hexdigest()[:16]
         folder = made_once(
-            tmp_path_factory, f"probe {key}", lambda made: real(Workspace(made), own, recipe)
+            tmp_path_factory,
+            f"probe {key}",
+            lambda made: real(Workspace(made), RigSession(own, recipe)),
         )
         found = probe.last_probe(Workspace(folder))
         assert found is not None

@@ -9,7 +9,8 @@ from scissorcal.errors import DeviceError
 from scissorcal.recording import read_recording, read_telemetry
 from scissorcal.recording.plate_channels import FRAME, PICTURE, POSE
 from scissorcal.vision.live import Frame
-from scissorcal.workday.runs.capture import capture_advance_into, capture_into
+from scissorcal.workday.options import SIM_RIG, CaptureOptions, FitOptions
+from scissorcal.workday.runs.capture import capture_into
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.tracking.sim_world import SimWorld
 from scissorcal.workday.workspace import Workspace
@@ -160,9 +161,9 @@ def test_a_rendering_is_tracked_and_keeps_the_rows_of_a_track(
 @pytest.mark.slow
 def test_a_path_is_followed_on_a_tracked_plate(cli: Cli, calibrated: Path) -> None:
     workspace = Workspace(calibrated)
-    capture_into(workspace, "friction", "sim", designed=False)
-    capture_advance_into(workspace, "sim")
-    fit_workspace(workspace, ("friction", "friction-advance"), effort="draft")
+    capture_into(workspace, "friction", SIM_RIG, CaptureOptions(designed=False))
+    capture_into(workspace, "friction-advance", SIM_RIG)
+    fit_workspace(workspace, ("friction", "friction-advance"), FitOptions(effort="draft"))
     path = calibrated / "path.csv"
     path.write_text("x_mm\n10\n25\n")
     said = cli("control", *SIM, "--path", path, "--force", "2", "--json")

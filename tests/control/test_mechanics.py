@@ -69,9 +69,7 @@ def settings(limits: Limits = LIMITS, force: float = 2.0, stiffness: float = 1e4
     path = points(10.0, 40.0, force=force)
     contour = map_contour(path, Plane(), POSE, 0.3)
     timed = time_path(path, contour, 1e-3)
-    return control_settings(
-        rig, identity, limits, Material(stiffness, 0.2, 1.0), contour, timed, 400.0
-    )
+    return control_settings(rig, identity, limits, Material(stiffness, 0.2, 1.0), timed, 400.0)
 
 
 def test_limits_are_those_of_recipe_and_device() -> None:
@@ -105,7 +103,7 @@ def test_a_place_beyond_the_sledge_is_refused() -> None:
     contour = map_contour(path, Plane(), pose, 0.4)
     with pytest.raises(InputError, match=r"x = .* mm the sledge would stand at"):
         control_settings(
-            rig, identity, Limits(), Material(1e4, 0.2, 1.0), contour,
+            rig, identity, Limits(), Material(1e4, 0.2, 1.0),
             time_path(path, contour, 1e-3), 400.0,
         )  # fmt: skip
 
@@ -119,6 +117,6 @@ def test_a_steep_surface_leaves_the_force_no_lever() -> None:
     contour = map_contour(path, surface, pose, 0.3)
     with pytest.raises(InputError, match=r"so steep that a force on it turns the blades"):
         control_settings(
-            rig, identity, Limits(), Material(1e4, 0.2, 1.0), contour,
+            rig, identity, Limits(), Material(1e4, 0.2, 1.0),
             time_path(path, contour, 1e-3), 400.0,
         )  # fmt: skip

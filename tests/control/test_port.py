@@ -13,6 +13,7 @@ from scissorcal.control.follow import Job, control
 from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.settings import Material
 from scissorcal.device.link import open_link
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.errors import DeviceError
@@ -51,7 +52,7 @@ def test_a_path_is_followed_through_a_port() -> None:
     with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
         link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)  # a busy machine is not what is tested
         before_s = time.monotonic()
-        result = control(link, RECIPE, rig(), job, confirm=print)
+        result = control(RigSession(link, RECIPE, Operator(print)), rig(), job)
         link.configure(ConfigKey.STREAM, 1.0)
         assert link.state().flags & 1 == 0, "the motors stayed on"
     figures = result.figures
@@ -76,7 +77,7 @@ def test_a_supervisor_that_hangs_leaves_the_rig_without_torque() -> None:
     with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
         link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)
         with pytest.raises(DeviceError, match=r"supervisor|damping"):
-            control(link, RECIPE, rig(), job, confirm=print, progress=hang)
+            control(RigSession(link, RECIPE, Operator(print, progress=hang)), rig(), job)
         link.configure(ConfigKey.STREAM, 1.0)
         assert link.state().flags & 1 == 0, "the motors stayed on"
     assert slept

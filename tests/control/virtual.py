@@ -14,6 +14,7 @@ from scissorcal.control.path_file import SurfacePoints
 from scissorcal.control.result import ControlResult
 from scissorcal.control.settings import Material
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.rig import VirtualRig
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.device.sim.truth import true_parameters
@@ -203,5 +204,7 @@ def go(run: Run, monkeypatch: Any, **how: Any) -> Run:
     monkeypatch.setattr(follow, "control_figures", kept)
     recipe = builtin_recipe("paper-80gsm")
     probe = probed(run.link.rig.specimen)
-    run.result = control(run.link, recipe, run.rig, run.job, probe=probe, **how)
+    operator = Operator(confirm=how.pop("confirm", None))
+    session = RigSession(run.link, recipe, operator, probe)
+    run.result = control(session, run.rig, run.job, **how)
     return run

@@ -9,8 +9,7 @@ import pytest
 from scissorcal.device import hand
 from scissorcal.device.capture import (
     CaptureReport,
-    capture_cut,
-    capture_friction,
+    capture,
     open_writer,
     servo_config,
 )
@@ -20,6 +19,7 @@ from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
 from scissorcal.device.recorder import Recorder
 from scissorcal.device.rig_record import identity_facts
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.faults import Faults
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import DeviceError, InputError
@@ -54,13 +54,10 @@ def captured(
     **options: object,
 ) -> tuple[Recording, CaptureReport]:
     path = folder / "capture.mcap"
-    hand_moves = bool(options.get("hand", False))
-    if kind == "friction":
-        with open_writer(path, "friction", link, recipe, TOML) as writer:
-            report = capture_friction(link, recipe, writer, **options)  # type: ignore[arg-type]
-    else:
-        with open_writer(path, "cut", link, recipe, TOML, hand=hand_moves) as writer:
-            report = capture_cut(link, recipe, writer, **options)  # type: ignore[arg-type]
+    hand = bool(options.pop("hand", False))
+    session = RigSession(link, recipe, Operator(**options), recipe_toml=TOML)  # type: ignore[arg-type]
+    with open_writer(session, kind, path, hand=hand) as writer:  # type: ignore[arg-type]
+        report = capture(session, kind, writer, hand=hand)  # type: ignore[arg-type]
     return read_recording(path), report
 
 

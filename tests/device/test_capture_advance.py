@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from scissorcal.device.advance_trajectory import advance_plan
-from scissorcal.device.capture import CaptureReport, capture_friction_advance, open_writer
+from scissorcal.device.capture import CaptureReport, capture, open_writer
 from scissorcal.device.completeness import completeness
 from scissorcal.device.counting import count_recorded, count_used
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability
@@ -39,8 +40,8 @@ def link_of(rig: Specimen) -> LockstepLink:
 
 
 def captured(path: Path, link: LockstepLink, recipe: Recipe = RECIPE) -> CaptureReport:
-    with open_writer(path, "friction-advance", link, recipe, "") as writer:
-        return capture_friction_advance(link, recipe, writer)
+    with open_writer(RigSession(link, recipe), "friction-advance", path) as writer:
+        return capture(RigSession(link, recipe), "friction-advance", writer)
 
 
 @pytest.fixture(scope="module")

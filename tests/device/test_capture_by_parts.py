@@ -14,8 +14,9 @@ from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.drive import IDLE_S
 from scissorcal.device.link import open_link
 from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.parts import Part, stroke_part, sweep_part
+from scissorcal.device.parts import ChosenStroke, Part, stroke_part, sweep_part
 from scissorcal.device.recorder import Recorder
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import InputError
@@ -32,14 +33,7 @@ def strokes_of(*wanted: tuple[float, int, int]) -> list[Part]:
     """Parts for (speed, place, sheet), numbered one after the other."""
     return [
         stroke_part(
-            RECIPE,
-            IDENTITY,
-            speed,
-            place,
-            places=PLACES,
-            sheet=sheet,
-            first=2 * number,
-            fresh=place == 0,
+            RECIPE, IDENTITY, ChosenStroke(speed, place, sheet, 2 * number, place == 0), PLACES
         )
         for number, (speed, place, sheet) in enumerate(wanted)
     ]
@@ -127,16 +121,14 @@ def test_a_capture_goes_on_until_there_is_no_next_part(tmp_path: Path) -> None:
     def progress(share: float, sentence: str, recorder: Recorder) -> None:
         done.append(share)
 
-    with open_writer(path, "cut", link, RECIPE, "", by_parts=True) as writer:
+    with open_writer(RigSession(link, RECIPE), "cut", path, by_parts=True) as writer:
         report = capture_by_parts(
-            link,
-            RECIPE,
+            RigSession(link, RECIPE, Operator(progress=progress)),
             "cut",
             writer,
             choose,
             longest_s=60.0,
             chosen=choose.chosen,
-            progress=progress,
         )
     recording = read_recording(path)
     assert [strokes for _, strokes in choose.heard] == [0, 2, 4, 6]
@@ -169,9 +161,9 @@ def test_what_was_recorded_stays_where_a_choice_fails(tmp_path: Path) -> None:
     path = tmp_path / "cut.mcap"
     with (
         pytest.raises(InputError, match="cannot be fitted"),
-        open_writer(path, "cut", link, RECIPE, "", by_parts=True) as writer,
+        open_writer(RigSession(link, RECIPE), "cut", path, by_parts=True) as writer,
     ):
-        capture_by_parts(link, RECIPE, "cut", writer, choose, longest_s=60.0)
+        capture_by_parts(RigSession(link, RECIPE), "cut", writer, choose, longest_s=60.0)
     recording = read_recording(path)
     assert [stroke.kind for stroke in recording.strokes] == ["closing", "opening"]
     assert {0, 1} <= set(recording.samples["stroke"].tolist())
@@ -203,8 +195,14 @@ def test_samples_are_recorded_while_the_choice_goes_on_in_its_own_thread(
             idled.set()
 
     path = tmp_path / "cut.mcap"
-    with open_writer(path, "cut", link, RECIPE, "", by_parts=True) as writer:
-        capture_by_parts(link, RECIPE, "cut", writer, choose, longest_s=60.0, progress=progress)
+    with open_writer(RigSession(link, RECIPE), "cut", path, by_parts=True) as writer:
+        capture_by_parts(
+            RigSession(link, RECIPE, Operator(progress=progress)),
+            "cut",
+            writer,
+            choose,
+            longest_s=60.0,
+        )
     assert threads
     assert threading.main_thread() not in threads
     recording = read_recording(path)
@@ -230,9 +228,11 @@ def test_a_rig_in_real_time_idles_while_the_next_part_is_chosen(tmp_path: Path) 
     with (
         SimProcess("office-paper", 1) as sim,
         open_link(sim.port) as link,
-        open_writer(path, "friction", link, RECIPE, "", by_parts=True) as writer,
+        open_writer(RigSession(link, RECIPE), "friction", path, by_parts=True) as writer,
     ):
-        report = capture_by_parts(link, RECIPE, "friction", writer, choose, longest_s=60.0)
+        report = capture_by_parts(
+            RigSession(link, RECIPE), "friction", writer, choose, longest_s=60.0
+        )
     recording = read_recording(path)
     assert {0, 1} <= set(recording.samples["stroke"].tolist())
     assert recording.duration_s > 2 * (2.0 + IDLE_S)
@@ -245,9 +245,8 @@ def test_a_press_is_reached_with_the_blades_clear_of_the_material() -> None:
     whole = cut_plan(recipe, IDENTITY).segments[0].reference
     count = recipe.capture.cut.strokes_per_sheet
     for place in range(count):
-        part = stroke_part(
-            recipe, IDENTITY, 0.4, place, places=count, sheet=0, first=0, fresh=place == 0
-        )
+        stroke = ChosenStroke(0.4, place, 0, 0, place == 0)
+        part = stroke_part(recipe, IDENTITY, stroke, count)
         reference = part.segment.reference
         assert reference.opening[0] == pytest.approx(whole.opening.max(), abs=1e-9)
         assert np.ptp(reference.advance) == 0.0

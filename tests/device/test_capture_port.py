@@ -13,13 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.capture import capture_cut, capture_friction, open_writer, servo_config
-from scissorcal.device.coverage import friction_coverage
+from scissorcal.device.capture import capture, open_writer, servo_config
+from scissorcal.device.coverage import coverage_of
 from scissorcal.device.link import open_link
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
 from scissorcal.device.port_motion import PortMotion
 from scissorcal.device.recorder import Recorder
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import ConfigKey, Mode, StateFlag, StopReason
@@ -38,25 +39,24 @@ RECIPE = changed(
 CAPTURE_UNTIL_KILLED = """
 import sys
 from pathlib import Path
-from scissorcal.device.capture import capture_friction, open_writer
-from scissorcal.device.coverage import friction_coverage
+from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.link import open_link
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.recipe.library import builtin_recipe
 
 recipe = builtin_recipe("paper-80gsm")
 with open_link(sys.argv[1]) as link:
-    with open_writer(Path(sys.argv[2]), "friction", link, recipe, "") as writer:
-        capture_friction(
-            link, recipe, writer, lambda done, what, grid: print(writer.sample_count, flush=True)
-        )
+    with open_writer(RigSession(link, recipe), "friction", Path(sys.argv[2])) as writer:
+        operator = Operator(progress=lambda *_: print(writer.sample_count, flush=True))
+        capture(RigSession(link, recipe, operator), "friction", writer)
 """
 
 
 def test_a_capture_through_a_port_has_everything(tmp_path: Path) -> None:
     path = tmp_path / "capture.mcap"
     with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
-        with open_writer(path, "friction", link, RECIPE, "") as writer:
-            report = capture_friction(link, RECIPE, writer)
+        with open_writer(RigSession(link, RECIPE), "friction", path) as writer:
+            report = capture(RigSession(link, RECIPE), "friction", writer)
         assert link.configure(ConfigKey.STREAM, 0.0) == 0.0, "the port is free again"
     recording = read_recording(path)
     samples = recording.samples
@@ -82,9 +82,9 @@ def test_a_sheet_is_loaded_while_the_loop_runs(tmp_path: Path) -> None:
     with (
         SimProcess("office-paper", seed=2) as sim,
         open_link(sim.port) as link,
-        open_writer(path, "cut", link, RECIPE, "") as writer,
+        open_writer(RigSession(link, RECIPE), "cut", path) as writer,
     ):
-        capture_cut(link, RECIPE, writer)
+        capture(RigSession(link, RECIPE), "cut", writer)
     recording = read_recording(path)
     assert [(s.kind, s.sheet) for s in recording.strokes] == [("closing", 0), ("opening", 0)]
     closing = recording.samples[recording.samples["stroke"] == 0]
@@ -97,9 +97,9 @@ def test_an_unplugged_rig_is_a_device_error_and_its_samples_are_kept(tmp_path: P
         SimProcess("office-paper", seed=1, faults=("unplug=1.5",)) as sim,
         open_link(sim.port) as link,
         pytest.raises(DeviceError, match="unplugged"),
-        open_writer(path, "friction", link, RECIPE, "") as writer,
+        open_writer(RigSession(link, RECIPE), "friction", path) as writer,
     ):
-        capture_friction(link, RECIPE, writer)
+        capture(RigSession(link, RECIPE), "friction", writer)
     recording = read_recording(path)
     assert len(recording.samples) > 500
     assert "ended early" in recording.notes[-1]
@@ -130,11 +130,11 @@ def test_a_capture_survives_a_stalled_computer(tmp_path: Path) -> None:
     with (
         SimProcess("office-paper", seed=1) as sim,
         open_link(sim.port) as link,
-        open_writer(path, "friction", link, RECIPE, "") as writer,
+        open_writer(RigSession(link, RECIPE), "friction", path) as writer,
         open_motion(link, servo_config(RECIPE, link.identity)) as motion,
     ):
         assert isinstance(motion, PortMotion)
-        recorder = Recorder(writer, friction_coverage(RECIPE, link.identity))
+        recorder = Recorder(writer, coverage_of(RECIPE, link.identity, "friction"))
         way = PathBuilder(*motion.position, motion.tick_s)
         way.open_to(0.8, 1.0, 20.0)
         way.open_to(0.3, 1.0, 20.0)

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.completeness import completeness
 from scissorcal.device.counting import count_recorded, count_used
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording
 from scissorcal.recording.recording import Recording
@@ -25,8 +26,8 @@ RECIPE = short("paper-80gsm")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     path = tmp_path_factory.mktemp("completeness") / "capture.mcap"
     link = LockstepLink("office-paper", np.random.default_rng(1))
-    with open_writer(path, "friction", link, RECIPE, "") as writer:
-        capture_friction(link, RECIPE, writer)
+    with open_writer(RigSession(link, RECIPE), "friction", path) as writer:
+        capture(RigSession(link, RECIPE), "friction", writer)
     return read_recording(path)
 
 
@@ -134,8 +135,8 @@ def changed_cut(recipe: Recipe, **keys: object) -> Recipe:
 def cut_of(folder: Path, recipe: Recipe, specimen: str, *, hand: bool = False) -> Recording:
     link = LockstepLink(specimen, np.random.default_rng(1))
     path = folder / "cut.mcap"
-    with open_writer(path, "cut", link, recipe, "", hand=hand) as writer:
-        capture_cut(link, recipe, writer, hand=hand)
+    with open_writer(RigSession(link, recipe), "cut", path, hand=hand) as writer:
+        capture(RigSession(link, recipe), "cut", writer, hand=hand)
     return read_recording(path)
 
 

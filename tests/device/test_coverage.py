@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scissorcal.device.coverage import CoverageGrid, cut_coverage, even_cells, friction_coverage
+from scissorcal.device.coverage import CoverageGrid, coverage_of, even_cells
 from scissorcal.device.cut_trajectory import cut_openings, cut_plan
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.recipe.library import builtin_recipe
@@ -58,7 +58,7 @@ def test_a_gap_is_not_counted_as_motion() -> None:
 def test_a_friction_plan_fills_every_cell() -> None:
     recipe = builtin_recipe("paper-80gsm")
     reference = friction_plan(recipe, IDENTITY).segments[0].reference
-    grid = friction_coverage(recipe, IDENTITY)
+    grid = coverage_of(recipe, IDENTITY, "friction")
     grid.add(samples_of(reference.opening))
     assert grid.share == 1.0, grid.sentence()
     assert grid.sentence() == "80 of 80 cells filled"
@@ -67,7 +67,7 @@ def test_a_friction_plan_fills_every_cell() -> None:
 @pytest.mark.parametrize("name", ["paper-80gsm", "cotton-cloth", "press-only"])
 def test_a_cut_plan_fills_every_cell(name: str) -> None:
     recipe = builtin_recipe(name)
-    grid = cut_coverage(recipe, IDENTITY)
+    grid = coverage_of(recipe, IDENTITY, "cut")
     for number, segment in enumerate(cut_plan(recipe, IDENTITY).segments):
         grid.add(samples_of(segment.reference.opening, start_us=number * 10**9))
     assert grid.share == 1.0, grid.sentence()
@@ -80,7 +80,7 @@ def test_a_cut_plan_fills_every_cell_of_blades_that_cross_the_sheet_in_part_of_t
     )
     recipe = recipe.model_copy(update={"rig": recipe.rig.model_copy(update={"edge": edge})})
     assert cut_openings(recipe, IDENTITY)[1] < recipe.scene.opening_rad[1] - 0.05
-    grid = cut_coverage(recipe, IDENTITY)
+    grid = coverage_of(recipe, IDENTITY, "cut")
     for number, segment in enumerate(cut_plan(recipe, IDENTITY).segments):
         grid.add(samples_of(segment.reference.opening, start_us=number * 10**9))
     assert grid.share == 1.0, grid.sentence()

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from scissorcal.device.probe.probe import probe
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import StopReason
 from scissorcal.package import ModelPackage
@@ -175,7 +176,7 @@ def test_the_probe_s_zero_of_the_force_sensor_is_taken_off_in_a_rendering(
     """A hand that rests on blades that rest, at a sensor that shows 3 N without it."""
     faults, hand = Faults(force_zero_N=3.0), Hand(strokes=0)
     device = StrangeDevice(faults)
-    found = probe(VirtualPort(device), short_recipe(), confirm=Person(device))
+    found = probe(RigSession(VirtualPort(device), short_recipe(), Operator(Person(device))))
     assert found.rest.handle_zero_N == pytest.approx(3.0, abs=0.05)
     rig = with_probe(rig_facts(paper), found)
     said = render_trial("none", paper, tmp_path, faults, hand=hand, rig=rig)
@@ -198,7 +199,7 @@ def test_an_encoder_that_sticks_in_a_rendering_stops_it(
     """Told from what the probe measured; without the fault nothing stops."""
     sound, hand = Faults(encoder_noise_rad=noise_rad), Hand(period_s=period_s, strokes=20)
     device = StrangeDevice(sound)
-    found = probe(VirtualPort(device), short_recipe(), confirm=Person(device))
+    found = probe(RigSession(VirtualPort(device), short_recipe(), Operator(Person(device))))
     assert found.rest.jitters == (noise_rad > 0.0)
     rig = with_probe(rig_facts(paper), found)
     stuck = replace(sound, encoder_stuck_at_s=2.0)

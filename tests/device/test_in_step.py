@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.capture import capture_cut, capture_friction, open_writer, servo_config
+from scissorcal.device.capture import capture, open_writer, servo_config
 from scissorcal.device.link import open_link
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
 from scissorcal.device.port_motion import PortMotion
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.faults import Faults
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import ConfigKey, Mode, StateFlag, StopReason
@@ -38,8 +39,8 @@ def patience(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_capture_through_a_port_has_every_sample(tmp_path: Path) -> None:
     path = tmp_path / "capture.mcap"
     with in_step() as rig, open_link(rig.port) as link:
-        with open_writer(path, "friction", link, RECIPE, "") as writer:
-            report = capture_friction(link, RECIPE, writer)
+        with open_writer(RigSession(link, RECIPE), "friction", path) as writer:
+            report = capture(RigSession(link, RECIPE), "friction", writer)
         assert link.configure(ConfigKey.STREAM, 0.0) == 0.0, "the port is free again"
     recording = read_recording(path)
     samples = recording.samples
@@ -62,9 +63,9 @@ def test_a_sheet_is_loaded_while_the_loop_runs(tmp_path: Path) -> None:
     with (
         in_step(seed=2) as rig,
         open_link(rig.port) as link,
-        open_writer(path, "cut", link, RECIPE, "") as writer,
+        open_writer(RigSession(link, RECIPE), "cut", path) as writer,
     ):
-        capture_cut(link, RECIPE, writer)
+        capture(RigSession(link, RECIPE), "cut", writer)
     recording = read_recording(path)
     assert [(s.kind, s.sheet) for s in recording.strokes] == [("closing", 0), ("opening", 0)]
     closing = recording.samples[recording.samples["stroke"] == 0]
@@ -77,9 +78,9 @@ def test_an_unplugged_rig_is_a_device_error_and_its_samples_are_kept(tmp_path: P
         in_step(faults=Faults(unplug_s=1.0)) as rig,
         open_link(rig.port) as link,
         pytest.raises(DeviceError, match="unplugged"),
-        open_writer(path, "friction", link, RECIPE, "") as writer,
+        open_writer(RigSession(link, RECIPE), "friction", path) as writer,
     ):
-        capture_friction(link, RECIPE, writer)
+        capture(RigSession(link, RECIPE), "friction", writer)
     recording = read_recording(path)
     sequence = recording.samples["sequence"].astype(np.int64)
     assert np.all(np.diff(sequence) == 1)

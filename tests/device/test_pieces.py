@@ -8,7 +8,7 @@ import pytest
 
 from scissorcal.device.link import open_link
 from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.motion import Motion, Samples
+from scissorcal.device.motion import LoopTask, Motion, Samples
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.port_motion import PortMotion
 from scissorcal.device.sim.process import SimProcess
@@ -56,7 +56,7 @@ def test_a_plate_with_a_hole_on_the_virtual_rig(kappa: float) -> None:
     """The commands are those of the pieces along the recorded way; the hole is felt as none."""
     tables = make_tables(kappa=kappa, moving_blades=2)
     link = LockstepLink("office-paper", np.random.default_rng(1))
-    with open_motion(link, CONFIG, tables, pieces=PLATE) as motion:
+    with open_motion(link, CONFIG, LoopTask(tables, PLATE)) as motion:
         samples = strokes(motion, 12.0, 3)
         report = motion.report()
     steps, model = replayed(tables, samples)
@@ -89,7 +89,7 @@ def test_a_hand_feels_pieces_over_a_port_as_in_lockstep() -> None:
     patient = replace(CONFIG, supervisor_ms=5000, fault_clearings=100)
     with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
         link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)  # a busy machine is not what is tested
-        with open_motion(link, patient, tables, pieces=PLATE) as motion:
+        with open_motion(link, patient, LoopTask(tables, PLATE)) as motion:
             assert isinstance(motion, PortMotion)
             samples = strokes(motion, 5.0, 1)
             ledger = motion.report().ledger
@@ -112,5 +112,5 @@ def test_pieces_and_a_tracked_plate_are_refused_before_anything_moves() -> None:
         passivity=PassivityConfig(),
     )
     with pytest.raises(ValueError, match="estimated pose"):
-        open_motion(link, config, make_tables(), pieces=PLATE)
+        open_motion(link, config, LoopTask(make_tables(), PLATE))
     assert link.virtual_time == 0.0

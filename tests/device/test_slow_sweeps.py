@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.signals.steadiness import steadiness
-from scissorcal.device.capture import capture_friction, open_writer
+from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.capture_gains import Probed, capture_gains
 from scissorcal.device.control import Axis, Gains, greatest_fall
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.probe import probe
+from scissorcal.device.session import RigSession
 from scissorcal.device.slow_sliding import StribeckFall
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
@@ -51,7 +52,7 @@ def spread_of_rate(recording: Recording, window_s: float = 0.02) -> float:
 def swept(folder: Path, recipe: Recipe, gains_of: str) -> Recording:
     """The recipe's sweeps on the virtual rig by a probe's gains, as the command captures them."""
     assert recipe.specimen is not None
-    found = probe(LockstepLink(recipe.specimen, np.random.default_rng(3)), recipe)
+    found = probe(RigSession(LockstepLink(recipe.specimen, np.random.default_rng(3)), recipe))
     link = LockstepLink(recipe.specimen, np.random.default_rng(4))
     if gains_of == AS_STROKES:
         gains = capture_gains(recipe, link.identity, "cut", Probed.of(found)).opening
@@ -63,8 +64,10 @@ def swept(folder: Path, recipe: Recipe, gains_of: str) -> Recording:
         recipe = changed("paper-80gsm", capture__friction=SHORT, rig__control=control)
     else:
         recipe, _ = with_usable_sweeps(recipe, link.identity, found)
-    with open_writer(folder / f"{gains_of}.mcap", "friction", link, recipe, TOML) as writer:
-        capture_friction(link, recipe, writer, probe=found)
+    with open_writer(
+        RigSession(link, recipe, recipe_toml=TOML), "friction", folder / f"{gains_of}.mcap"
+    ) as writer:
+        capture(RigSession(link, recipe, probe=found), "friction", writer)
     return read_recording(folder / f"{gains_of}.mcap")
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.probe.result import ProbeResult
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.recipe.library import builtin_recipe
 
@@ -47,7 +48,7 @@ def trial_of(
     try:
         link = RigLink(rig)
         person = Person(link, follows=follows, swaps=swaps, clings=clings)
-        result = probe(link, builtin_recipe("paper-80gsm"), confirm=person)
+        result = probe(RigSession(link, builtin_recipe("paper-80gsm"), Operator(person)))
     except ProbeRefusedError as refused:
         said = str(refused)
     except DeviceError as refused:

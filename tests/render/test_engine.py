@@ -10,14 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.faults import Faults
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability, ConfigKey, Identity, StateFlag
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Recording, read_attachments, read_recording
-from scissorcal.render import RenderResult, VirtualStrokes, open_writer, render
-from scissorcal.render.rig_facts import rig_facts
+from scissorcal.render import Rendering, RenderResult, VirtualStrokes, open_writer, render
+from scissorcal.render.rig_facts import RigFacts, rig_facts
 from tests.strange_device import FAULTS, StrangeDevice, VirtualPort
 from tests.strange_device.mechanics import Hand
 
@@ -29,13 +30,19 @@ def rig(specimen: str = "office-paper", seed: int = 1, **faults: Any) -> Lockste
 
 
 def rendered(
-    package: ModelPackage, path: Path, link: LockstepLink | None = None, **options: Any
+    package: ModelPackage,
+    path: Path,
+    link: LockstepLink | None = None,
+    limits: Limits | None = None,
+    known: RigFacts | None = None,
+    **options: Any,
 ) -> tuple[RenderResult, Recording]:
-    link = link or rig()
-    with open_writer(path, link, package, "# a recipe") as writer:
-        result = render(
-            link, package, writer=writer, **({"strokes": TWO, "seconds": 20.0} | options)
-        )
+    recipe = package.recipe.model_copy(update=limits and {"limits": limits})
+    operator = Operator(progress=options.pop("progress", lambda *_: None))
+    session = RigSession(link or rig(), recipe, operator, recipe_toml="# a recipe")
+    with open_writer(session, package, path) as writer:
+        how = Rendering(**({"strokes": TWO, "seconds": 20.0} | options))
+        result = render(session, package, how, writer=writer, rig=known)
     return result, read_recording(path)
 
 
@@ -186,7 +193,7 @@ def test_a_soft_rendering_is_stated_and_the_cut_keeps_its_energy(
     slow, _ = rendered(paper, tmp_path / "a.mcap")
     known = rig_facts(paper)
     quick, _ = rendered(
-        paper, tmp_path / "b.mcap", rig=replace(known, late_s=1e-5, damping_Nm_s_per_rad=0.03)
+        paper, tmp_path / "b.mcap", known=replace(known, late_s=1e-5, damping_Nm_s_per_rad=0.03)
     )
     assert slow.admission.derated
     assert slow.admission.rendered <= slow.admission.allowed_in_hand < slow.admission.needed
@@ -203,7 +210,7 @@ def test_a_rig_that_cannot_render_a_package_is_refused_before_anything_moves(
     link = rig()
     late = replace(rig_facts(paper), late_s=0.05)
     with pytest.raises(InputError, match="What would cure it: A delay of"):
-        render(link, paper, strokes=TWO, rig=late)
+        render(RigSession(link, paper.recipe), paper, Rendering(strokes=TWO), rig=late)
     assert link.virtual_time < 0.1
 
 
@@ -211,13 +218,15 @@ def test_a_translation_force_needs_an_advance_motor(
     pushing_paper: ModelPackage,
 ) -> None:
     link = Disguised(capabilities=int(Capability.SIMULATOR), force_limit=0.0)
-    result = render(link, pushing_paper, strokes=TWO, seconds=0.5)
+    result = render(
+        RigSession(link, pushing_paper.recipe), pushing_paper, Rendering(0.5, strokes=TWO)
+    )
     assert any("no advance motor" in sentence for sentence in result.warnings)
     manifest = pushing_paper.manifest
     alone = manifest.mechanics.model_copy(update={"render": ("translation_force",)})
     only = replace(pushing_paper, manifest=manifest.model_copy(update={"mechanics": alone}))
     with pytest.raises(InputError, match="nothing would be felt"):
-        render(link, only, strokes=TWO, seconds=0.5)
+        render(RigSession(link, only.recipe), only, Rendering(0.5, strokes=TWO))
 
 
 @pytest.mark.parametrize("fault", ["none", "motor reversed"])
@@ -228,7 +237,9 @@ def test_a_reversed_motor_is_told_by_the_hands_work(paper: ModelPackage, fault: 
     def grasp(_: str) -> None:
         device.grasp(Hand(stiffness=8.0, damping=0.05, strokes=2))
 
-    result = render(VirtualPort(device), paper, seconds=6.0, confirm=grasp)
+    result = render(
+        RigSession(VirtualPort(device), paper.recipe, Operator(grasp)), paper, Rendering(6.0)
+    )
     sense = next(verdict for verdict in result.verdicts if verdict.check == "motor sense")
     assert sense.status == ("pass" if fault == "none" else "fail")
 
@@ -285,27 +296,27 @@ def test_an_unplugged_rig_leaves_what_was_recorded(paper: ModelPackage, tmp_path
     path = tmp_path / "r.mcap"
     with (
         pytest.raises(DeviceError, match="unplugged"),
-        open_writer(path, link, paper) as writer,
+        open_writer(RigSession(link, paper.recipe), paper, path) as writer,
     ):
-        render(link, paper, strokes=TWO, writer=writer)
+        render(RigSession(link, paper.recipe), paper, Rendering(strokes=TWO), writer=writer)
     assert read_recording(path).duration_s == pytest.approx(2.5, abs=0.3)
 
 
 def test_it_runs_without_a_recording(paper: ModelPackage) -> None:
-    assert render(rig(), paper, strokes=TWO, seconds=2.0).frames > 1900
+    assert render(RigSession(rig(), paper.recipe), paper, Rendering(2.0, strokes=TWO)).frames > 1900
 
 
 def test_a_missing_confirm_callback_is_refused_before_anything_moves(paper: ModelPackage) -> None:
     link = Disguised(capabilities=1)
     with pytest.raises(InputError, match="clear the blades"):
-        render(link, paper, seconds=1.0)
+        render(RigSession(link, paper.recipe), paper, Rendering(1.0))
     assert link.virtual_time < 0.1
 
 
 def test_confirmation_is_requested_before_any_force(paper: ModelPackage) -> None:
     link = Disguised(capabilities=1)
     asked: list[str] = []
-    result = render(link, paper, seconds=1.0, confirm=asked.append)
+    result = render(RigSession(link, paper.recipe, Operator(asked.append)), paper, Rendering(1.0))
     assert len(asked) == 1
     assert "push back" in asked[0]
     assert result.seconds == pytest.approx(1.0, abs=0.1)
@@ -315,30 +326,34 @@ def test_confirmation_is_requested_before_any_force(paper: ModelPackage) -> None
 
     link = Disguised(capabilities=1)
     with pytest.raises(KeyboardInterrupt):
-        render(link, paper, seconds=1.0, confirm=leave)
+        render(RigSession(link, paper.recipe, Operator(leave)), paper, Rendering(1.0))
     assert link.virtual_time < 0.5
 
 
 def test_a_device_that_cannot_reach_the_scene_is_refused(paper: ModelPackage) -> None:
     with pytest.raises(InputError, match="build a package for this rig"):
-        render(Disguised(opening_min=1.2, opening_max=1.5), paper)
+        render(RigSession(Disguised(opening_min=1.2, opening_max=1.5), paper.recipe), paper)
 
 
 def test_a_device_of_another_rate_or_handle_is_named(paper: ModelPackage) -> None:
     other_handle = Disguised(handle_radius=0.05)
     with pytest.raises(InputError, match=r"is of another rig.*handle radius of 50\.0 mm"):
-        render(other_handle, paper, strokes=TWO, seconds=0.5)
+        render(RigSession(other_handle, paper.recipe), paper, Rendering(0.5, strokes=TWO))
     assert other_handle.virtual_time < 0.1
-    result = render(other_handle, paper, strokes=TWO, seconds=0.5, allow_mismatch=True)
+    result = render(
+        RigSession(other_handle, paper.recipe),
+        paper,
+        Rendering(0.5, strokes=TWO, allow_mismatch=True),
+    )
     assert any("handle radius of 50.0 mm" in sentence for sentence in result.warnings)
     manifest = paper.manifest
     slow = manifest.mechanics.model_copy(update={"loop_rate_Hz": 500.0})
     other = replace(paper, manifest=manifest.model_copy(update={"mechanics": slow}))
-    result = render(rig(), other, strokes=TWO, seconds=0.5)
+    result = render(RigSession(rig(), other.recipe), other, Rendering(0.5, strokes=TWO))
     assert any("built for 500 Hz" in sentence for sentence in result.warnings)
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
 def test_impossible_times_are_refused(seconds: float, paper: ModelPackage) -> None:
     with pytest.raises(InputError, match="above 0"):
-        render(rig(), paper, seconds=seconds)
+        render(RigSession(rig(), paper.recipe), paper, Rendering(seconds))

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from scissorcal.device.link import open_link
+from scissorcal.device.session import RigSession
 from scissorcal.kernel import ConfigKey
 from scissorcal.package import ModelPackage
 from scissorcal.recording import read_recording
-from scissorcal.render import VirtualStrokes, latency_of, open_writer, render
+from scissorcal.render import Rendering, VirtualStrokes, latency_of, open_writer, render
 from tests.device.in_step import in_step, patient
 
 
@@ -19,8 +20,13 @@ def test_a_port_is_served_by_a_separate_process(
     patient(monkeypatch)
     path = tmp_path / "r.mcap"
     with in_step() as rig, open_link(rig.port) as link:
-        with open_writer(path, link, paper) as writer:
-            result = render(link, paper, seconds=2.0, strokes=VirtualStrokes(1, 0.6), writer=writer)
+        with open_writer(RigSession(link, paper.recipe), paper, path) as writer:
+            result = render(
+                RigSession(link, paper.recipe),
+                paper,
+                Rendering(2.0, strokes=VirtualStrokes(1, 0.6)),
+                writer=writer,
+            )
         link.configure(ConfigKey.STREAM, 1.0)
         rig.pass_ticks(1)
         assert link.state().flags & 1 == 0, "the motors stayed on"

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
 from scissorcal.errors import MissingError
 from scissorcal.kernel import SampleFlag
 from scissorcal.package import ModelPackage
 from scissorcal.recording import read_attachments, read_recording
-from scissorcal.render import RenderResult, VirtualStrokes, open_writer, render
+from scissorcal.render import Rendering, RenderResult, VirtualStrokes, open_writer, render
 from scissorcal.render.admission import rendered_tables
 from scissorcal.render.plate_pose import FALL_S, STALE_S
 from tests.render.plate_motion import Move, Tracker, true_torque
@@ -76,9 +77,11 @@ def run(package: ModelPackage, tracker: Tracker, folder: Path, **options: Any) -
     truth = options.pop("truth", tracker.move)
     path = folder / "r.mcap"
     link = LockstepLink("office-paper", np.random.default_rng(1))
-    given = {"seconds": 20.0, "strokes": STROKES, "plate": tracker} | options
-    with open_writer(path, link, package, "# a recipe") as writer:
-        result = render(link, package, writer=writer, **given)
+    seconds, plate = options.pop("seconds", 20.0), options.pop("plate", tracker)
+    session = RigSession(link, package.recipe, recipe_toml="# a recipe")
+    with open_writer(session, package, path) as writer:
+        how = Rendering(seconds, STROKES)
+        result = render(session, package, how, writer=writer, plate=plate, **options)
     samples = read_recording(path).samples
     true = true_torque(rendered_tables(package.tables, result.admission), truth, samples, 8)
     return Run(result, samples, true)
@@ -191,9 +194,13 @@ def test_a_pose_that_is_too_uncertain_is_not_rendered(
     tracker = Tracker(moved_plate(upper_paper), np.random.default_rng(3), claimed=8.0 * CLAIMED)
     path = tmp_path / "r.mcap"
     link = LockstepLink("office-paper", np.random.default_rng(1))
-    with open_writer(path, link, upper_paper) as writer:
+    with open_writer(RigSession(link, upper_paper.recipe), upper_paper, path) as writer:
         result = render(
-            link, upper_paper, seconds=3.0, strokes=STROKES, writer=writer, plate=tracker
+            RigSession(link, upper_paper.recipe),
+            upper_paper,
+            Rendering(3.0, strokes=STROKES),
+            writer=writer,
+            plate=tracker,
         )
     assert not read_recording(path).samples["torque_command"].any()
     assert result.plate is not None
@@ -218,7 +225,12 @@ def test_what_was_placed_is_in_the_recording(upper_paper: ModelPackage, tmp_path
 def test_a_known_plate_asks_no_tracker(silent_paper: ModelPackage) -> None:
     tracker = Tracker(Move((0.5, 0.5, 0.0)), np.random.default_rng(1))
     link = LockstepLink("office-paper", np.random.default_rng(1))
-    result = render(link, silent_paper, seconds=1.0, strokes=STROKES, plate=tracker)
+    result = render(
+        RigSession(link, silent_paper.recipe),
+        silent_paper,
+        Rendering(1.0, strokes=STROKES),
+        plate=tracker,
+    )
     assert tracker.asked == 0
     assert result.plate is None
 
@@ -226,5 +238,5 @@ def test_a_known_plate_asks_no_tracker(silent_paper: ModelPackage) -> None:
 def test_no_pose_at_all_is_refused_before_anything_moves(upper_paper: ModelPackage) -> None:
     link = LockstepLink("office-paper", np.random.default_rng(1))
     with pytest.raises(MissingError, match="or give the pose of a tracker"):
-        render(link, upper_paper, seconds=1.0)
+        render(RigSession(link, upper_paper.recipe), upper_paper, Rendering(1.0))
     assert link.virtual_time < 0.1

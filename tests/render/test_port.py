@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from scissorcal.device.link import open_link
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.kernel import ConfigKey
 from scissorcal.package import ModelPackage
 from scissorcal.recording import read_recording
-from scissorcal.render import VirtualStrokes, latency_of, open_writer, render
+from scissorcal.render import Rendering, VirtualStrokes, latency_of, open_writer, render
 from tests.render.plate_motion import Move, Tracker
 
 pytestmark = pytest.mark.realtime
@@ -24,8 +25,13 @@ def test_a_port_is_served_by_a_separate_process(paper: ModelPackage, tmp_path: P
     path = tmp_path / "r.mcap"
     with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
         link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)  # a busy machine is not what is tested
-        with open_writer(path, link, paper) as writer:
-            result = render(link, paper, seconds=3.0, strokes=VirtualStrokes(1, 0.6), writer=writer)
+        with open_writer(RigSession(link, paper.recipe), paper, path) as writer:
+            result = render(
+                RigSession(link, paper.recipe),
+                paper,
+                Rendering(3.0, strokes=VirtualStrokes(1, 0.6)),
+                writer=writer,
+            )
         link.configure(ConfigKey.STREAM, 1.0)
         assert link.state().flags & 1 == 0, "the motors stayed on"
     recording = read_recording(path)
@@ -52,7 +58,11 @@ def test_a_supervisor_that_is_slow_for_a_moment_changes_nothing(paper: ModelPack
     with SimProcess("office-paper", seed=1) as sim, open_link(sim.port) as link:
         link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)
         strokes = VirtualStrokes(1, 0.6)
-        result = render(link, paper, seconds=2.0, strokes=strokes, progress=slow_once)
+        result = render(
+            RigSession(link, paper.recipe, Operator(progress=slow_once)),
+            paper,
+            Rendering(2.0, strokes=strokes),
+        )
     assert slept
     assert result.fallback_frames == 0
     assert result.overrun == 0
@@ -66,7 +76,12 @@ def test_an_estimated_plate_is_followed_through_a_port(upper_paper: ModelPackage
         link.configure(ConfigKey.BRAKE_AFTER_MS, 500.0)
         before_s = time.monotonic()
         strokes = VirtualStrokes(1, 0.6)
-        result = render(link, upper_paper, seconds=3.0, strokes=strokes, plate=tracker)
+        result = render(
+            RigSession(link, upper_paper.recipe),
+            upper_paper,
+            Rendering(3.0, strokes=strokes),
+            plate=tracker,
+        )
     assert before_s < tracker.asked_s < time.monotonic()
     assert result.plate is not None
     assert result.plate.estimates > 100

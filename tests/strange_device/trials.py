@@ -7,16 +7,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.probe.probe import probe
 from scissorcal.device.recorder import unloaded_sentence
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError, ScissorcalError
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
+from scissorcal.render import Rendering, render
 from scissorcal.render import open_writer as open_render_writer
-from scissorcal.render import render
 from scissorcal.render.rig_facts import RigFacts
 from scissorcal.verdicts import failed
 
@@ -66,7 +67,9 @@ def probe_trial(name: str) -> Outcome:
     device = StrangeDevice(FAULTS[name], seed=SEED)
 
     def run() -> str:
-        found = probe(VirtualPort(device), builtin_recipe("paper-80gsm"), confirm=Person(device))
+        found = probe(
+            RigSession(VirtualPort(device), builtin_recipe("paper-80gsm"), Operator(Person(device)))
+        )
         warned = [v.why for v in found.verdicts if v.status != "pass" and v.check not in STATED]
         return "; ".join(["done", *warned])
 
@@ -87,11 +90,13 @@ def capture_trial(name: str, kind: str, folder: Path, faults: Faults | None = No
 
     def run() -> str:
         link = VirtualPort(device)
-        with open_writer(path, "cut" if kind == "cut" else "friction", link, recipe, "") as writer:
+        with open_writer(
+            RigSession(link, recipe), "cut" if kind == "cut" else "friction", path
+        ) as writer:
             if kind == "cut":
-                report = capture_cut(link, recipe, writer, confirm=confirm)
+                report = capture(RigSession(link, recipe, Operator(confirm)), "cut", writer)
             else:
-                report = capture_friction(link, recipe, writer, confirm=confirm)
+                report = capture(RigSession(link, recipe, Operator(confirm)), "friction", writer)
         tally = report.tally
         found = [f"{tally.lost} frames lost"] if tally.lost else []
         found += [f"{tally.faults} faults"] if tally.faults else []
@@ -118,13 +123,14 @@ def render_trial(
 
     def run() -> str:
         link = VirtualPort(device)
-        with open_render_writer(path, link, package) as writer:
+        with open_render_writer(RigSession(link, package.recipe), package, path) as writer:
             result = render(
-                link,
+                RigSession(
+                    link, package.recipe, Operator(lambda request: device.grasp(hand or Hand()))
+                ),
                 package,
-                seconds=RENDER_S,
+                Rendering(RENDER_S),
                 writer=writer,
-                confirm=lambda request: device.grasp(hand or Hand()),
                 rig=rig,
             )
         wrong = failed(result.verdicts)

@@ -9,6 +9,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.device.motion import Samples
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.kernel import ConfigKey, SampleFlag
 from scissorcal.model.mechanism import AxisLaw
@@ -17,7 +18,14 @@ from scissorcal.package import ModelPackage
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording
-from scissorcal.render import PlatePose, RenderResult, VirtualStrokes, open_writer, render
+from scissorcal.render import (
+    PlatePose,
+    Rendering,
+    RenderResult,
+    VirtualStrokes,
+    open_writer,
+    render,
+)
 from scissorcal.render.admission import rendered_tables
 from scissorcal.tracking.consistency import pose_error
 from scissorcal.tracking.contacts import TipContacts
@@ -29,7 +37,7 @@ from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.inputs import REST_RATE_RAD_PER_S
 from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
 from scissorcal.workday.tracking.pose_source import Due, TrackedPose
-from scissorcal.workday.tracking.session import RigDrive, TrackSession
+from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import CAMERA_DRIFT, CAMERA_OFFSET_S, SimCamera, SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackAbout
 from tests.control.virtual import mechanics
@@ -245,7 +253,7 @@ def run(case: Case, seed: int, package: ModelPackage, folder: Path) -> Run:
         _located(world, eye) if case.rendered else StatedPictures(world, eye, seed, case.noise)
     )
     source = Watched(TrackedPose(session, pictures, steady=case.steady), world)
-    with idle_rig(world.link, recipe) as motion:
+    with idle_rig(RigSession(world.link, recipe)) as motion:
         world.begin(motion)
         motion.configure(ConfigKey.HAND_SPEED_rad_per_s, TAPS_RAD_PER_S)
         if not case.taps:
@@ -260,9 +268,15 @@ def run(case: Case, seed: int, package: ModelPackage, folder: Path) -> Run:
     session.follower.touching = False  # nothing real is between the blades
     world.plate.moves_at_s = world.link.virtual_time + BEGINS_S
     path = folder / f"{seed}.mcap"
-    with open_writer(path, world.link, package, "# a recipe") as writer:
+    with open_writer(
+        RigSession(world.link, package.recipe, recipe_toml="# a recipe"), package, path
+    ) as writer:
         result = render(
-            world.link, package, seconds=SECONDS, strokes=STROKES, writer=writer, plate=source
+            RigSession(world.link, package.recipe),
+            package,
+            Rendering(SECONDS, strokes=STROKES),
+            writer=writer,
+            plate=source,
         )
     samples = read_recording(path).samples
     tables = rendered_tables(package.tables, result.admission)
@@ -278,7 +292,7 @@ def _session(case: Case, recipe: Recipe, world: CarriedWorld) -> TrackSession:
     delay = recipe.plate.tracking.camera_delay_ms
     about = TrackAbout("sim", "rig", "a" * 16, SIM_LENS.width, SIM_LENS.height, delay)
     contacts = TipContacts(rig.tip, axis)
-    return TrackSession(recipe, Plane(), about, drive=RigDrive(0.06), contacts=contacts)
+    return TrackSession(recipe, TrackFacts(Plane(), about, RigDrive(0.06), contacts))
 
 
 def _located(world: CarriedWorld, eye: PlateEye) -> Due:

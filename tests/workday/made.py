@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from scissorcal.recording import write_recording
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import Workspace
 from tests.calibration.truth import Stroke, Truth, make_recording, sweep
@@ -71,7 +72,7 @@ def fitted_workspace(folder: Path, *kinds: Kind, **how: Any) -> Workspace:
     workspace = quick_workspace(folder)
     for kind in kinds:
         RECORD[kind](workspace)
-    fit_workspace(workspace, kinds, **how)
+    fit_workspace(workspace, kinds, FitOptions(**how))
     return workspace
 
 

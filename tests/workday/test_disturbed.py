@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+from scissorcal.device import capture as rig_capture
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.faults import Faults
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import StopReason
@@ -42,8 +43,10 @@ def capture(workspace: Workspace, faults: Faults | None = None) -> Path:
     recipe = workspace.recipe()
     link = LockstepLink("office-paper", np.random.default_rng(1), faults)
     path = workspace.new_recording("friction")
-    with open_writer(path, "friction", link, recipe, workspace.recipe_path.read_text()) as writer:
-        capture_friction(link, recipe, writer)
+    with rig_capture.open_writer(
+        RigSession(link, recipe, recipe_toml=workspace.recipe_path.read_text()), "friction", path
+    ) as writer:
+        rig_capture.capture(RigSession(link, recipe), "friction", writer)
     return path
 
 
@@ -80,8 +83,12 @@ def test_strokes_that_cut_nothing_do_not_count(tmp_path: Path) -> None:
     path = workspace.new_recording("cut")
     link = VirtualPort(StrangeDevice(FAULTS["no sheet"], seed=1))
     asked: list[str] = []
-    with open_writer(path, "cut", link, recipe, workspace.recipe_path.read_text()) as writer:
-        report = capture_cut(link, recipe, writer, confirm=asked.append)
+    with rig_capture.open_writer(
+        RigSession(link, recipe, recipe_toml=workspace.recipe_path.read_text()), "cut", path
+    ) as writer:
+        report = rig_capture.capture(
+            RigSession(link, recipe, Operator(asked.append)), "cut", writer
+        )
     closing = [stroke for stroke in read_recording(path).strokes if stroke.kind == "closing"]
     assert set(report.empty) == set(closing)
     found = Engine.of(workspace).state("capture cut")

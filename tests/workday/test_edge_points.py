@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from scissorcal.aliases import Array
-from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+from scissorcal.device import capture as rig_capture
 from scissorcal.device.crossing import Blade
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.blade import blade_on
 from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.material import Sheet
@@ -29,6 +30,7 @@ from scissorcal.package.build import build_package
 from scissorcal.recipe.edge import edge_sentence, stated_curve
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.runs.fit import fit_workspace, load_result
 from scissorcal.workday.runs.package import build_workspace_package
@@ -90,11 +92,11 @@ def truth() -> Specimen:
 def capture(workspace: Workspace, rig: Specimen, seed: int) -> None:
     recipe, text = workspace.recipe(), workspace.recipe_path.read_text("utf-8")
     link = LockstepLink(rig, np.random.default_rng(seed))
-    probe = ensure_probed(workspace, link, recipe)
-    for kind, take in (("friction", capture_friction), ("cut", capture_cut)):
+    session = ensure_probed(workspace, RigSession(link, recipe, recipe_toml=text))
+    for kind in ("friction", "cut"):
         path = workspace.new_recording(kind)
-        with open_writer(path, kind, link, recipe, text, probe=probe) as writer:
-            take(link, recipe, writer, probe=probe)
+        with rig_capture.open_writer(session, kind, path) as writer:
+            rig_capture.capture(session, kind, writer)
     link.close()
 
 
@@ -109,7 +111,7 @@ def made(root: Path, text: str) -> Workspace:
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     workspace = made(tmp_path_factory.mktemp("edge") / "points", recipe_of_points())
     capture(workspace, truth(), SEED)
-    fit_workspace(workspace, ("friction", "cut"), seed=SEED)
+    fit_workspace(workspace, ("friction", "cut"), FitOptions(seed=SEED))
     return workspace
 
 
@@ -171,7 +173,7 @@ def test_torque_and_force_are_the_rigs(package: ModelPackage) -> None:
 def test_a_line_in_its_place_is_far_off(workspace: Workspace, package: ModelPackage) -> None:
     line = made(workspace.root.parent / "line", recipe_of_line())
     shutil.copytree(workspace.root / "captures", line.root / "captures")
-    fit_workspace(line, ("friction", "cut"), seed=SEED)
+    fit_workspace(line, ("friction", "cut"), FitOptions(seed=SEED))
     straight, curved = errors(built_package(line)), errors(package)
     assert straight[0] > 0.1
     assert straight[0] > 4.0 * curved[0]

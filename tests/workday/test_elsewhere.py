@@ -13,6 +13,7 @@ from scissorcal.errors import InputError
 from scissorcal.workday.elsewhere import put_in_place, refuse_unwritable
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import restore, versions
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.runs.fit import fit_step, fit_workspace
 from scissorcal.workday.steps import BY_NAME
 from scissorcal.workday.workspace import Workspace
@@ -43,7 +44,7 @@ def refused(workspace: Workspace, folder: Path | None, patch: pytest.MonkeyPatch
     patch.setattr(store, "save", full)
     step = BY_NAME["fit friction"]
     with pytest.raises(InputError) as found:
-        fit_step(Engine.of(workspace), step, seed=5, force=True, save_to=folder)
+        fit_step(Engine.of(workspace), step, FitOptions(seed=5, force=True, save_to=folder))
     patch.undo()
     return found.value
 
@@ -107,7 +108,7 @@ def test_folders_of_other_programs_beside_a_fit_are_left_out(workspace: Workspac
     pictures = workspace.fit_path("friction").with_suffix("")
     (pictures / "@eaDir").mkdir(parents=True)
     (pictures / "own.png").write_bytes(b"picture")
-    fit_workspace(workspace, ("friction",), seed=3, force=True)
+    fit_workspace(workspace, ("friction",), FitOptions(seed=3, force=True))
     (earlier,) = [one for one in versions(Engine.of(workspace), "friction") if not one.current]
     kept = earlier.path.with_suffix("")
     assert [path.name for path in kept.iterdir()] == ["own.png"]
@@ -123,7 +124,7 @@ def test_a_workspace_that_may_only_be_read_is_refused_before_the_fit(
 
 
 def test_a_restore_that_was_killed_half_way_can_be_done_again(workspace: Workspace) -> None:
-    fit_workspace(workspace, ("friction",), seed=9, force=True)
+    fit_workspace(workspace, ("friction",), FitOptions(seed=9, force=True))
     engine = Engine.of(workspace)
     (earlier,) = [one for one in versions(engine, "friction") if not one.current]
     shutil.copytree(earlier.path.parent, workspace.root / "aside")

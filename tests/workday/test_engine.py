@@ -12,14 +12,16 @@ import pytest
 
 from scissorcal.calibration.store import load_fit, save
 from scissorcal.calibration.verify.result import VerifyResult
-from scissorcal.device.capture import capture_friction, open_writer
+from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recording import read_recording, write_recording
 from scissorcal.verdicts import Status, Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import restore, versions
 from scissorcal.workday.index import FileIndex
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.recordings import exclude_recording, include_recording, used_recordings
 from scissorcal.workday.runs.fit import fit_workspace
@@ -93,25 +95,25 @@ def test_another_prior_is_another_identity_of_its_own_fit_only(
 
 def test_another_seed_of_friction_makes_the_cut_stale(copied: Workspace) -> None:
     assert state(copied, "fit cut") == "unverified"
-    fit_workspace(copied, ("friction",), seed=7, force=True)
+    fit_workspace(copied, ("friction",), FitOptions(seed=7, force=True))
     assert state(copied, "fit friction") == "unverified"
     assert state(copied, "fit cut") == "stale"
     assert make_plan(copied).next_command == "scissorcal fit cut"
 
 
 def test_the_same_fit_again_leaves_the_cut_current_and_adds_no_version(copied: Workspace) -> None:
-    fit_workspace(copied, force=True)
+    fit_workspace(copied, (), FitOptions(force=True))
     for version in versions(Engine.of(copied)):
         if not version.current:
             shutil.rmtree(version.path.parent)
-    fit_workspace(copied, ("friction",), force=True)
+    fit_workspace(copied, ("friction",), FitOptions(force=True))
     assert state(copied, "fit cut") == "unverified"
     assert len(versions(Engine.of(copied), "friction")) == 1
 
 
 def test_an_earlier_version_is_kept_and_restored(copied: Workspace) -> None:
     before = copied.fit_path("friction").read_bytes()
-    fit_workspace(copied, ("friction",), seed=7, force=True)
+    fit_workspace(copied, ("friction",), FitOptions(seed=7, force=True))
     engine = Engine.of(copied)
     current, earlier = versions(engine, "friction")
     assert (current.current, earlier.current) == (True, False)
@@ -135,7 +137,7 @@ def test_a_fit_that_cannot_be_written_leaves_the_earlier_one(
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match="The disk is full"):
-        fit_workspace(copied, ("friction",), seed=7, force=True)
+        fit_workspace(copied, ("friction",), FitOptions(seed=7, force=True))
     assert copied.fit_path("friction").read_bytes() == before
     assert state(copied, "fit friction") == "unverified"
 
@@ -335,8 +337,8 @@ def captured(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     recipe = workspace.recipe()
     link = LockstepLink("office-paper", np.random.default_rng(1))
     path = workspace.new_recording("friction")
-    with open_writer(path, "friction", link, recipe, text) as writer:
-        capture_friction(link, recipe, writer)
+    with open_writer(RigSession(link, recipe, recipe_toml=text), "friction", path) as writer:
+        capture(RigSession(link, recipe), "friction", writer)
     return workspace
 
 
@@ -353,8 +355,10 @@ def test_a_speed_that_the_fit_hardly_uses_is_named_in_plan_and_report(tmp_path: 
     workspace.recipe_path.write_text(text, encoding="utf-8")
     link = LockstepLink("office-paper", np.random.default_rng(2))
     path = workspace.new_recording("friction")
-    with open_writer(path, "friction", link, workspace.recipe(), text) as writer:
-        capture_friction(link, workspace.recipe(), writer)
+    with open_writer(
+        RigSession(link, workspace.recipe(), recipe_toml=text), "friction", path
+    ) as writer:
+        capture(RigSession(link, workspace.recipe()), "friction", writer)
     before = Engine.of(workspace).completeness("friction")
     assert all(row.used is None for row in before.summary)
     assert before.missing == ()

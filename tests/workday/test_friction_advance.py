@@ -10,9 +10,10 @@ from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.requirements import requirements
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import restore, versions
+from scissorcal.workday.options import SIM_RIG, FitOptions
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.recordings import exclude_recording
-from scissorcal.workday.runs.capture import capture_advance_into
+from scissorcal.workday.runs.capture import capture_into
 from scissorcal.workday.runs.fit import available, fit_workspace, load_result
 from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.workspace import Workspace, create_workspace
@@ -54,7 +55,7 @@ def day(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     made = create_workspace(tmp_path_factory.mktemp("advance") / "work", "paper-80gsm")
     with made.recipe_path.open("a", encoding="utf-8") as file:
         file.write(SHORT)
-    capture_advance_into(made, "sim")
+    capture_into(made, "friction-advance", SIM_RIG)
     fit_workspace(made, (NAME,))
     return made
 
@@ -123,7 +124,7 @@ def test_the_report_shows_it_beside_a_missing_scene(day):
 
 
 def test_versions_are_kept_and_restored(day):
-    fit_workspace(day, (NAME,), effort="draft")
+    fit_workspace(day, (NAME,), FitOptions(effort="draft"))
     engine = Engine.of(day)
     kept = [one for one in versions(engine, NAME) if not one.current]
     assert len(kept) == 1
@@ -142,13 +143,13 @@ def test_a_capture_without_travel_is_refused_before_the_rig_is_probed(workspace)
     text = text.replace("[capture.friction_advance]", "[capture.friction_advance]\ntravel_mm = 2.0")
     workspace.recipe_path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match="travel_mm = 2 is too little"):
-        capture_advance_into(workspace, "sim")
+        capture_into(workspace, "friction-advance", SIM_RIG)
     assert not workspace.probe_path.exists()
     assert workspace.recordings(NAME) == ()
 
 
 def test_its_recordings_can_be_excluded(workspace):
-    captured = capture_advance_into(workspace, "sim")
+    captured = capture_into(workspace, "friction-advance", SIM_RIG)
     exclude_recording(workspace, captured.path.name, "the sledge was held")
     found = Engine.of(workspace).state(f"capture {NAME}")
     assert (found.state, found.found) == ("missing", "every recording is excluded")

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scissorcal.device.session import RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.pictures import PlatePicture
@@ -26,7 +27,7 @@ def test_a_pose_is_predicted_for_the_time_that_it_is_asked_for() -> None:
                 yield eye.picture(found)
 
     source = TrackedPose(session, due)
-    with idle_rig(world.link, recipe) as motion:
+    with idle_rig(RigSession(world.link, recipe)) as motion:
         world.begin(motion)
         poses = []
         for step in range(36):
@@ -71,7 +72,7 @@ def test_a_camera_that_fails_is_a_lost_plate_although_the_tip_touches(
             yield picture
 
     source = TrackedPose(session, due)
-    with idle_rig(world.link, recipe) as motion:
+    with idle_rig(RigSession(world.link, recipe)) as motion:
         world.begin(motion)
         for _ in range(100):
             samples = motion.step()

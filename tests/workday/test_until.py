@@ -48,7 +48,7 @@ def test_friction_begins_with_three_speeds_and_an_excitation() -> None:
 
 def test_no_sweep_is_slower_than_the_rig_makes_steadily() -> None:
     choose = UntilTolerance(
-        "friction", RECIPE, IDENTITY, Earlier(), Limits(4.0), slowest_sweep=0.083
+        "friction", RECIPE, IDENTITY, Earlier(), Limits(4.0, slowest_sweep=0.083)
     )
     assert min(choose.recipe.capture.friction.speeds_rad_per_s) == 0.083
     part = choose(NOTHING, 0.0)

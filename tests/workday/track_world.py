@@ -1,5 +1,6 @@
 """Tracks in simulated worlds whose camera and rig frame are off as their covariances say."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.plate.fit import plate_target
 from scissorcal.device.motion import Motion
+from scissorcal.device.session import RigSession
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.surface import Plane
 from scissorcal.recipe.library import recipe_path
@@ -21,7 +23,7 @@ from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.sim.sim_camera import SIM_LENS, sim_plate_scene
 from scissorcal.workday.tracking.feeds import idle_rig, sim_feed, sim_rig_feed
 from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
-from scissorcal.workday.tracking.session import RigDrive, TrackSession
+from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import SimCamera, SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder
 
@@ -63,15 +65,10 @@ def a_session(
 ) -> TrackSession:
     delay = recipe.plate.tracking.camera_delay_ms
     about = TrackAbout("sim", "rig", "a" * 16, SIM_LENS.width, SIM_LENS.height, delay)
-    return TrackSession(
-        recipe,
-        Plane(),
-        about,
-        drive=RigDrive(0.06) if rig else None,
-        contacts=TipContacts(tip_of(recipe)) if rig else None,
-        friction_known=False,
-        recorder=recorder,
-    )
+    facts = TrackFacts(Plane(), about, friction_known=False)
+    if rig:
+        facts = replace(facts, drive=RigDrive(0.06), contacts=TipContacts(tip_of(recipe)))
+    return TrackSession(recipe, facts, recorder=recorder)
 
 
 def tracked(
@@ -89,7 +86,7 @@ def tracked(
             session.take_picture(picture)
             last = picture.arrived_s
         return session, world, last
-    with idle_rig(world.link, recipe) as motion:
+    with idle_rig(RigSession(world.link, recipe)) as motion:
         run_rig(session, world, motion, eye, seconds)
     return session, world, world.link.virtual_time
 

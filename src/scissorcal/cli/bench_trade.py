@@ -2,16 +2,17 @@
 
 import re
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Folder, Seed
+from scissorcal.cli.options import RIG, Folder, options_of
 from scissorcal.cli.output import Answer, command, note, table
 from scissorcal.cli.progress import progress
-from scissorcal.cli.verify import Cluster
+from scissorcal.cli.verify import CLUSTER, Processes
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,53 +23,47 @@ if TYPE_CHECKING:
 _SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 _DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(s|min|h)\s*")
 
-Knobs = Annotated[
-    list[str] | None,
-    typer.Option(
+
+@dataclass(frozen=True)
+class TradeOptions:
+    """Which knobs are measured, for how long, and of which day."""
+
+    knob: list[str] | None = None
+    budget: str | None = None
+    recipe: str | None = None
+    force: bool = False
+    seed: int = 0
+
+
+_OPTIONS = {
+    "knob": typer.Option(
         "--knob", metavar="NAME", help="A knob to measure; repeat the option. All if not given."
     ),
-]
-Budget = Annotated[
-    str | None,
-    typer.Option(
+    "budget": typer.Option(
         metavar="TIME",
         help='Time for the whole run, such as "3 min" or "90 s"; what does not fit is named.',
     ),
-]
-Recipe = Annotated[
-    str | None,
-    typer.Option(
+    "recipe": typer.Option(
         help="A built-in recipe in place of a workspace: its day on the virtual rig is made first, "
         "in the folder bench-NAME (bench-NAME-SEED for a seed above 0), and kept; a budget counts "
         "from there on."
     ),
-]
-Workers = Annotated[
-    int | None,
-    typer.Option(min=1, help="Processes to measure in; one for each core if not given."),
-]
-Force = Annotated[
-    bool,
-    typer.Option(
+    "force": typer.Option(
         "--force",
         help="Measure again what was measured on the same inputs: the knobs named by --knob alone, "
         "all where none is named.",
     ),
-]
+    "seed": RIG["seed"],
+    "workers": typer.Option(min=1, help="Processes to measure in; one for each core if not given."),
+    "cluster": CLUSTER,
+}
 Show = Annotated[bool, typer.Option("--show", help="Print what the last run found; measure none.")]
 
 
 @command
+@options_of(_OPTIONS)
 def trade(
-    knob: Knobs = None,
-    budget: Budget = None,
-    recipe: Recipe = None,
-    workers: Workers = None,
-    cluster: Cluster = None,
-    force: Force = False,
-    show: Show = False,
-    seed: Seed = 0,
-    folder: Folder = None,
+    options: TradeOptions, processes: Processes, show: Show = False, folder: Folder = None
 ) -> Answer:
     """Measure what accuracy costs, on a workspace's own recordings and scene.
 
@@ -92,7 +87,8 @@ def trade(
     began = time.time()
     from scissorcal.workday.runs.bench import TradeSettings, trade_workspace
 
-    allowed = None if budget is None else seconds_of(budget)
+    recipe = options.recipe
+    allowed = None if options.budget is None else seconds_of(options.budget)
     if recipe is not None and folder is not None:
         raise InputError("--recipe makes another workspace: leave out --workspace.")
     if recipe is not None and show:
@@ -102,15 +98,15 @@ def trade(
     if recipe is None:
         workspace = open_workspace(folder)
     else:
-        workspace = _day(recipe, seed)
+        workspace = _day(recipe, options.seed)
         began = time.time()
-    settings = TradeSettings(tuple(knob or ()), allowed, seed, force)
+    settings = TradeSettings(tuple(options.knob or ()), allowed, options.seed, options.force)
     with progress() as tell:
         found = trade_workspace(
             workspace,
             settings,
-            workers=workers,
-            cluster=cluster,
+            workers=processes.workers,
+            cluster=processes.cluster,
             progress=tell,
             began=began,
         )

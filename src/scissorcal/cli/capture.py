@@ -1,22 +1,24 @@
 """``scissorcal capture``"""
 
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Axis, Baud, Device, Folder, Realtime, Seed, Yes, positive
+from scissorcal.cli.options import RIG, Axis, Folder, Yes, options_of, positive
 from scissorcal.cli.output import Answer, command, note
-from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.errors import ScissorcalError
 from scissorcal.verdicts import Verdict
+from scissorcal.workday.options import CaptureOptions, RigOptions
 
 if TYPE_CHECKING:
+    from scissorcal.device.session import Operator
     from scissorcal.recipe.requirements import CaptureKind
     from scissorcal.recording.until import UntilMark
-    from scissorcal.workday.runs.capture import Captured, Until
+    from scissorcal.workday.runs.capture import Captured
     from scissorcal.workday.workspace import Workspace
 
 _PHOTOGRAPHS = "scissorcal.cli.capture_photographs"
@@ -48,38 +50,24 @@ def capture() -> None:
     """
 
 
-Designed = Annotated[
-    bool | None,
-    typer.Option(
+_PLANNED = {
+    "designed": typer.Option(
         "--designed/--as-in-recipe",
         help="Capture the strokes that narrow the torque's band the most for their time, or those "
         "that the recipe lists; by default as its capture.plan says.",
     ),
-]
-
-
-UntilTolerance = Annotated[
-    bool,
-    typer.Option(
+    "until_tolerance": typer.Option(
         "--until-tolerance",
         help="Fit after each stroke, choose the next one by what it is worth, and end when the "
         "torque's band over the scene is within its tolerance.",
     ),
-]
-
-AtLeast = Annotated[
-    int,
-    typer.Option(
+    "at_least": typer.Option(
         "--at-least",
         metavar="N",
         min=0,
         help="With --until-tolerance: go on until there are N strokes (pairs of sweeps).",
     ),
-]
-
-MaxMinutes = Annotated[
-    float | None,
-    typer.Option(
+    "max_minutes": typer.Option(
         "--max-minutes",
         metavar="MIN",
         callback=positive,
@@ -87,30 +75,20 @@ MaxMinutes = Annotated[
         "(motion, and the time that the recipe gives a person); the first part always runs. By "
         "default those that the recipe's list takes.",
     ),
-]
-
-
-YesLong = Annotated[
-    bool,
-    typer.Option(
+    "long": typer.Option(
         "--yes-long", help="A capture of more than 4 hours is meant; at most 24 are possible."
     ),
-]
+}
+_HAND = typer.Option("--hand", help="Motor off: a person (or the virtual hand) cuts.")
 
 
 @command
+@options_of({**RIG, **_PLANNED})
 def friction(
-    device: Device,
+    rig: RigOptions,
+    options: CaptureOptions,
     axis: Axis = "opening",
-    designed: Designed = None,
-    until_tolerance: UntilTolerance = False,
-    at_least: AtLeast = 0,
-    max_minutes: MaxMinutes = None,
-    realtime: Realtime = False,
     yes: Yes = False,
-    yes_long: YesLong = False,
-    seed: Seed = 0,
-    baud: Baud = None,
     folder: Folder = None,
 ) -> Answer:
     """Record empty closing and opening at several speeds, then excited motion for the inertia.
@@ -131,36 +109,17 @@ def friction(
       64 of 64 cells filled
       ...
     """
-    rig = _Rig(device, seed, realtime, baud)
-    if axis == "advance":
-        if designed is not None or until_tolerance or at_least or max_minutes is not None:
-            raise InputError(
-                "The sledge's capture takes the speeds that capture.friction_advance lists: leave "
-                "out --designed, --as-in-recipe, --until-tolerance and its options."
-            )
-        return _capture(
-            "friction-advance", rig, _How(False, None, None), yes=yes, long=yes_long, folder=folder
-        )
-    how = _How(False, designed, _until(until_tolerance, at_least, max_minutes, designed))
-    return _capture("friction", rig, how, yes=yes, long=yes_long, folder=folder)
+    from scissorcal.workday.runs.capture import capture_into
+
+    kind: CaptureKind = "friction" if axis == "opening" else "friction-advance"
+    with _at_rig(open_workspace(folder), kind, options, yes) as (workspace, operator):
+        return _answer(workspace, kind, capture_into(workspace, kind, rig, options, operator))
 
 
 @command
+@options_of({**RIG, **_PLANNED, "hand": _HAND})
 def cut(
-    device: Device,
-    hand: Annotated[
-        bool, typer.Option("--hand", help="Motor off: a person (or the virtual hand) cuts.")
-    ] = False,
-    designed: Designed = None,
-    until_tolerance: UntilTolerance = False,
-    at_least: AtLeast = 0,
-    max_minutes: MaxMinutes = None,
-    realtime: Realtime = False,
-    yes: Yes = False,
-    yes_long: YesLong = False,
-    seed: Seed = 0,
-    baud: Baud = None,
-    folder: Folder = None,
+    rig: RigOptions, options: CaptureOptions, yes: Yes = False, folder: Folder = None
 ) -> Answer:
     """Record strokes through fresh sheets at the recipe's speeds, or presses.
 
@@ -179,91 +138,23 @@ def cut(
       7 strokes, 1.7 planned min: band within 7 % at 96 % of felt places (median 1.5 %); tolerance
       reached at 95 % confidence
     """
-    rig = _Rig(device, seed, realtime, baud)
-    how = _How(hand, designed, _until(until_tolerance, at_least, max_minutes, designed))
-    return _capture("cut", rig, how, yes=yes, long=yes_long, folder=folder)
+    from scissorcal.workday.runs.capture import capture_into
+
+    with _at_rig(open_workspace(folder), "cut", options, yes) as (workspace, operator):
+        return _answer(workspace, "cut", capture_into(workspace, "cut", rig, options, operator))
 
 
-@dataclass(frozen=True)
-class _Rig:
-    device: str
-    seed: int
-    realtime: bool
-    baud: int | None
-
-
-@dataclass(frozen=True)
-class _How:
-    hand: bool
-    designed: bool | None
-    until: "Until | None"
-
-
-def _until(
-    wanted: bool, at_least: int, max_minutes: float | None, designed: bool | None
-) -> "Until | None":
-    """What --until-tolerance and its options ask for; None without it. InputError where at odds."""
-    from scissorcal.workday.runs.capture import Until
-
-    if not wanted:
-        if at_least or max_minutes is not None:
-            raise InputError(
-                "--at-least and --max-minutes bound a capture until the tolerance: add "
-                "--until-tolerance, or leave them out."
-            )
-        return None
-    if designed is not None:
-        raise InputError(
-            "--until-tolerance chooses each stroke while it captures: leave out --designed and "
-            "--as-in-recipe."
-        )
-    return Until(at_least, max_minutes)
-
-
-def _capture(
-    kind: "CaptureKind",
-    rig: _Rig,
-    how: _How,
-    *,
-    yes: bool,
-    long: bool,
-    folder: Path | None,
-) -> Answer:
+@contextmanager
+def _at_rig(
+    workspace: "Workspace", kind: "CaptureKind", options: CaptureOptions, yes: bool
+) -> "Iterator[tuple[Workspace, Operator]]":
+    """Show a capture to the person at the terminal; say what was kept where it fails."""
     from scissorcal.cli.live_view import LiveView
-    from scissorcal.workday.runs.capture import capture_advance_into, capture_into
 
-    workspace = open_workspace(folder)
     before = set(workspace.recordings(kind))
     try:
-        with LiveView(ask=not yes, listed=how.until is None) as view:
-            if kind == "friction-advance":
-                captured = capture_advance_into(
-                    workspace,
-                    rig.device,
-                    seed=rig.seed,
-                    baud=rig.baud,
-                    realtime=rig.realtime,
-                    long=long,
-                    progress=view.show,
-                    confirm=view.confirm,
-                    say=note,
-                )
-            else:
-                captured = capture_into(
-                    workspace,
-                    kind,
-                    rig.device,
-                    hand=how.hand,
-                    designed=how.designed,
-                    until=replace(how.until, tell=view.approach) if how.until else None,
-                    seed=rig.seed,
-                    baud=rig.baud,
-                    realtime=rig.realtime,
-                    long=long,
-                    progress=view.show,
-                    confirm=view.confirm,
-                    say=note,
-                )
+        with LiveView(ask=not yes, listed=not options.until_tolerance) as view:
+            yield workspace, view.operator
     except BaseException as error:
         kept = sorted(set(workspace.recordings(kind)) - before)
         for path in kept:
@@ -271,6 +162,9 @@ def _capture(
         if isinstance(error, ScissorcalError):
             error.kept = tuple(kept)
         raise
+
+
+def _answer(workspace: "Workspace", kind: str, captured: "Captured") -> Answer:
     return Answer(
         _facts(captured),
         _text(workspace, captured),

@@ -1,42 +1,67 @@
-"""``scissorcal capture camera``, ``blade`` and ``plate``: photographs, taken in by one driver."""
+"""``scissorcal capture camera``, ``blade`` and ``plate``: photographs."""
 
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Folder, Images, MoreImages, Seed
+from scissorcal.cli.options import RIG, Folder, options_of
 from scissorcal.cli.output import Answer, command, note
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
+    from scissorcal.recipe.schema import Recipe
     from scissorcal.vision.targets.boards import Board
-    from scissorcal.workday.photographs import Taken
+    from scissorcal.workday.photographs import BladeSetup, Taken
     from scissorcal.workday.workspace import Workspace
 
-Source = Annotated[
-    str | None,
-    typer.Option(
-        "--camera",
-        metavar="NUMBER|VIDEO|sim",
-        help="Take pictures from a camera or a video file, while the target is held still; sim: "
-        "render them.",
-    ),
-]
 
+@dataclass(frozen=True)
+class Photographs:
+    """Where photographs come from: files, or ``source`` (a camera, a video or "sim")."""
+
+    images: list[Path] | None = None
+    more: list[Path] | None = None
+    source: str | None = None
+    seed: int = 0
+    views: int = 20
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that were given."""
+        return (*(self.images or ()), *(self.more or ()))
+
+    def refuse_two_sources(self, otherwise: str = "a camera or video with --camera") -> None:
+        """InputError where there is no source of pictures, or two."""
+        if bool(self.images) == bool(self.source):
+            raise InputError(f"Give photographs with --image, or {otherwise}.")
+
+
+_FILES = {
+    "images": typer.Option("--image", "-i", help="A photograph; repeat the option for each."),
+    "more": typer.Argument(metavar="FILE", help="More photographs: what --image *.jpg expands to."),
+    "seed": RIG["seed"],
+}
+_SOURCE = typer.Option(
+    "--camera",
+    metavar="NUMBER|VIDEO|sim",
+    help="Take pictures from a camera or a video file, while the target is held still; sim: "
+    "render them.",
+)
 _VIEWS_HELP = "Pictures to take from --camera; Ctrl-C ends it sooner."
 
 
 @command
+@options_of({**_FILES, "source": _SOURCE, "views": typer.Option(min=3, help=_VIEWS_HELP)})
 def camera(
-    images: Images = None,
-    more: MoreImages = None,
-    source: Source = None,
-    views: Annotated[int, typer.Option(min=3, help=_VIEWS_HELP)] = 20,
+    photographs: Photographs,
     words: Annotated[
         str,
         typer.Option(
@@ -46,7 +71,6 @@ def camera(
             "before 4.6 drew an even number of rows.",
         ),
     ] = "camera",
-    seed: Seed = 0,
     folder: Folder = None,
 ) -> Answer:
     """Take in photographs of the camera board, and say which views are missing.
@@ -61,70 +85,81 @@ def camera(
         places 6 of 9, sizes 1 of 3, slants 1 of 5; wanted: upper left, left, lower left, ...
       ...
     """
-    from scissorcal.vision.coverage import ViewCoverage
     from scissorcal.vision.targets.board_words import board_from_words
     from scissorcal.workday.runs.camera import capture_camera
 
-    _refuse_two_sources(images, source)
+    photographs.refuse_two_sources()
     board = board_from_words(words)
-    wanted = ViewCoverage()
-
-    def store(workspace: "Workspace", photographs: Iterable[Path]) -> "Taken":
-        nonlocal wanted
-        taken, wanted = capture_camera(workspace, photographs, board, note)
-        return taken
-
-    return _take_in(
-        open_workspace(folder),
-        (*(images or ()), *(more or ())),
-        partial(_board_pictures, source, board, seed, views) if source else None,
-        store,
-        of=lambda done: f"the {board.name}",
-        facts=lambda done: {"board": board.name, "wanted": wanted.wanted},
-        last_line=lambda done: f"\n{wanted.sentence()}",
-    )
+    workspace = open_workspace(folder)
+    with _pictures(photographs, partial(_board_pictures, photographs, board)) as pictures:
+        taken, wanted = capture_camera(workspace, pictures, board, note)
+    facts = {"board": board.name, "wanted": wanted.wanted}
+    return _answer(workspace, taken, f"the {board.name}", facts, f"\n{wanted.sentence()}")
 
 
-BladeSource = Annotated[
-    Literal["sim"] | None,
-    typer.Option("--camera", help="sim: three rendered photographs of the recipe's virtual blade."),
-]
+@dataclass(frozen=True)
+class BladePhotographs(Photographs):
+    """Photographs of a blade, which no running camera takes."""
+
+    source: Literal["sim"] | None = None
+
+
+@dataclass(frozen=True)
+class BladePlacing:
+    """How a blade was laid down, as the command line states it."""
+
+    both: bool = False
+    no_mat: bool = False
+    scale: float | None = None
+    length_mm: float | None = None
+    edge_side: Literal["down", "up"] = "down"
+    pivot: tuple[float, float] | None = None
+
+    def setup(self) -> "BladeSetup":
+        """The same, as a workspace keeps it; InputError where options are at odds."""
+        from scissorcal.workday.photographs import BladeSetup
+
+        if self.no_mat and not self.both:
+            raise InputError("A blade alone needs the mat; --no-mat goes with --both.")
+        if (self.scale is not None or self.length_mm is not None) and not self.no_mat:
+            raise InputError("The mat gives the scale: --scale and --length-mm go with --no-mat.")
+        if self.scale is not None and self.length_mm is not None:
+            raise InputError("Give --scale or --length-mm, not both.")
+        for name, value in (("--scale", self.scale), ("--length-mm", self.length_mm)):
+            if value is not None and not 0.0 < value < 1e4:
+                raise InputError(f"{name} must be a positive number.")
+        if self.pivot is not None and self.both:
+            raise InputError("Open scissors show their own pivot: leave --pivot out.")
+        return BladeSetup(
+            both=self.both,
+            mat=not self.no_mat,
+            edge_side=self.edge_side,
+            scale_mm_per_px=self.scale,
+            length_mm=self.length_mm,
+            pivot_px=self.pivot,
+        )
+
+
 OTHER_LAMP = (
     "Photographs under one lamp share its shadow, and their agreement is no evidence: take others "
     "with the scissors turned by 90 deg, or the lamp elsewhere."
 )
-Both = Annotated[
-    bool, typer.Option("--both", help="Open scissors: both blades in each photograph.")
-]
-NoMat = Annotated[bool, typer.Option("--no-mat", help="With --both: no mat; shapes have no scale.")]
-Scale = Annotated[float | None, typer.Option(help="With --no-mat: millimetres per pixel.")]
-LengthMm = Annotated[
-    float | None, typer.Option(help="With --no-mat: the blade's length, pivot to tip.")
-]
-EdgeSide = Annotated[
-    Literal["down", "up"],
-    typer.Option("--edge", help="Which side of the mat the edge faces."),
-]
-Pivot = Annotated[
-    tuple[float, float] | None,
-    typer.Option(help="Pivot in pixels, where no hole marks it."),
-]
+_BLADE = {
+    "source": typer.Option(
+        "--camera", help="sim: three rendered photographs of the recipe's virtual blade."
+    ),
+    "both": typer.Option("--both", help="Open scissors: both blades in each photograph."),
+    "no_mat": typer.Option("--no-mat", help="With --both: no mat; shapes have no scale."),
+    "scale": typer.Option(help="With --no-mat: millimetres per pixel."),
+    "length_mm": typer.Option(help="With --no-mat: the blade's length, pivot to tip."),
+    "edge_side": typer.Option("--edge", help="Which side of the mat the edge faces."),
+    "pivot": typer.Option(help="Pivot in pixels, where no hole marks it."),
+}
 
 
 @command
-def blade(
-    images: Images = None,
-    source: BladeSource = None,
-    both: Both = False,
-    no_mat: NoMat = False,
-    scale: Scale = None,
-    length_mm: LengthMm = None,
-    edge_side: EdgeSide = "down",
-    pivot: Pivot = None,
-    more: MoreImages = None,
-    seed: Seed = 0,
-    folder: Folder = None,
-) -> Answer:
+@options_of({**_FILES, **_BLADE})
+def blade(photographs: BladePhotographs, placing: BladePlacing, folder: Folder = None) -> Answer:
     """Take in photographs of a blade on the printed mat, or of open scissors.
 
     Lay the blade flat inside the markers, its pivot hole on the small cross, its tip to the right
@@ -139,42 +174,34 @@ def blade(
     """
     from scissorcal.vision.sim.sim_camera import render_blade_photographs
     from scissorcal.workday.demo.sim_photographs import specimen_blade
-    from scissorcal.workday.photographs import BladeSetup
     from scissorcal.workday.runs.blade import capture_blade
 
-    if bool(images) == bool(source):
-        raise InputError("Give photographs with --image, or --camera sim.")
-    _refuse_contradictions(both, no_mat, scale, length_mm, pivot)
-    setup = BladeSetup(
-        both=both,
-        mat=not no_mat,
-        edge_side=edge_side,
-        scale_mm_per_px=scale,
-        length_mm=length_mm,
-        pivot_px=pivot,
-    )
-    return _take_in(
-        open_workspace(folder),
-        (*(images or ()), *(more or ())),
-        (
-            lambda workspace, scratch: render_blade_photographs(
-                specimen_blade(workspace.recipe()), scratch, seed, both=both
-            )
-        )
-        if source
-        else None,
-        lambda workspace, photographs: capture_blade(workspace, list(photographs), setup, note),
-        of=lambda done: "open scissors" if both else "the blade",
-        last_line=lambda done: f"\n{OTHER_LAMP}" if both else "",
-    )
+    photographs.refuse_two_sources("--camera sim")
+    setup = placing.setup()
+    workspace = open_workspace(folder)
+
+    def rendered(scratch: Path) -> Iterable[Path]:
+        virtual = specimen_blade(workspace.recipe())
+        return render_blade_photographs(virtual, scratch, photographs.seed, both=setup.both)
+
+    with _pictures(photographs, rendered) as pictures:
+        taken = capture_blade(workspace, list(pictures), setup, note)
+    if setup.both:
+        return _answer(workspace, taken, "open scissors", {}, f"\n{OTHER_LAMP}")
+    return _answer(workspace, taken, "the blade")
+
+
+@dataclass(frozen=True)
+class PlatePhotographs(Photographs):
+    """Photographs of the plate's target; fewer do."""
+
+    views: int = 5
 
 
 @command
+@options_of({**_FILES, "source": _SOURCE, "views": typer.Option(min=1, help=_VIEWS_HELP)})
 def plate(
-    images: Images = None,
-    source: Source = None,
-    views: Annotated[int, typer.Option(min=1, help=_VIEWS_HELP)] = 5,
-    more: MoreImages = None,
+    photographs: PlatePhotographs,
     stances: Annotated[
         str | None,
         typer.Option(
@@ -183,7 +210,6 @@ def plate(
             "where the rig stood in each: file,advance_mm,opening_deg. sim goes with --camera sim.",
         ),
     ] = None,
-    seed: Seed = 0,
     folder: Folder = None,
 ) -> Answer:
     """Take in photographs of the plate's target, or of the rig's card at known stances.
@@ -202,116 +228,90 @@ def plate(
     from scissorcal.vision.stances import read_stances
     from scissorcal.workday.runs.plate import capture_plate
 
-    _refuse_two_sources(images, source)
+    photographs.refuse_two_sources()
+    source = photographs.source
     if source and stances and (source, stances) != ("sim", "sim"):
         raise InputError(
             "The rig's stances are not known in pictures of a running camera: --stances goes with "
             "--image, or --stances sim with --camera sim."
         )
     known = read_stances(Path(stances)) if stances and not source else None
+    workspace = open_workspace(folder)
 
-    def pictures(workspace: "Workspace", scratch: Path) -> Iterable[Path]:
+    def made(scratch: Path) -> Iterable[Path]:
         nonlocal known
-        if not stances:
-            return _plate_pictures(str(source), seed, views, workspace, scratch)
         recipe = workspace.recipe()
-        made = render_card_photographs(recipe, scratch, seed, standing_plate(recipe))
-        known = {path.name: stance for path, stance in made.items()}
-        return list(made)
+        if not stances:
+            return _plate_pictures(photographs, recipe, scratch)
+        known = {
+            path.name: stance
+            for path, stance in render_card_photographs(
+                recipe, scratch, photographs.seed, standing_plate(recipe)
+            ).items()
+        }
+        return [scratch / name for name in known]
 
-    def store(workspace: "Workspace", photographs: Iterable[Path]) -> "Taken":
-        return capture_plate(workspace, photographs, note, stances=known)
-
-    return _take_in(
-        open_workspace(folder),
-        (*(images or ()), *(more or ())),
-        pictures if source else None,
-        store,
-        of=lambda done: f"the {done.capture.index.board.name}",
-        facts=lambda done: {"target": done.capture.index.board.name},
-    )
+    with _pictures(photographs, made) as pictures:
+        taken = capture_plate(workspace, pictures, note, stances=known)
+    name = taken.capture.index.board.name
+    return _answer(workspace, taken, f"the {name}", {"target": name})
 
 
-def _take_in(
-    workspace: "Workspace",
-    given: tuple[Path, ...],
-    pictures: "Callable[[Workspace, Path], Iterable[Path]] | None",
-    store: "Callable[[Workspace, Iterable[Path]], Any]",
-    *,
-    of: Callable[[Any], str],
-    facts: Callable[[Any], Mapping[str, Any]] = lambda done: {},
-    last_line: Callable[[Any], str] = lambda done: "",
-) -> Answer:
-    """Store the photographs ``given``, or those that ``pictures`` makes in a temporary folder.
-
-    ``store`` checks and keeps them; ``of`` names what they show. Every capture of photographs ends
-    here, so that all of them report alike.
-    """
+@contextmanager
+def _pictures(
+    photographs: Photographs, made: Callable[[Path], Iterable[Path]]
+) -> Iterator[Iterable[Path]]:
+    """The files that were given, or what is ``made`` in a temporary folder where none were."""
     with tempfile.TemporaryDirectory() as scratch:
-        done = store(workspace, pictures(workspace, Path(scratch)) if pictures else given)
-    count = len(done.taken)
+        yield made(Path(scratch)) if photographs.source else photographs.files
+
+
+def _answer(
+    workspace: "Workspace",
+    taken: "Taken",
+    target: str,
+    facts: Mapping[str, Any] = MappingProxyType({}),
+    last_line: str = "",
+) -> Answer:
+    """What was taken in of a ``target``, alike for all captures of photographs."""
+    count = len(taken.taken)
     plural = "s" if count > 1 else ""
-    text = f"{workspace.relative(done.capture.folder)}: {count} photograph{plural} of {of(done)}"
-    if done.refused:
-        text += f", {len(done.refused)} left out"
+    text = f"{workspace.relative(taken.capture.folder)}: {count} photograph{plural} of {target}"
+    if taken.refused:
+        text += f", {len(taken.refused)} left out"
     result = {
-        "capture": done.capture.folder,
-        "photographs": done.taken,
-        "left_out": done.refused,
-        **facts(done),
+        "capture": taken.capture.folder,
+        "photographs": taken.taken,
+        "left_out": taken.refused,
+        **facts,
     }
-    files = [done.capture.path(photo) for photo in done.capture.index.photographs]
-    return Answer(result, text + last_line(done), files=files)
+    files = [taken.capture.path(photo) for photo in taken.capture.index.photographs]
+    return Answer(result, text + last_line, files=files)
 
 
-def _board_pictures(
-    source: str, board: "Board", seed: int, views: int, workspace: "Workspace", scratch: Path
-) -> Iterable[Path]:
+def _board_pictures(photographs: Photographs, board: "Board", scratch: Path) -> Iterable[Path]:
     from scissorcal.vision.live import pick_frames
     from scissorcal.vision.sim.sim_camera import render_board_photographs
     from scissorcal.vision.targets.boards import Chessboard
 
+    source, views = photographs.source, photographs.views
+    assert source is not None
     if source != "sim":
         return pick_frames(source, board, scratch, views)
     if isinstance(board, Chessboard):
         raise InputError("Only printed boards with markers are rendered: leave --board out.")
-    return render_board_photographs(board, scratch, seed, "board", count=views)
+    return render_board_photographs(board, scratch, photographs.seed, "board", count=views)
 
 
-def _plate_pictures(
-    source: str, seed: int, views: int, workspace: "Workspace", scratch: Path
-) -> Iterable[Path]:
+def _plate_pictures(photographs: Photographs, recipe: "Recipe", scratch: Path) -> Iterable[Path]:
     from scissorcal.vision.live import pick_at_rest
     from scissorcal.vision.sim.sim_camera import render_plate_photographs, standing_plate
     from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 
+    source, views = photographs.source, photographs.views
+    assert source is not None
     if source == "sim":
-        recipe = workspace.recipe()
-        stands = standing_plate(recipe)
-        return render_plate_photographs(recipe, scratch, seed, count=views, rig_plate=stands)
+        return render_plate_photographs(
+            recipe, scratch, photographs.seed, count=views, rig_plate=standing_plate(recipe)
+        )
     return pick_at_rest(source, (PLATE_BOARD, PLATE_STRIP), scratch, views)
-
-
-def _refuse_two_sources(images: list[Path] | None, source: str | None) -> None:
-    if bool(images) == bool(source):
-        raise InputError("Give photographs with --image, or a camera or video with --camera.")
-
-
-def _refuse_contradictions(
-    both: bool,
-    no_mat: bool,
-    scale: float | None,
-    length_mm: float | None,
-    pivot: tuple[float, float] | None,
-) -> None:
-    if no_mat and not both:
-        raise InputError("A blade alone needs the mat; --no-mat goes with --both.")
-    if (scale is not None or length_mm is not None) and not no_mat:
-        raise InputError("The mat gives the scale: --scale and --length-mm go with --no-mat.")
-    if scale is not None and length_mm is not None:
-        raise InputError("Give --scale or --length-mm, not both.")
-    for name, value in (("--scale", scale), ("--length-mm", length_mm)):
-        if value is not None and not 0.0 < value < 1e4:
-            raise InputError(f"{name} must be a positive number.")
-    if pivot is not None and both:
-        raise InputError("Open scissors show their own pivot: leave --pivot out.")

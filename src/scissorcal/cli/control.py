@@ -1,61 +1,55 @@
 """``scissorcal control``"""
 
 from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import (
-    Baud,
-    Device,
+    NO_RECORD,
+    PLATE_CAMERA,
+    RIG,
     Folder,
-    PlateCamera,
-    Realtime,
-    Seed,
     Yes,
+    options_of,
     positive,
 )
-from scissorcal.cli.output import Answer, command, note, table
+from scissorcal.cli.output import Answer, command, table
 from scissorcal.cli.tracked import tracked_facts
+from scissorcal.workday.options import ControlOptions, RigOptions
 
 if TYPE_CHECKING:
-    from scissorcal.workday.runs.control import Controlled
+    from scissorcal.control.result import ControlResult
+    from scissorcal.workday.runs.at_rig import RigRun
+
+
+_OPTIONS = {
+    "path_file": typer.Option(
+        "--path",
+        metavar="PATH.csv",
+        help="Points on the plate: x_mm, and y_mm, force_N, speed_mm_per_s where stated.",
+    ),
+    "force_N": typer.Option(
+        "--force", callback=positive, metavar="N", help="Force along the normal."
+    ),
+    "speed_mm_per_s": typer.Option(
+        "--speed", callback=positive, metavar="MM_PER_S", help="Along the path."
+    ),
+    "pose": typer.Option(
+        metavar="X_MM,Y_MM,RISE_DEG|x=MM,y=MM,z=MM,yaw=DEG,pitch=DEG,roll=DEG",
+        help="Where the plate stands in the rig's frame (a rotation also as qw=,qx=,qy=,qz=); "
+        "as it was fitted if not given.",
+    ),
+    "camera": PLATE_CAMERA,
+    "no_record": NO_RECORD,
+}
 
 
 @command
+@options_of({**RIG, **_OPTIONS})
 def control(
-    device: Device,
-    path_file: Annotated[
-        Path,
-        typer.Option(
-            "--path",
-            metavar="PATH.csv",
-            help="Points on the plate: x_mm, and y_mm, force_N, speed_mm_per_s where stated.",
-        ),
-    ],
-    force: Annotated[
-        float, typer.Option(callback=positive, metavar="N", help="Force along the normal.")
-    ] = 2.0,
-    speed: Annotated[
-        float, typer.Option(callback=positive, metavar="MM_PER_S", help="Along the path.")
-    ] = 10.0,
-    pose: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X_MM,Y_MM,RISE_DEG|x=MM,y=MM,z=MM,yaw=DEG,pitch=DEG,roll=DEG",
-            help="Where the plate stands in the rig's frame (a rotation also as qw=,qx=,qy=,qz=); "
-            "as it was fitted if not given.",
-        ),
-    ] = None,
-    camera: PlateCamera = "none",
-    no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
-    realtime: Realtime = False,
-    yes: Yes = False,
-    seed: Seed = 0,
-    baud: Baud = None,
-    folder: Folder = None,
+    rig: RigOptions, options: ControlOptions, yes: Yes = False, folder: Folder = None
 ) -> Answer:
     """Press with the upper blade's tip on the plate, and follow a path on its surface.
 
@@ -77,22 +71,7 @@ def control(
 
     workspace = open_workspace(folder)
     with LiveView(ask=not yes) as view:
-        controlled = control_workspace(
-            workspace,
-            device,
-            path_file,
-            force_N=force,
-            speed_mm_per_s=speed,
-            pose=pose,
-            camera=camera,
-            record=not no_record,
-            seed=seed,
-            baud=baud,
-            realtime=realtime,
-            progress=view.show,
-            confirm=view.confirm,
-            say=note,
-        )
+        controlled = control_workspace(workspace, rig, options, view.operator)
     result = asdict(controlled.result)
     del result["verdicts"]
     files = [controlled.recording] if controlled.recording else []
@@ -104,7 +83,7 @@ def control(
     return Answer({**result, **facts}, _text(controlled), verdicts, files)
 
 
-def _text(controlled: "Controlled") -> str:
+def _text(controlled: "RigRun[ControlResult]") -> str:
     done = controlled.result
     figures = done.figures
     peak = max(figures.peaks_N, default=float("nan"))

@@ -4,15 +4,16 @@ import time
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import writes_in
-from scissorcal.cli.options import Axis, Folder, Seed, positive
+from scissorcal.cli.options import RIG, Axis, Folder, options_of, positive
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
+from scissorcal.workday.options import FitOptions
 
 if TYPE_CHECKING:
     from scissorcal.workday.runs.fit import FitOutcome
@@ -52,14 +53,20 @@ _EXAMPLES = {
 }
 """What the help of each command shows as its first line of output."""
 
-Effort = Annotated[
-    Literal["draft", "standard", "thorough"] | None,
-    typer.Option(
+_OPTIONS = {
+    "effort": typer.Option(
         help="draft: quick, intervals unchecked; standard: checked; thorough: by ensembles of "
         "walkers, continues where it was interrupted. The recipe's if not given."
     ),
-]
-Force = Annotated[bool, typer.Option("--force", help="Fit again even where nothing changed.")]
+    "force": typer.Option("--force", help="Fit again even where nothing changed."),
+    "seed": RIG["seed"],
+    "save_to": typer.Option(
+        file_okay=False,
+        help="Where a fit is kept if the workspace cannot be written; a folder for temporary files "
+        "if not given. 'scissorcal fit restore FILE' puts it in place.",
+    ),
+}
+_CRITIC = typer.Option("--critic", help="Ask the critic, at draft effort too, and print its work.")
 MaxMinutes = Annotated[
     float,
     typer.Option(
@@ -67,29 +74,12 @@ MaxMinutes = Annotated[
         help="Time after which each fit stops with the result it has; it is then unfinished.",
     ),
 ]
-Critic = Annotated[
-    bool, typer.Option("--critic", help="Ask the critic, at draft effort too, and print its work.")
-]
-SaveTo = Annotated[
-    Path | None,
-    typer.Option(
-        file_okay=False,
-        help="Where a fit is kept if the workspace cannot be written; a folder for temporary files "
-        "if not given. 'scissorcal fit restore FILE' puts it in place.",
-    ),
-]
 
 
 @group(_COMMANDS, runs_alone=True)
 @command
-def fit(
-    effort: Effort = None,
-    force: Force = False,
-    max_minutes: MaxMinutes = 10.0,
-    seed: Seed = 0,
-    save_to: SaveTo = None,
-    folder: Folder = None,
-) -> Answer:
+@options_of(_OPTIONS)
+def fit(options: FitOptions, max_minutes: MaxMinutes = 10.0, folder: Folder = None) -> Answer:
     """Fit what the scene requires: camera, blade and plate to photographs, friction, the cut.
 
     A fit whose recordings, photographs and settings are unchanged is not repeated. --effort does
@@ -108,21 +98,16 @@ def fit(
       friction: nothing changed since the last fit; stribeck + angle, symmetric is as it was
       ...
     """
-    return _run((), folder, effort, force, max_minutes, seed, save_to)
+    return _run((), options, max_minutes, folder)
 
 
 def _command_of(*wanted: str) -> Callable[..., None]:
     """Make the command that fits one thing; it has the options of ``fit``."""
 
     def fit_one(
-        effort: Effort = None,
-        force: Force = False,
-        max_minutes: MaxMinutes = 10.0,
-        seed: Seed = 0,
-        save_to: SaveTo = None,
-        folder: Folder = None,
+        options: FitOptions, max_minutes: MaxMinutes = 10.0, folder: Folder = None
     ) -> Answer:
-        return _run(wanted, folder, effort, force, max_minutes, seed, save_to)
+        return _run(wanted, options, max_minutes, folder)
 
     what = wanted[0] if wanted else "all"
     fit_one.__doc__ = f"""{_COMMANDS[what][1]} See 'scissorcal fit --help'.
@@ -133,18 +118,15 @@ def _command_of(*wanted: str) -> Callable[..., None]:
       {_EXAMPLES[what]}
       ...
     """
-    return command(fit_one)
+    return command(options_of(_OPTIONS)(fit_one))
 
 
 @command
+@options_of({**_OPTIONS, "critic": _CRITIC})
 def friction(
+    options: FitOptions,
     axis: Axis = "opening",
-    effort: Effort = None,
-    force: Force = False,
     max_minutes: MaxMinutes = 10.0,
-    seed: Seed = 0,
-    save_to: SaveTo = None,
-    critic: Critic = False,
     folder: Folder = None,
 ) -> Answer:
     """Friction, to recordings of empty motion. See 'scissorcal fit --help'.
@@ -172,7 +154,7 @@ def friction(
       ...
     """
     what = "friction" if axis == "opening" else "friction-advance"
-    return _run((what,), folder, effort, force, max_minutes, seed, save_to, critic)
+    return _run((what,), options, max_minutes, folder)
 
 
 camera = _command_of("camera")
@@ -183,17 +165,10 @@ all_ = _command_of()
 
 
 def _run(
-    wanted: Sequence[str],
-    folder: Path | None,
-    effort: Literal["draft", "standard", "thorough"] | None,
-    force: bool,
-    max_minutes: float,
-    seed: int,
-    save_to: Path | None,
-    critic: bool = False,
+    wanted: Sequence[str], options: FitOptions, max_minutes: float, folder: Path | None
 ) -> Answer:
     from scissorcal.workday.engine import Engine
-    from scissorcal.workday.runs.fit import fit_step, steps_to_fit
+    from scissorcal.workday.runs.fit import fit_step, for_step, steps_to_fit
 
     limit_s = 60.0 * max_minutes
     outcomes = []
@@ -205,16 +180,12 @@ def _run(
                 outcome = fit_step(
                     engine,
                     step,
-                    effort=effort,
-                    seed=seed,
-                    force=force and (not wanted or step.what in wanted),
+                    for_step(options, step, wanted),
                     progress=tell,
                     stop=lambda ends_s=ends_s: time.monotonic() > ends_s,  # type: ignore[misc]
-                    save_to=save_to,
-                    critic=critic and step.what in wanted,
                 )
             outcomes.append(outcome)
-    return _answer(outcomes, critic)
+    return _answer(outcomes, options.critic)
 
 
 def _answer(outcomes: "Sequence[FitOutcome]", critic: bool) -> Answer:
@@ -222,7 +193,7 @@ def _answer(outcomes: "Sequence[FitOutcome]", critic: bool) -> Answer:
     from scissorcal.cli.fit_law import critic_text, parameter_facts
 
     laws = [outcome for outcome in outcomes if _SHOWN[outcome.what] == _LAW]
-    seen = {o.what: _shown(o).facts(o) for o in outcomes if o not in laws}
+    geometry = {o.what: _shown(o).facts(o) for o in outcomes if o not in laws}
     result: dict[str, object] = {}
     if laws:
         passed = [outcome for outcome in laws if not outcome.result.rejected]
@@ -230,12 +201,12 @@ def _answer(outcomes: "Sequence[FitOutcome]", critic: bool) -> Answer:
             "parameters": [row for outcome in passed for row in parameter_facts(outcome)],
             "not_a_calibration": {o.what: parameter_facts(o) for o in laws if o not in passed},
             "fits": [_shown(outcome).facts(outcome) for outcome in laws],
-            "geometry": seen,
+            "geometry": geometry,
         }
-    elif len(seen) == 1:
-        (result,) = seen.values()
+    elif len(geometry) == 1:
+        (result,) = geometry.values()
     else:
-        result = {"geometry": seen}
+        result = {"geometry": geometry}
     return Answer(
         result,
         "\n\n".join(

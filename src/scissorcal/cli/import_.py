@@ -1,77 +1,114 @@
 """``scissorcal import``"""
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from scissorcal.cli.opening import open_workspace, writes_in
-from scissorcal.cli.options import Folder
+from scissorcal.cli.options import Folder, options_of
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 from scissorcal.cli.survey import survey_lines
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
-    from scissorcal.recording import Recording
+    from scissorcal.recording import Joint, Kind, Recording
 
 _CAMERA_FILES = (".yaml", ".yml", ".xml", ".json", ".ini")
 _CAMERA_NAMES = ("cameras.txt", "ost.txt")
 """As COLMAP and camera_calibration of ROS call them."""
 
 
+@dataclass(frozen=True)
+class TableOptions:
+    """How a log is read: which columns, in which units, and what is let pass."""
+
+    columns: list[str] | None = None
+    units: list[str] | None = None
+    scales: list[str] | None = None
+    rate_Hz: float | None = None
+    handle_radius_mm: float | None = None
+    min_travel: float | None = None
+    allow_gaps: bool = False
+    drop_last_line: bool = True
+    delimiter: str | None = None
+
+    @property
+    def channels(self) -> dict[str, str | int]:
+        """The column of each channel; InputError where one is given twice."""
+        from scissorcal.recording.table import column_of
+
+        return {name: column_of(at) for name, at in pairs("column", self.columns)}
+
+    def read(
+        self, path: Path, joint: "Joint", kind: "Kind" = "friction", *, motion_only: bool = False
+    ) -> "Recording":
+        """Read a log as `import_table` does."""
+        from scissorcal.recording import import_table
+
+        radius_mm = self.handle_radius_mm
+        return import_table(
+            path,
+            columns=self.channels,
+            units=dict(pairs("unit", self.units)),
+            scale=dict(pairs("scale", self.scales)),
+            rate_Hz=self.rate_Hz,
+            joint=joint,
+            kind=kind,
+            handle_radius_m=radius_mm * 1e-3 if radius_mm else math.nan,
+            min_travel=self.min_travel,
+            allow_gaps=self.allow_gaps,
+            drop_last_line=self.drop_last_line,
+            delimiter=self.delimiter,
+            motion_only=motion_only,
+        )
+
+
 def _per_channel(short: str, long: str, help_text: str) -> Any:
     return typer.Option(short, long, metavar="CHANNEL=...", help=help_text)
 
 
-Files = Annotated[
-    list[Path], typer.Argument(dir_okay=False, help="Logs of one layout, or a camera's file.")
-]
-Columns = Annotated[
-    list[str] | None, _per_channel("-c", "--column", "Which column holds a channel.")
-]
-Units = Annotated[list[str] | None, _per_channel("-u", "--unit", "The unit of a channel's column.")]
-Scales = Annotated[
-    list[str] | None, _per_channel("-s", "--scale", "The factor of a channel's column.")
-]
-RateHz = Annotated[
-    float | None,
-    typer.Option("--rate-hz", help="Samples per second, if there is no time column."),
-]
-JointKind = Annotated[
-    Literal["rotary", "linear"] | None, typer.Option(help="The recipe's if not given.")
-]
-Kind = Annotated[Literal["friction", "cut"], typer.Option(help="What was recorded.")]
-HandleRadiusMm = Annotated[float | None, typer.Option(help="The recipe's if not given.")]
-MinTravel = Annotated[float | None, typer.Option(help="Least travel of a stroke (rad, or m).")]
-AllowGaps = Annotated[bool, typer.Option("--allow-gaps", help="Keep gaps in time, with a note.")]
-DropLastLine = Annotated[
-    bool,
-    typer.Option(
+TABLE = {
+    "columns": _per_channel("-c", "--column", "Which column holds a channel."),
+    "units": _per_channel("-u", "--unit", "The unit of a channel's column."),
+    "scales": _per_channel("-s", "--scale", "The factor of a channel's column."),
+    "rate_Hz": typer.Option("--rate-hz", help="Samples per second, if there is no time column."),
+    "handle_radius_mm": typer.Option(help="The recipe's if not given."),
+    "min_travel": typer.Option(help="Least travel of a stroke (rad, or m)."),
+    "allow_gaps": typer.Option("--allow-gaps", help="Keep gaps in time, with a note."),
+    "drop_last_line": typer.Option(
         "--drop-last-line/--keep-last-line",
         help="Leave out the last line of a text file where it is not whole.",
     ),
+    "delimiter": typer.Option(help="What separates the columns of a CSV file."),
+}
+JointKind = Annotated[
+    Literal["rotary", "linear"] | None, typer.Option(help="The recipe's if not given.")
 ]
-Delimiter = Annotated[str | None, typer.Option(help="What separates the columns of a CSV file.")]
+RecordedKind = Annotated[
+    Literal["friction", "cut"], typer.Option("--kind", help="What was recorded.")
+]
+Output = Annotated[Path | None, typer.Option(help="Write here, without a workspace.")]
+Files = Annotated[
+    list[Path], typer.Argument(dir_okay=False, help="Logs of one layout, or a camera's file.")
+]
+JointRecordedKind = Annotated[
+    Literal["friction", "cut"], typer.Option("--kind", help="What was recorded.")
+]
 Output = Annotated[Path | None, typer.Option(help="Write here, without a workspace.")]
 
 
 @command
+@options_of(TABLE)
 def import_(
     files: Files,
-    columns: Columns = None,
-    units: Units = None,
-    scales: Scales = None,
-    rate_Hz: RateHz = None,
+    table: TableOptions,
     joint: JointKind = None,
-    kind: Kind = "friction",
-    handle_radius_mm: HandleRadiusMm = None,
-    min_travel: MinTravel = None,
-    allow_gaps: AllowGaps = False,
-    drop_last_line: DropLastLine = True,
-    delimiter: Delimiter = None,
+    kind: RecordedKind = "friction",
     output: Output = None,
     folder: Folder = None,
 ) -> Answer:
@@ -102,8 +139,6 @@ def import_(
       fits/camera.nc: camera of 640 x 480 from left_intrinsics.yml (OpenCV)
       ...
     """
-    import math
-
     if len(files) == 1 and (
         files[0].suffix.lower() in _CAMERA_FILES or files[0].name in _CAMERA_NAMES
     ):
@@ -111,36 +146,23 @@ def import_(
     if output and len(files) > 1:
         raise InputError(f"--output names one file, and {len(files)} logs are given.")
 
-    from scissorcal.recording import Joint, import_table, write_recording
-    from scissorcal.recording.table import column_of
+    from scissorcal.recording import Joint, write_recording
 
     workspace = None if output else open_workspace(folder)
     rig = workspace.recipe().rig if workspace else None
-    radius_mm = handle_radius_mm if handle_radius_mm or not rig else rig.handle_radius_mm
-    chosen = {name: column_of(at) for name, at in pairs("column", columns)}
-    unit_of, scale_of = dict(pairs("unit", units)), dict(pairs("scale", scales))
+    if rig:
+        radius_mm = table.handle_radius_mm or rig.handle_radius_mm
+        table = replace(table, handle_radius_mm=radius_mm)
+    measured = tuple(table.channels)
 
     def import_one(file: Path) -> _Imported:
-        recording = import_table(
-            file,
-            columns=chosen,
-            units=unit_of,
-            scale=scale_of,
-            rate_Hz=rate_Hz,
-            joint=Joint(joint or (rig.joint if rig else "rotary")),
-            kind=kind,
-            handle_radius_m=radius_mm * 1e-3 if radius_mm else math.nan,
-            min_travel=min_travel,
-            allow_gaps=allow_gaps,
-            drop_last_line=drop_last_line,
-            delimiter=delimiter,
-        )
+        recording = table.read(file, Joint(joint or (rig.joint if rig else "rotary")), kind)
         target = output or (workspace.new_recording(kind) if workspace else None)
         assert target is not None
         path = write_recording(recording, target)
         shown = workspace.relative(path) if workspace else str(path)
         planned = rig.joint if rig else recording.joint.kind
-        return _Imported(recording, path, shown, planned, tuple(chosen))
+        return _Imported(recording, path, shown, planned, measured)
 
     if len(files) == 1:
         return _answer(import_one(files[0]))
@@ -165,17 +187,17 @@ def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]"
         for done, file in enumerate(files):
             tell(done / len(files), f"{file.name}")
             try:
-                one = import_one(file)
+                imported = import_one(file)
             except InputError as error:
                 refused.append(str(error))
                 continue
-            answer = _answer(one)
+            answer = _answer(imported)
             first, *_ = answer.text.splitlines()
             lines.append(f"{file.name}: {first}")
-            particular = (*one.recording.particular, *answer.result["survey"].notes)
+            particular = (*imported.recording.particular, *answer.result["survey"].notes)
             lines += [f"  note: {said}" for said in particular]
             facts.append(answer.result)
-            paths.append(one.path)
+            paths.append(imported.path)
     if refused:
         told = InputError(
             f"{len(refused)} of {len(files)} logs were not imported; the other {len(paths)} were:"
@@ -187,27 +209,27 @@ def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]"
     return Answer({"imported": facts}, "\n".join(lines), files=paths)
 
 
-def _answer(one: _Imported) -> Answer:
+def _answer(imported: _Imported) -> Answer:
     """What was imported; a note where the recipe plans for another joint than was recorded."""
     from scissorcal.calibration.signals.survey import survey
 
-    recording, joint = one.recording, one.recording.joint
+    recording, joint = imported.recording, imported.recording.joint
     notes = list(recording.notes)
-    if one.planned != joint.kind:
+    if imported.planned != joint.kind:
         notes.append(
-            f'The recipe has a {one.planned} joint: set joint = "{joint.kind}" in its '
+            f'The recipe has a {imported.planned} joint: set joint = "{joint.kind}" in its '
             f"[rig] to plan for a {joint.kind} one."
         )
-    found = survey(recording, one.measured)
-    notes += found.notes
+    sensors = survey(recording, imported.measured)
+    notes += sensors.notes
     lines = [
-        f"{one.shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
+        f"{imported.shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
         f"{len(recording.strokes)} strokes, {joint.kind} joint",
-        *survey_lines(found),
+        *survey_lines(sensors),
         *(f"note: {sentence}" for sentence in notes),
     ]
     result = {
-        "recording": one.path,
+        "recording": imported.path,
         "kind": recording.kind,
         "joint": joint.kind,
         "position_unit": joint.position_unit,
@@ -215,10 +237,10 @@ def _answer(one: _Imported) -> Answer:
         "samples": len(recording.samples),
         "duration_s": recording.duration_s,
         "strokes": recording.strokes,
-        "survey": found,
+        "survey": sensors,
         "notes": notes,
     }
-    return Answer(result, "\n".join(lines), files=[one.path])
+    return Answer(result, "\n".join(lines), files=[imported.path])
 
 
 def _import_camera(file: Path, folder: Path | None) -> Answer:

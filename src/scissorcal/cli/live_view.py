@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import typer
 
 from scissorcal.cli import questions
-from scissorcal.cli.output import is_interactive
+from scissorcal.cli.output import is_interactive, note
 from scissorcal.cli.progress import pace
 from scissorcal.cli.terminal import echo, printable
 from scissorcal.errors import InputError
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from scissorcal.device.coverage import CoveredAxis
     from scissorcal.device.recorder import Recorder
+    from scissorcal.device.session import Operator
     from scissorcal.recording.until import UntilMark
 
 _LINE_EVERY_S = 5.0
@@ -55,7 +56,14 @@ class LiveView:
     def __exit__(self, *_: object) -> None:
         self._stop()
 
-    def show(self, done: float, sentence: str, recorder: "Recorder | None" = None) -> None:
+    @property
+    def operator(self) -> "Operator":
+        """Asks, tells and shows to the person at the terminal."""
+        from scissorcal.device.session import Operator
+
+        return Operator(self.confirm, note, self.show, self.approach)
+
+    def show(self, done: float, sentence: str, recorder: "Recorder | None" = None, /) -> None:
         """Show the progress of the work at the rig, and what a capture recorded so far."""
         now = time.monotonic()
         if recorder is not None:
@@ -64,9 +72,9 @@ class LiveView:
             last, self._axis = recorder.last[0], recorder.axis
             place, effort = last[self._axis.channel], last[self._axis.effort]
             self._trace.append((self._axis.places * place, self._axis.efforts * effort))
-        every = _LINE_EVERY_S if self._live is None else _DRAW_EVERY_S
+        interval_s = _LINE_EVERY_S if self._live is None else _DRAW_EVERY_S
         finished = done >= 1.0 and not self._finished
-        if now - self._drawn_s < every and not finished:
+        if now - self._drawn_s < interval_s and not finished:
             return
         self._drawn_s, self._finished = now, done >= 1.0
         share = min(max(done, 0.0), 1.0)

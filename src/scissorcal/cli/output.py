@@ -10,7 +10,8 @@ import json
 import sys
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,7 @@ import typer
 
 from scissorcal.cli.failures import INTERRUPTED, UNEXPECTED, unexpected, user_error
 from scissorcal.cli.log import log_command
+from scissorcal.cli.options import gathered, parameters_of
 from scissorcal.cli.terminal import drawn, echo, kept, printable_json, style
 from scissorcal.verdicts import Verdict, failed
 from scissorcal.workday.envelope import Envelope, plain
@@ -60,28 +62,33 @@ class _Running:
     show_traceback: bool
     workspace: "Workspace | None" = None
     trace: str = ""
+    code: int = 0
+    answer: Answer = field(default_factory=lambda: Answer({}))
 
-    def run(self, function: Callable[..., Answer], options: dict[str, Any]) -> tuple[int, Answer]:
-        """Run a command's function; return its exit code and answer, errors turned into both."""
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """Run a command's function: afterwards its exit code and answer stand, of an error too."""
         try:
-            answer = function(**options)
+            yield
         except (typer.Abort, typer.Exit, typer.TyperException):
             raise
         except KeyboardInterrupt:
-            return INTERRUPTED, self._refuse("Interrupted.", INTERRUPTED)
+            self._refuse("Interrupted.", INTERRUPTED)
         except Exception as error:  # noqa: BLE001 - the last line of defence: a sentence, a code
             known = user_error(error, self.workspace.root if self.workspace else None)
             if self.show_traceback:
                 note(traceback.format_exc())
             if known:
-                return known.exit_code, self._refuse(str(known), known.exit_code, known.kept)
-            self.trace = traceback.format_exc()
-            return UNEXPECTED, self._refuse(unexpected(error), UNEXPECTED)
-        return VERDICT_FAILED if failed(tuple(answer.verdicts)) else 0, answer
+                self._refuse(str(known), known.exit_code, known.kept)
+            else:
+                self.trace = traceback.format_exc()
+                self._refuse(unexpected(error), UNEXPECTED)
+        else:
+            self.code = VERDICT_FAILED if failed(tuple(self.answer.verdicts)) else 0
 
-    def _refuse(self, sentence: str, code: int, kept: Sequence[Path] = ()) -> Answer:
+    def _refuse(self, sentence: str, code: int, kept: Sequence[Path] = ()) -> None:
         echo(f"{style('Error:', fg='red')} {sentence}", err=True)
-        return Answer({"error": sentence, "exit_code": code}, files=kept)
+        self.code, self.answer = code, Answer({"error": sentence, "exit_code": code}, files=kept)
 
 
 _running: ContextVar[_Running | None] = ContextVar("running", default=None)
@@ -106,9 +113,11 @@ def command(function: Callable[..., Answer]) -> Callable[..., None]:
         running = _Running(as_json, verbose, show_traceback)
         token = _running.set(running)
         try:
-            code, answer = running.run(function, options)
+            with running.watched():
+                running.answer = function(**gathered(function, options))
         finally:
             _running.reset(token)
+        code, answer = running.code, running.answer
         seconds = time.perf_counter() - began
         if running.workspace:
             words = context.find_root().obj or context.command_path.split()[1:]
@@ -127,9 +136,8 @@ def _with_shared_options(
 ) -> Callable[..., None]:
     """Give ``callback`` the parameters of ``function`` and those that every command has."""
     kind = inspect.Parameter.KEYWORD_ONLY
-    own = inspect.signature(function, eval_str=True).parameters.values()
     parameters = [inspect.Parameter("context", kind, annotation=typer.Context)]
-    parameters += [parameter.replace(kind=kind) for parameter in own]
+    parameters += [item.replace(kind=kind) for item in parameters_of(function)]
     parameters += [
         inspect.Parameter(name, kind, default=False, annotation=Annotated[bool, option])
         for name, option in _SHARED_OPTIONS.items()

@@ -1,40 +1,34 @@
 """``scissorcal predict``"""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Folder
+from scissorcal.cli.options import Folder, options_of
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
+from scissorcal.workday.options import PredictOptions
 
 if TYPE_CHECKING:
     from scissorcal.calibration.friction.predict import Band
     from scissorcal.workday.runs.predict import PredictionOutcome
 
 
+_OPTIONS = {
+    "what": typer.Argument(help="What to predict."),
+    "motion": typer.Argument(dir_okay=False, help="A recording, or a table of the motion."),
+    "level": typer.Option(
+        min=0.5, max=0.99, help="Probability with which a measured sample lies in the band."
+    ),
+    "table": typer.Option(dir_okay=False, help="Write a table here (.csv)."),
+    "plot": typer.Option(dir_okay=False, help="Draw it here (.svg or .png)."),
+}
+
+
 @command
-def predict(
-    what: Annotated[Literal["friction", "load"], typer.Argument(help="What to predict.")],
-    motion: Annotated[
-        Path, typer.Argument(dir_okay=False, help="A recording, or a table of the motion.")
-    ],
-    level: Annotated[
-        float,
-        typer.Option(
-            min=0.5, max=0.99, help="Probability with which a measured sample lies in the band."
-        ),
-    ] = 0.9,
-    table: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="Write a table here (.csv).")
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="Draw it here (.svg or .png).")
-    ] = None,
-    folder: Folder = None,
-) -> Answer:
+@options_of(_OPTIONS)
+def predict(options: PredictOptions, folder: Folder = None) -> Answer:
     """Predict the effort of MOTION from the friction fit, with a band for measured samples.
 
     friction: the effort that drives the empty joint through MOTION. load: the load at the far end
@@ -59,15 +53,8 @@ def predict(
     from scissorcal.workday.runs.predict import predict_workspace
 
     with progress() as tell:
-        outcome = predict_workspace(
-            open_workspace(folder),
-            what,
-            motion,
-            level=level,
-            table=table,
-            plot=plot,
-            progress=tell,
-        )
+        outcome = predict_workspace(open_workspace(folder), options, tell)
+    what = options.what
     return Answer(_facts(what, outcome), _text(what, outcome), files=outcome.files)
 
 

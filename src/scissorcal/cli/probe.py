@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from scissorcal.cli.options import Baud, Device, Folder, Realtime, Seed, Yes
+from scissorcal.cli.options import RIG, Folder, Yes, options_of
 from scissorcal.cli.output import Answer, command, note, table
+from scissorcal.workday.options import RigOptions
 
 if TYPE_CHECKING:
     from scissorcal.device.probe.result import ProbeResult
@@ -24,18 +25,16 @@ _FACTS = (
 
 
 @command
+@options_of(RIG)
 def probe(
-    device: Device,
+    rig: RigOptions,
     recipe: Annotated[
         Path | None,
         typer.Option(
             "--recipe", dir_okay=False, help="A recipe file, where there is no workspace."
         ),
     ] = None,
-    realtime: Realtime = False,
     yes: Yes = False,
-    seed: Seed = 0,
-    baud: Baud = None,
     folder: Folder = None,
 ) -> Answer:
     """Check a rig before its motors run: line, sensors, watchdog, signs, delay, inertia, friction.
@@ -62,16 +61,7 @@ def probe(
     given = workspace.recipe() if workspace else load_recipe(recipe or Path())
     try:
         with LiveView(ask=not yes) as view:
-            result = probe_device(
-                given,
-                device,
-                workspace=workspace,
-                seed=seed,
-                baud=baud,
-                realtime=realtime,
-                progress=view.show,
-                confirm=view.confirm,
-            )
+            result = probe_device(given, rig, view.operator, workspace=workspace)
     except ProbeRefusedError as error:
         note(_text(error.result))
         raise
@@ -86,9 +76,9 @@ def _text(result: "ProbeResult") -> str:
 
     rows = [["", "estimate", "sd", ""]]
     for label, name, scale, unit in ESTIMATES:
-        found = getattr(result, name)
-        if found is not None:
-            rows.append([label, f"{scale * found.mean:.4g}", f"{scale * found.sd:.2g}", unit])
+        estimate = getattr(result, name)
+        if estimate is not None:
+            rows.append([label, f"{scale * estimate.mean:.4g}", f"{scale * estimate.sd:.2g}", unit])
     facts = result.facts
     for label, name, scale, unit in _FACTS:
         if math.isfinite(facts.get(name, math.nan)):

@@ -2,77 +2,64 @@
 
 import math
 from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import (
-    Baud,
-    Device,
+    NO_RECORD,
+    PLATE_CAMERA,
+    RIG,
+    TRUSTED_KEY,
     Folder,
-    PlateCamera,
-    Realtime,
-    Seed,
-    TrustedKey,
     Yes,
+    options_of,
     positive,
 )
 from scissorcal.cli.output import Answer, command, note, table
 from scissorcal.cli.tracked import tracked_facts
+from scissorcal.workday.options import RenderOptions, RigOptions
 
 if TYPE_CHECKING:
-    from scissorcal.workday.runs.render import Rendered
+    from scissorcal.render import RenderResult
+    from scissorcal.workday.runs.at_rig import RigRun
+
+
+_OPTIONS = {
+    "package_path": typer.Option(
+        "--package", help="The package to render; the workspace's if not given."
+    ),
+    "seconds": typer.Option(callback=positive, help="How long to render, by the rig's clock."),
+    "strokes": typer.Option(min=1, help="Strokes of the virtual hand."),
+    "rate_rad_per_s": typer.Option(callback=positive, help="Speed of the virtual hand."),
+    "camera": PLATE_CAMERA,
+    "taps_s": typer.Option(
+        "--taps",
+        min=0.0,
+        metavar="SECONDS",
+        help="Before rendering, with the motors off: tap the plate with the blade's tip, at "
+        "several places, so that contact tells its height.",
+    ),
+    "accept_derated": typer.Option(
+        "--accept-derated",
+        help="Render although what is felt differs from the package by more than the scene's "
+        "tolerance; result and recording state that a person accepted it.",
+    ),
+    "allow_mismatch": typer.Option(
+        "--allow-mismatch",
+        help="Render a package of another rig (radius, joint, limits, serial number) or a "
+        "stale one; what differs is said and recorded.",
+    ),
+    "trusted_key": TRUSTED_KEY,
+    "no_record": NO_RECORD,
+}
 
 
 @command
+@options_of({**RIG, **_OPTIONS})
 def render(
-    device: Device,
-    package_path: Annotated[
-        Path | None,
-        typer.Option("--package", help="The package to render; the workspace's if not given."),
-    ] = None,
-    seconds: Annotated[
-        float, typer.Option(callback=positive, help="How long to render, by the rig's clock.")
-    ] = 30.0,
-    strokes: Annotated[int, typer.Option(min=1, help="Strokes of the virtual hand.")] = 4,
-    rate_rad_per_s: Annotated[
-        float, typer.Option(callback=positive, help="Speed of the virtual hand.")
-    ] = 0.3,
-    camera: PlateCamera = "none",
-    taps: Annotated[
-        float,
-        typer.Option(
-            min=0.0,
-            metavar="SECONDS",
-            help="Before rendering, with the motors off: tap the plate with the blade's tip, at "
-            "several places, so that contact tells its height.",
-        ),
-    ] = 0.0,
-    accept_derated: Annotated[
-        bool,
-        typer.Option(
-            "--accept-derated",
-            help="Render although what is felt differs from the package by more than the scene's "
-            "tolerance; result and recording state that a person accepted it.",
-        ),
-    ] = False,
-    allow_mismatch: Annotated[
-        bool,
-        typer.Option(
-            "--allow-mismatch",
-            help="Render a package of another rig (radius, joint, limits, serial number) or a "
-            "stale one; what differs is said and recorded.",
-        ),
-    ] = False,
-    trusted_key: TrustedKey = None,
-    no_record: Annotated[bool, typer.Option("--no-record", help="Keep no recording.")] = False,
-    realtime: Realtime = False,
-    yes: Yes = False,
-    seed: Seed = 0,
-    baud: Baud = None,
-    folder: Folder = None,
+    rig: RigOptions, options: RenderOptions, yes: Yes = False, folder: Folder = None
 ) -> Answer:
     """Render the cut on a rig: hold the handles and close them.
 
@@ -90,37 +77,13 @@ def render(
       ...
     """
     from scissorcal.cli.live_view import LiveView
-    from scissorcal.package.keys import read_public_keys
-    from scissorcal.render import VirtualStrokes
-    from scissorcal.workday.runs.render import (
-        package_warnings,
-        render_workspace,
-    )
+    from scissorcal.workday.runs.render import package_warnings, render_workspace
 
     workspace = open_workspace(folder)
-    trusted = read_public_keys(trusted_key) if trusted_key else None
-    for sentence in package_warnings(workspace, package_path):
+    for sentence in package_warnings(workspace, options.package_path):
         note(sentence)
     with LiveView(ask=not yes) as view:
-        rendered = render_workspace(
-            workspace,
-            device,
-            package_path=package_path,
-            seconds=seconds,
-            strokes=VirtualStrokes(strokes, rate_rad_per_s),
-            record=not no_record,
-            seed=seed,
-            baud=baud,
-            realtime=realtime,
-            progress=view.show,
-            confirm=view.confirm,
-            say=note,
-            camera=camera,
-            taps_s=taps,
-            accept_derated=accept_derated,
-            allow_mismatch=allow_mismatch,
-            trusted=trusted,
-        )
+        rendered = render_workspace(workspace, rig, options, view.operator)
     result = asdict(rendered.result)
     verdicts = rendered.result.verdicts
     if rendered.tracked:
@@ -131,7 +94,7 @@ def render(
     return Answer({**result, **facts}, _text(rendered), verdicts, files)
 
 
-def _text(rendered: "Rendered") -> str:
+def _text(rendered: "RigRun[RenderResult]") -> str:
     result = rendered.result
     lines = [f"rendered {result.strokes} strokes in {result.seconds:.1f} s on {rendered.rig}"]
     if result.latency is not None:

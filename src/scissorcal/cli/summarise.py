@@ -1,21 +1,13 @@
 """``scissorcal summarise``"""
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from scissorcal.cli.import_ import (
-    AllowGaps,
-    Columns,
-    Delimiter,
-    DropLastLine,
-    MinTravel,
-    RateHz,
-    Scales,
-    Units,
-    pairs,
-)
+from scissorcal.cli.import_ import TABLE, TableOptions
+from scissorcal.cli.options import options_of
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.survey import survey_lines
 from scissorcal.errors import InputError
@@ -26,34 +18,38 @@ if TYPE_CHECKING:
 
 _HAND: "Effort" = "handle_force"
 
-RadiusMm = Annotated[
-    float | None,
-    typer.Option(help="Lever of handle_force: with it the force is a torque, and has work."),
-]
+
+@dataclass(frozen=True)
+class Logs:
+    """The log that is summed up, and a second one that is subtracted or compared with."""
+
+    log: Path
+    blank: Path | None = None
+    compare: Path | None = None
+
+    @property
+    def second(self) -> Path | None:
+        """The second log."""
+        return self.blank or self.compare
+
+
+_LOGS = {
+    "log": typer.Argument(dir_okay=False, help="A log, or a recording (.mcap)."),
+    "blank": typer.Option(dir_okay=False, help="A log of empty strokes, to subtract."),
+    "compare": typer.Option(dir_okay=False, help="Another log, to compare with."),
+}
+_RADIUS = typer.Option(help="Lever of handle_force: with it the force is a torque, and has work.")
 
 
 @command
+@options_of({**_LOGS, **TABLE, "handle_radius_mm": _RADIUS})
 def summarise(
-    log: Annotated[Path, typer.Argument(dir_okay=False, help="A log, or a recording (.mcap).")],
-    blank: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="A log of empty strokes, to subtract.")
-    ] = None,
-    compare: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="Another log, to compare with.")
-    ] = None,
-    columns: Columns = None,
-    units: Units = None,
-    scales: Scales = None,
-    rate_Hz: RateHz = None,
+    logs: Logs,
+    table: TableOptions,
     joint: Annotated[Literal["rotary", "linear"], typer.Option(help="Kind of joint.")] = "rotary",
-    handle_radius_mm: RadiusMm = None,
     cut_length_mm: Annotated[
         float | None, typer.Option(min=0.001, help="Length that one closing stroke cuts.")
     ] = None,
-    min_travel: MinTravel = None,
-    allow_gaps: AllowGaps = False,
-    drop_last_line: DropLastLine = True,
-    delimiter: Delimiter = None,
     output: Annotated[Path, typer.Option(dir_okay=False, help="The page.")] = Path("summary.html"),
 ) -> Answer:
     """Sum up force or torque over angle: curves by direction, work, plateau, slope, friction.
@@ -70,8 +66,6 @@ def summarise(
       ...
       summary.html
     """
-    import math
-    from dataclasses import replace
     from datetime import UTC, datetime
 
     import numpy as np
@@ -96,9 +90,8 @@ def summarise(
     from scissorcal.report.summary import Shown, summary_page, summary_panels
     from scissorcal.report.text import panels_text
 
-    _refuse(log, blank, compare, joint, handle_radius_mm, output)
-    chosen = {name: column_of(at) for name, at in pairs("column", columns)}
-    unit_of, scale_of = dict(pairs("unit", units)), dict(pairs("scale", scales))
+    _refuse(logs, table, joint, output)
+    channels = table.channels
 
     def read(path: Path) -> "tuple[Recording, Effort]":
         if path.suffix == ".mcap":
@@ -106,30 +99,17 @@ def summarise(
             effort: Effort = "motor_torque" if recording.samples["motor_torque"].any() else _HAND
             return recording, effort
         refuse_no_table(path)
-        if not {"motor_torque", "handle_force"} & set(chosen):
+        if not {"motor_torque", "handle_force"} & set(channels):
             raise InputError(
                 f"{path}: no column is given for the force or torque. Name it with "
                 "-c handle_force=COLUMN or -c motor_torque=COLUMN."
             )
-        recording = import_table(
-            path,
-            columns=chosen,
-            units=unit_of,
-            scale=scale_of,
-            rate_Hz=rate_Hz,
-            joint=Joint(joint),
-            handle_radius_m=handle_radius_mm * 1e-3 if handle_radius_mm else math.nan,
-            min_travel=min_travel,
-            allow_gaps=allow_gaps,
-            drop_last_line=drop_last_line,
-            delimiter=delimiter,
-            motion_only=True,
-        )
+        recording = table.read(path, Joint(joint), motion_only=True)
         # A page that is passed on tells nothing of the disk.
         named = replace(recording, source=path.name)
-        return named, _HAND if _HAND in chosen else "motor_torque"
+        return named, _HAND if _HAND in channels else "motor_torque"
 
-    second_path = blank or compare
+    log, blank, second_path = logs.log, logs.blank, logs.second
     recording, effort = read(log)
     second, second_effort = read(second_path) if second_path else (None, effort)
     unit = effort_unit(recording, effort)
@@ -143,21 +123,21 @@ def summarise(
             f"{log} is in {unit} and {second_path} in {effort_unit(second, second_effort)}: "
             "compare logs of one quantity (--handle-radius-mm makes a force a torque)."
         )
-    logs = [(recording, effort), *([(second, second_effort)] if second is not None else [])]
-    places = common_places([one for one, _ in logs])
-    found, *rest = sum_up(logs, places)
+    pair = [(recording, effort), *([(second, second_effort)] if second is not None else [])]
+    places = common_places([one for one, _ in pair])
+    found, *rest = sum_up(pair, places)
     other = rest[0] if rest else None
-    surveys = [survey(one, ("opening", used)) for one, used in logs]
+    surveys = [survey(one, ("opening", used)) for one, used in pair]
     notes = tuple(
         f"{one.source}: {said}"
-        for (one, _), seen in zip(logs, surveys, strict=True)
+        for (one, _), seen in zip(pair, surveys, strict=True)
         for said in (*_said(one), *seen.notes)
     )
     rng = np.random.default_rng(0)  # one log gives one page
     shown = Shown(
         log=found,
         second=other,
-        against="blank" if blank else "other" if compare else "",
+        against="blank" if blank else "other" if logs.compare else "",
         apart=difference(found, other, rng) if other else None,
         plateau=plateau_in(found, rng),
         slope=slope_in(found),
@@ -175,12 +155,12 @@ def summarise(
         part.write_text(page, encoding="utf-8")
     seen = [
         line
-        for (one, _), look in zip(logs, surveys, strict=True)
+        for (one, _), look in zip(pair, surveys, strict=True)
         for line in (f"Sensors in {one.source}", *survey_lines(look), "")
     ]
     text = "\n".join([panels_text(panels), "", *seen])
     looks = [
-        {"log": one.source, "survey": look} for (one, _), look in zip(logs, surveys, strict=True)
+        {"log": one.source, "survey": look} for (one, _), look in zip(pair, surveys, strict=True)
     ]
     result = {"panels": panels, "notes": notes, "surveys": looks}
     return Answer(result, f"{text}{output}", files=[output])
@@ -192,16 +172,10 @@ def _said(recording: "Recording") -> tuple[str, ...]:
     return recording.notes[1:] if imported else recording.notes
 
 
-def _refuse(
-    log: Path,
-    blank: Path | None,
-    compare: Path | None,
-    joint: str,
-    handle_radius_mm: float | None,
-    output: Path,
-) -> None:
+def _refuse(logs: Logs, table: TableOptions, joint: str, output: Path) -> None:
     """Raise InputError for options that contradict each other."""
-    if blank and compare:
+    handle_radius_mm = table.handle_radius_mm
+    if logs.blank and logs.compare:
         raise InputError("Give --blank or --compare, not both.")
     if handle_radius_mm is not None and not 0.0 < handle_radius_mm < float("inf"):
         raise InputError(
@@ -211,7 +185,7 @@ def _refuse(
         raise InputError(
             "A linear joint has no lever: leave --handle-radius-mm out, or give --joint rotary."
         )
-    for path in (log, blank, compare):
+    for path in (logs.log, logs.blank, logs.compare):
         if path is not None and path.exists() and output.exists() and output.samefile(path):
             raise InputError(f"--output {output} is a log that is read: name another file.")
     if output.suffix.lower() not in (".html", ".htm"):

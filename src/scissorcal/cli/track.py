@@ -2,14 +2,15 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Baud, Folder, Seed, positive
+from scissorcal.cli.options import RIG, Folder, options_of, positive
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.pose_lines import pose_lines
+from scissorcal.workday.options import TrackOptions
 
 if TYPE_CHECKING:
     from scissorcal.workday.runs.track import TrackResult
@@ -24,40 +25,31 @@ _RESTS = {
 """What a pose rests on, by the track's state."""
 
 
+_OPTIONS = {
+    "camera": typer.Option(
+        "--camera",
+        metavar="NUMBER|VIDEO|sim|none",
+        help="A camera by its number, a video file, a track's recording (followed again by the "
+        "recipe as it is now), sim: a rendered plate, or none.",
+    ),
+    "device": typer.Option(
+        "--device",
+        metavar="PORT|sim|none",
+        help="Serial port of the rig whose blade's tip touches the plate, sim, or none.",
+    ),
+    "seconds": typer.Option(callback=positive, help="Stop after this time; Ctrl-C stops sooner."),
+    "camera_delay_ms": typer.Option(
+        metavar="MS",
+        help="From a picture's exposure to its soonest arrival, in place of the recipe's.",
+    ),
+    "seed": RIG["seed"],
+    "baud": RIG["baud"],
+}
+
+
 @command
-def track(
-    camera: Annotated[
-        str,
-        typer.Option(
-            "--camera",
-            metavar="NUMBER|VIDEO|sim|none",
-            help="A camera by its number, a video file, a track's recording (followed again by the "
-            "recipe as it is now), sim: a rendered plate, or none.",
-        ),
-    ] = "none",
-    device: Annotated[
-        str,
-        typer.Option(
-            "--device",
-            metavar="PORT|sim|none",
-            help="Serial port of the rig whose blade's tip touches the plate, sim, or none.",
-        ),
-    ] = "none",
-    seconds: Annotated[
-        float | None,
-        typer.Option(callback=positive, help="Stop after this time; Ctrl-C stops sooner."),
-    ] = None,
-    camera_delay_ms: Annotated[
-        float | None,
-        typer.Option(
-            metavar="MS",
-            help="From a picture's exposure to its soonest arrival, in place of the recipe's.",
-        ),
-    ] = None,
-    seed: Seed = 0,
-    baud: Baud = None,
-    folder: Folder = None,
-) -> Answer:
+@options_of(_OPTIONS)
+def track(options: TrackOptions, folder: Folder = None) -> Answer:
     """Follow the plate's pose by a camera, by contacts of the blade's tip, or by both.
 
     Needs the camera's fit, and with a rig photographs of the rig card. The rig's motors are off:
@@ -77,21 +69,12 @@ def track(
     from scissorcal.workday.runs.track import track_plate
 
     workspace = open_workspace(folder)
-    with TrackView(seconds) as view:
-        done = track_plate(
-            workspace,
-            camera,
-            device,
-            seconds=seconds,
-            camera_delay_ms=camera_delay_ms,
-            seed=seed,
-            baud=baud,
-            tell=view.show,
-        )
+    with TrackView(options.seconds) as view:
+        done = track_plate(workspace, options, view.show)
     angles = done.pose.euler_angles
     result = {**asdict(done), "euler_angles": angles, "drop_outs": done.drop_outs}
     del result["verdicts"]
-    name = workspace.relative(done.path) if done.path else Path(camera).name
+    name = workspace.relative(done.path) if done.path else Path(options.camera).name
     files = (done.path,) if done.path else ()
     return Answer(result, f"{name}: {_text(done)}", done.verdicts, files)
 

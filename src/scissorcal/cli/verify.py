@@ -1,14 +1,16 @@
 """``scissorcal verify``"""
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from scissorcal.cli.opening import writes_in
-from scissorcal.cli.options import Axis, Folder, Seed
+from scissorcal.cli.options import RIG, Axis, Folder, options_of
 from scissorcal.cli.output import Answer, command, note, table
 from scissorcal.cli.progress import progress
 from scissorcal.errors import InputError
+from scissorcal.workday.options import VerifySettings
 
 if TYPE_CHECKING:
     from scissorcal.calibration.verify.result import (
@@ -25,50 +27,46 @@ _ALL_CHECKS = ",".join(_CHECKS)
 
 
 What = Annotated[Literal["friction", "cut", "all"], typer.Argument(help="The fit to check.")]
-Fits = Annotated[
-    int,
-    typer.Option(
+Checks = Annotated[str, typer.Option(help="Which checks to make, separated by commas.")]
+_SETTINGS = {
+    "fits": typer.Option(
         min=1,
         help="Fits to simulated data: 100 detect intervals too narrow by a factor of 1.5 in 2 of "
         "3 cases and by 2 always, 200 by 1.5 in 98 of 100.",
     ),
-]
-Checks = Annotated[str, typer.Option(help="Which checks to make, separated by commas.")]
-Prior = Annotated[
-    Literal["local", "recipe"],
-    typer.Option(
+    "prior": typer.Option(
         help="What simulated truths are drawn from: around the posterior, or from the "
         "recipe's prior."
     ),
-]
-Spread = Annotated[
-    float, typer.Option(min=1.0, help="Width of the local prior, in posterior widths.")
-]
-Workers = Annotated[
-    int | None,
-    typer.Option(min=1, help="Processes to fit in; one for each core if not given."),
-]
-Cluster = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS",
-        help="Scheduler of a dask.distributed cluster to fit on, such as tcp://host:8786; it can "
-        "run programs as you (docs/cluster.md).",
-    ),
-]
+    "spread": typer.Option(min=1.0, help="Width of the local prior, in posterior widths."),
+    "seed": RIG["seed"],
+}
+
+
+@dataclass(frozen=True)
+class Processes:
+    """Where work is done: in ``workers`` processes of this computer, or on a ``cluster``."""
+
+    workers: int | None = None
+    cluster: str | None = None
+
+
+CLUSTER = typer.Option(
+    metavar="ADDRESS",
+    help="Scheduler of a dask.distributed cluster to fit on, such as tcp://host:8786; it can "
+    "run programs as you (docs/cluster.md).",
+)
+_WORKERS = typer.Option(min=1, help="Processes to fit in; one for each core if not given.")
 
 
 @command
+@options_of({**_SETTINGS, "workers": _WORKERS, "cluster": CLUSTER})
 def verify(
+    settings: VerifySettings,
+    processes: Processes,
     what: What = "all",
     axis: Axis = "opening",
-    fits: Fits = 100,
     checks: Checks = _ALL_CHECKS,
-    prior: Prior = "local",
-    spread: Spread = 3.0,
-    workers: Workers = None,
-    cluster: Cluster = None,
-    seed: Seed = 0,
     folder: Folder = None,
 ) -> Answer:
     """Check whether a fit's intervals mean what they say.
@@ -98,8 +96,9 @@ def verify(
     width: factor by which intervals are too narrow (above 1) or too wide; shift: their offset from
     the truth; p: probability of such ranks if the intervals are right.
     """
-    from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
+    from scissorcal.workday.runs.verify import verify_workspace
 
+    workers, cluster = processes.workers, processes.cluster
     if workers is not None and cluster is not None:
         raise InputError("Give --workers or --cluster, not both: a cluster brings its workers.")
     if axis == "advance" and what != "friction":
@@ -108,9 +107,7 @@ def verify(
         )
     kind: FitKind | Literal["all"] = "friction-advance" if axis == "advance" else what
     wanted: tuple[FitKind, ...] = () if kind == "all" else (kind,)
-    settings = VerifySettings(
-        checks=_checks(checks), fits=fits, prior=prior, spread=spread, seed=seed
-    )
+    settings = replace(settings, checks=_checks(checks))
     with writes_in(folder, "scissorcal verify") as workspace, progress() as tell:
         outcomes = verify_workspace(
             workspace, wanted, settings, workers=workers, cluster=cluster, progress=tell

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.aliases import Progress
 from scissorcal.control.contours import Foot, contour_at, foot_of
 from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.path_file import SurfacePoints
@@ -27,19 +26,17 @@ from scissorcal.control.surface_path import (
 )
 from scissorcal.device.capture import servo_config
 from scissorcal.device.capture_gains import Probed, capture_gains
-from scissorcal.device.link import Link
-from scissorcal.device.loading import Confirm, is_simulator
+from scissorcal.device.loading import is_simulator
 from scissorcal.device.lockstep_motion import Exchanging
-from scissorcal.device.motion import Motion, Samples
+from scissorcal.device.motion import LoopTask, Motion, Samples
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder, Reference
+from scissorcal.device.session import RigSession
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import CONTROL_DTYPE, ConfigKey, ControlFlag
 from scissorcal.model.surface import Surface
 from scissorcal.recipe.pace import APPROACH_SPEED, TURN_ACCELERATION
-from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import RecordingWriter
-from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult
 from scissorcal.recording.telemetry import CONTROL
 from scissorcal.tracking.plate_pose import PlatePose, PoseSource
 
@@ -71,15 +68,7 @@ class Job:
 
 
 def control(
-    link: Link,
-    recipe: Recipe,
-    rig: RigMechanics,
-    job: Job,
-    *,
-    writer: RecordingWriter | None = None,
-    progress: Progress | None = None,
-    confirm: Confirm | None = None,
-    probe: ProbeResult | None = None,
+    session: RigSession, rig: RigMechanics, job: Job, writer: RecordingWriter | None = None
 ) -> ControlResult:
     """Press along the plate's normal and follow a path on its surface, with both axes of the rig.
 
@@ -87,51 +76,45 @@ def control(
     presses; then it is lifted. The inner loop runs in C (docs/control.md); here the pose source is
     asked about 100 times a second, and what follows from it goes to the servo: without a pose the
     tip is lifted, the path waits, and after 2 s the run ends. On a simulator the specimen's plate
-    is put in; elsewhere ``confirm`` asks a person for it, unless the job says that it is tracked in
+    is put in; elsewhere a person is asked for it, unless the job says that it is tracked in
     its place. ``writer`` records samples and telemetry.
 
     Raises InputError, before anything moves, for a path, force or stiffness that cannot be had, and
     where nobody can be asked; DeviceError where no pose comes, where a tracked one is lost before
     the tip is lowered, or the rig fails. The motors are released in any case.
     """
-    identity = link.identity
+    link, recipe, identity = session.link, session.recipe, session.identity
     if not job.tracked:
-        refuse_nobody(identity, confirm)
+        refuse_nobody(session)
     # Stiff ones, without material: sweeps of friction give up stiffness for damping. By the mean of
     # the delay, as the gains of contact are (decision 136).
-    probed = Probed.of(probe)
+    probed = Probed.of(session.probe)
     probed = None if probed is None else replace(probed, delay_sd_s=0.0)
     gains = capture_gains(recipe, identity, "friction-advance", probed)
-    tell = progress or _silent
     now_s = link.virtual_time if isinstance(link, Exchanging) else time.monotonic()
     pose = _pose_now(job.source, now_s, "nothing was moved")
     contour = map_contour(job.points, job.surface, pose, job.length_m)
     path = time_path(job.points, contour, identity.tick_us * 1e-6)
     settings = control_settings(
-        rig, identity, recipe.limits, job.material, contour, path, gains.rate_cutoff_Hz
+        rig, identity, recipe.limits, job.material, path, gains.rate_cutoff_Hz
     )
     seconds = len(path.place) * identity.tick_us * 1e-6
-    config = servo_config(recipe, identity, seconds, gains, probe.rest if probe else UNKNOWN_REST)
+    config = servo_config(recipe, identity, seconds, gains, session.rest)
     watch = replace(config.watch, rest_torque=0.0)  # pressing blades rest under any torque
     config = replace(config, watch=watch, supervisor_ms=200)
-    run = _Run(job, rig, contour, path, settings, writer, tell)
-    with open_motion(
-        link,
-        config,
-        longest_reference=len(path.place),
-        every_s=EVERY_S,
-        control=settings.config,
-    ) as motion:
+    run = _Run(session, rig, job, path, settings, writer)
+    task = LoopTask(control=settings.config, longest_reference=len(path.place))
+    with open_motion(link, config, task, every_s=EVERY_S) as motion:
         start = start_foot(job.points, contour, job.surface, pose)
         _prepare(motion, rig, run)
         _move_over(motion, rig, contour, start, run)
-        if job.tracked and not is_simulator(identity):
+        if job.tracked and not session.simulated:
             start = _start_again(motion, rig, run)
         else:
-            put_plate(motion, confirm)
+            put_plate(motion, session.operator.confirm)
         _lower(motion, rig, start, run)
         run.follow(motion)
-        if is_simulator(identity):
+        if session.simulated:
             motion.configure(ConfigKey.MATERIAL, 0.0)
         report = motion.report()
     figures = control_figures(
@@ -155,17 +138,16 @@ class _Run:
 
     def __init__(
         self,
-        job: Job,
+        session: RigSession,
         rig: RigMechanics,
-        contour: ContourMap,
+        job: Job,
         path: TimedPath,
         settings: Settings,
         writer: RecordingWriter | None,
-        tell: Progress,
     ) -> None:
-        self.job, self._rig, self._contour, self._path = job, rig, contour, path
+        self.job, self._rig, self._contour, self._path = job, rig, path.contour, path
         self._settings = settings
-        self._writer, self._tell = writer, tell
+        self._writer, self._tell = writer, session.operator.progress
         self._rows: list[NDArray[np.void]] = []
         self._clock = 0, 0
         self.share = 1.0
@@ -363,7 +345,3 @@ def _refuse_held(samples: Samples, rig: RigMechanics) -> None:
             "presses, since the force at the tip is known from the motor's torque alone. Let go, "
             "and start again; a sensor that has no zero is shown by 'scissorcal device probe'."
         )
-
-
-def _silent(done: float, sentence: str) -> None:
-    pass

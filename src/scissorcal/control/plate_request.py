@@ -2,8 +2,9 @@
 
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import Motion
+from scissorcal.device.session import RigSession
 from scissorcal.errors import InputError
-from scissorcal.kernel import ConfigKey, Identity
+from scissorcal.kernel import ConfigKey
 
 PLATE = 2.0
 """MATERIAL that puts a virtual rig's plate in."""
@@ -17,15 +18,15 @@ REQUEST = (
 )
 
 
-def ask_for_plate(identity: Identity, confirm: Confirm | None) -> None:
+def ask_for_plate(session: RigSession) -> None:
     """Have a person put the plate in before a camera looks for it; a simulator does so by itself.
 
     Nothing moves meanwhile. InputError where nobody can be asked.
     """
-    refuse_nobody(identity, confirm)
-    if not is_simulator(identity):
-        assert confirm is not None
-        confirm(REQUEST_FIRST)
+    refuse_nobody(session)
+    if not session.simulated:
+        assert session.operator.confirm is not None
+        session.operator.confirm(REQUEST_FIRST)
 
 
 def put_plate(motion: Motion, confirm: Confirm | None) -> None:
@@ -38,9 +39,9 @@ def put_plate(motion: Motion, confirm: Confirm | None) -> None:
         confirm(REQUEST)
 
 
-def refuse_nobody(identity: Identity, confirm: Confirm | None) -> None:
+def refuse_nobody(session: RigSession) -> None:
     """InputError where a person must be asked, and none can be."""
-    if not is_simulator(identity) and confirm is None:
+    if not session.simulated and session.operator.confirm is None:
         raise InputError(
             "A person must be asked to put the plate in its place: pass a confirm callback that "
             "shows a sentence and returns when that is done."

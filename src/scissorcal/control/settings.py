@@ -15,7 +15,7 @@ from scissorcal.control.mechanics import (
     axis_friction,
     contact_loop,
 )
-from scissorcal.control.surface_path import ContourMap, TimedPath
+from scissorcal.control.surface_path import TimedPath
 from scissorcal.errors import InputError
 from scissorcal.kernel import ControlConfig, HybridConfig, Identity
 from scissorcal.recipe.schema import Limits
@@ -66,7 +66,6 @@ def control_settings(
     identity: Identity,
     limits: Limits,
     material: Material,
-    contour: ContourMap,
     path: TimedPath,
     rate_cutoff_Hz: float,
 ) -> Settings:
@@ -75,6 +74,7 @@ def control_settings(
     Refused are places that the blades or the sledge do not reach, where a force has no lever on the
     opening, forces beyond what the motors may give, and stiffness at which no gain is stable.
     """
+    contour = path.contour
     torque_limit = min(limits.torque_Nm, identity.torque_limit)
     force_limit = min(limits.force_N, identity.force_limit)
     largest = float(path.force.max())
@@ -199,7 +199,7 @@ def _presliding(rig: RigMechanics, identity: Identity) -> float:
 
 def _reached(rig: RigMechanics, identity: Identity, foot: Foot, x: float) -> float:
     """Opening at a foot; InputError where tip or sledge do not come there, above it and below."""
-    found = []
+    openings = []
     lifted, lower = LIFT_M + AWAY_M, -AWAY_M
     for doing, beyond in (
         ("touching it", 0.0),
@@ -220,15 +220,15 @@ def _reached(rig: RigMechanics, identity: Identity, foot: Foot, x: float) -> flo
                 f"At x = {1e3 * x:.1f} mm the surface is {1e3 * foot.point[1]:.1f} mm above the "
                 f"pivot, and {doing} takes {takes}. Move the plate, or shorten the path."
             )
-        found.append(opening)
-    advance = rig.advance_at(foot.point[0], found[0])
+        openings.append(opening)
+    advance = rig.advance_at(foot.point[0], openings[0])
     low, high = identity.advance_min + ADVANCE_MARGIN_M, identity.advance_max - ADVANCE_MARGIN_M
     if not low <= advance <= high:
         raise InputError(
             f"At x = {1e3 * x:.1f} mm the sledge would stand at {1e3 * advance:.1f} mm: it moves "
             f"from {1e3 * low:.1f} to {1e3 * high:.1f} mm. Move the plate, or shorten the path."
         )
-    return found[0]
+    return openings[0]
 
 
 def _refuse_lever(rig: RigMechanics, foot: Foot, x: float, opening: float) -> None:

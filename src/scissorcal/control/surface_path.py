@@ -55,7 +55,8 @@ class TimedPath:
     """What CONTROL follows, one entry each tick: arrays (n,).
 
     ``place`` (m) and ``rate`` (m/s) along the contour, ``force`` (N) in the rig's plane, ``stage``
-    the index of the point that is passed next. ``way`` is the length of it all, in m.
+    the index of the point that is passed next. ``way`` is the length of it all, in m, ``contour``
+    what it lies on.
     """
 
     place: Array
@@ -63,6 +64,7 @@ class TimedPath:
     force: Array
     stage: NDArray[np.int32]
     way: float
+    contour: ContourMap
 
 
 def map_contour(
@@ -133,7 +135,7 @@ def time_path(points: SurfacePoints, contour: ContourMap, tick_s: float) -> Time
     walked = way[-1] * (walked / walked[-1])  # ends at way[-1] exactly, in the last stage
     force = np.interp(walked, way, points.force * share)
     stage = np.searchsorted(way, walked, side="right").clip(1, len(way) - 1).astype(np.int32)
-    return TimedPath(place, rate, force, stage, float(way[-1]))
+    return TimedPath(place, rate, force, stage, float(way[-1]), contour)
 
 
 def _refuse_beyond_plate(points: SurfacePoints, i: int, length_m: float) -> None:

@@ -11,27 +11,23 @@ from scissorcal.device.capture_gains import (
     Probed,
     capture_gains,
 )
-from scissorcal.device.coverage import (
-    CoverageGrid,
-    advance_coverage,
-    cut_coverage,
-    friction_coverage,
-)
+from scissorcal.device.coverage import CoverageGrid, coverage_of
 from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.drive import CaptureProgress, Drive, silent
+from scissorcal.device.drive import Drive
 from scissorcal.device.hand import hand_strokes, hand_travel
-from scissorcal.device.link import Link
-from scissorcal.device.loading import Confirm, Loader
-from scissorcal.device.motion import STOP_MARGIN_RAD, Motion, MotionReport
+from scissorcal.device.loading import Loader
+from scissorcal.device.motion import STOP_MARGIN_RAD, LoopTask, Motion, MotionReport
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
 from scissorcal.device.rig_record import rig_facts
+from scissorcal.device.session import RigSession
 from scissorcal.device.trajectory import Plan, friction_plan
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.kernel import Identity, ServoConfig
+from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import Joint, Kind, RecordingWriter, Stroke
-from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult, RestFacts
+from scissorcal.recording import Joint, RecordingWriter, Stroke
+from scissorcal.recording.probe import UNKNOWN_REST, RestFacts
 
 SUPERVISOR_S = 0.3
 """Without heartbeat, which ends where this process takes no block for a second: see Heartbeat."""
@@ -58,152 +54,78 @@ class CaptureReport:
 
 
 def open_writer(
+    session: RigSession,
+    kind: CaptureKind,
     path: Path,
-    kind: Kind,
-    link: Link,
-    recipe: Recipe,
-    recipe_toml: str,
     *,
     hand: bool = False,
     by_parts: bool = False,
-    probe: ProbeResult | None = None,
 ) -> RecordingWriter:
     """Open the recording of a capture and write all that is known before it starts.
 
-    ``by_parts``: strokes are chosen later. ``recipe_toml`` is the recipe's text, unchanged;
-    ``probe`` what a probe of this rig found. Raises as RecordingWriter does, and as the plan of the
+    ``by_parts``: strokes are chosen later. Raises as RecordingWriter does, and as the plan of the
     capture does.
     """
-    identity = link.identity
-    strokes: tuple[Stroke, ...] = ()
-    if not hand and not by_parts:
-        strokes = planned(recipe, identity, kind).strokes
+    recipe, identity = session.recipe, session.identity
     return RecordingWriter(
         path,
         kind,
         Joint(recipe.rig.joint),
-        recipe_toml,
-        rig_facts(identity, recipe.rig.motor_sign, probe),
+        session.recipe_toml,
+        rig_facts(identity, recipe.rig.motor_sign, session.probe),
         identity.handle_radius,
-        strokes,
+        () if hand or by_parts else planned(recipe, identity, kind).strokes,
         min_travel=hand_travel(recipe, identity) if hand else None,
     )
 
 
-def capture_friction(
-    link: Link,
-    recipe: Recipe,
-    writer: RecordingWriter,
-    progress: CaptureProgress | None = None,
-    *,
-    confirm: Confirm | None = None,
-    probe: ProbeResult | None = None,
-    cleared: bool = False,
+def capture(
+    session: RigSession, kind: CaptureKind, writer: RecordingWriter, *, hand: bool = False
 ) -> CaptureReport:
-    """Drive sweeps with empty blades and an excitation, and record them.
+    """Drive empty sweeps and an excitation of one axis, or strokes through sheets; record them.
 
-    ``confirm`` asks a person to clear the blades, unless they are ``cleared``; a simulator clears
-    them itself. The gains follow
-    from ``probe`` where there is one; DeviceError where none could follow the plan. What was
-    recorded stays in the writer, whatever happens. Raises DeviceError where the rig fails (limits,
-    faults that do not clear, an unplugged cable), InputError where the recipe does not fit it.
+    Friction is that of the blades, or of the sledge with the blades open. With ``hand`` (cuts only)
+    the motors are off while a hand moves the handles, and strokes are found from the motion; on a
+    simulator the virtual hand does it, and motors bring the rig back before each sheet. The person
+    is asked to clear the blades, unless the session is ``cleared`` (a hand's capture asks in any
+    case), and to load each sheet; a simulator does both itself. The gains follow from the session's
+    probe where there is one. What was recorded stays in the writer, whatever happens.
+
+    Raises DeviceError where the rig fails (limits, faults that do not clear, an unplugged cable) or
+    no gains could follow the plan; InputError where the recipe does not fit the rig: a sledge
+    without an advance motor or without travel, too.
     """
-    coverage = friction_coverage(recipe, link.identity)
-    recorder = Recorder(writer, coverage)
-    plan = friction_plan(recipe, link.identity)
-    gains = gains_for(link, recipe, "friction", probe, writer)
-    with motion_for(link, recipe, plan, gains, probe) as motion:
-        loader = Loader(motion, recorder, confirm)
-        if not cleared:
-            loader.clear(plan.segments[0].request)
-        plan = friction_plan(recipe, link.identity, advance=motion.position[1])
-        drive = Drive(motion, recorder, plan.strokes, progress, _ticks(plan))
-        drive.idle()
-        drive.follow(plan.segments[0])
-        drive.idle()
-        return finish(recorder, motion)
-
-
-def capture_friction_advance(
-    link: Link,
-    recipe: Recipe,
-    writer: RecordingWriter,
-    progress: CaptureProgress | None = None,
-    *,
-    confirm: Confirm | None = None,
-    probe: ProbeResult | None = None,
-    cleared: bool = False,
-) -> CaptureReport:
-    """Drive sweeps of the sledge with empty, open blades and an excitation, and record them.
-
-    As capture_friction. InputError for a rig without an advance motor, or without travel.
-    """
-    refuse_without_motor(link.identity)
-    plan = advance_plan(recipe, link.identity)
-    recorder = Recorder(writer, advance_coverage(recipe, link.identity))
-    gains = gains_for(link, recipe, "friction-advance", probe, writer)
-    with motion_for(link, recipe, plan, gains, probe) as motion:
-        loader = Loader(motion, recorder, confirm)
-        if not cleared:
-            loader.clear(plan.segments[0].request)
-        drive = Drive(motion, recorder, plan.strokes, progress, _ticks(plan))
-        drive.idle()
-        drive.follow(plan.segments[0])
-        drive.idle()
-        return finish(recorder, motion)
-
-
-def capture_cut(
-    link: Link,
-    recipe: Recipe,
-    writer: RecordingWriter,
-    hand: bool = False,
-    progress: CaptureProgress | None = None,
-    confirm: Confirm | None = None,
-    probe: ProbeResult | None = None,
-    cleared: bool = False,
-) -> CaptureReport:
-    """Drive strokes through sheets (or presses), or record those of a hand.
-
-    With ``hand`` the motors are off while the hand moves; strokes are found from the motion. On
-    a simulator the virtual hand does it, and motors bring the rig back before each sheet.
-    ``confirm`` asks a person to load each sheet; a simulator loads by itself. With ``hand`` a
-    person is asked to clear the blades in any case. Otherwise as
-    capture_friction.
-    """
-    identity = link.identity
-    coverage = cut_coverage(recipe, identity, hand=hand)
-    recorder = Recorder(writer, coverage)
-    gains = gains_for(link, recipe, "cut", probe, writer)
-    if hand:
-        with motion_for(link, recipe, None, gains, probe) as motion:
-            loader = Loader(motion, recorder, confirm)
-            tell = progress or silent
-            hand_strokes(
-                motion, recipe, recorder, loader, lambda done, what: tell(done, what, recorder)
-            )
+    if kind == "friction-advance":
+        refuse_without_motor(session.identity)
+    plan = None if hand else planned(session.recipe, session.identity, kind)
+    recorder = Recorder(writer, coverage_of(session.recipe, session.identity, kind, hand=hand))
+    operator = session.operator
+    with motion_for(session, plan, gains_for(session, kind, writer)) as motion:
+        loader = Loader(motion, recorder, operator.confirm)
+        if plan is None:
+            hand_strokes(motion, session.recipe, recorder, loader, operator.progress)
             return finish(recorder, motion)
-    plan = cut_plan(recipe, identity)
-    with motion_for(link, recipe, plan, gains, probe) as motion:
-        loader = Loader(motion, recorder, confirm)
-        if not cleared:
-            loader.clear(CLEAR_REQUEST)
-        drive = Drive(motion, recorder, plan.strokes, progress, _ticks(plan))
+        if not session.cleared:
+            loader.clear(CLEAR_REQUEST if kind == "cut" else plan.segments[0].request)
+        if kind == "friction":
+            plan = friction_plan(session.recipe, session.identity, advance=motion.position[1])
+        drive = Drive(motion, recorder, plan.strokes, operator.progress, _ticks(plan))
         drive.idle()
         for segment in plan.segments:
-            loader.retract()
-            drive.go_to_start(segment)
-            loader.load(drive.warning() + segment.request)
+            if kind == "cut":
+                loader.retract()
+                drive.go_to_start(segment)
+                loader.load(drive.warning() + segment.request)
             drive.follow(segment)
         drive.idle()
         return finish(recorder, motion)
 
 
-def planned(recipe: Recipe, identity: Identity, kind: Kind) -> Plan:
+def planned(recipe: Recipe, identity: Identity, kind: CaptureKind) -> Plan:
     """The plan that a capture of one kind follows. Raises InputError as the plans do."""
     if kind == "friction-advance":
         return advance_plan(recipe, identity)
-    return friction_plan(recipe, identity) if kind == "friction" else cut_plan(recipe, identity)
+    return (friction_plan if kind == "friction" else cut_plan)(recipe, identity)
 
 
 def servo_config(
@@ -253,32 +175,24 @@ def servo_config(
     )
 
 
-def gains_for(
-    link: Link, recipe: Recipe, kind: Kind, probe: ProbeResult | None, writer: RecordingWriter
-) -> CaptureGains:
+def gains_for(session: RigSession, kind: CaptureKind, writer: RecordingWriter) -> CaptureGains:
     """Gains by what the probe found; what is said of them is noted."""
-    gains = capture_gains(recipe, link.identity, kind, Probed.of(probe))
-    for verdict in gains.verdicts if probe else ():
+    gains = capture_gains(session.recipe, session.identity, kind, Probed.of(session.probe))
+    for verdict in gains.verdicts if session.probe else ():
         writer.note(verdict.why)
     return gains
 
 
 def motion_for(
-    link: Link,
-    recipe: Recipe,
-    plan: Plan | None,
-    gains: CaptureGains,
-    probe: ProbeResult | None,
-    *,
-    duration_s: float = 0.0,
+    session: RigSession, plan: Plan | None, gains: CaptureGains, *, duration_s: float = 0.0
 ) -> Motion:
     """Start the servo for a plan, or for references of ``duration_s`` if that is longer."""
-    rest = probe.rest if probe else UNKNOWN_REST
+    identity = session.identity
     lasts_s = max(plan.duration_s if plan else 0.0, duration_s)
-    config = servo_config(recipe, link.identity, lasts_s, gains, rest)
+    config = servo_config(session.recipe, identity, lasts_s, gains, session.rest)
     longest = max((len(segment.reference) for segment in plan.segments), default=0) if plan else 0
-    longest = max(longest, round(duration_s * 1e6 / link.identity.tick_us))
-    return open_motion(link, config, longest_reference=longest)
+    longest = max(longest, round(duration_s * 1e6 / identity.tick_us))
+    return open_motion(session.link, config, LoopTask(longest_reference=longest))
 
 
 def finish(recorder: Recorder, motion: Motion) -> CaptureReport:

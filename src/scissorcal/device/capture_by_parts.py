@@ -14,20 +14,19 @@ from scissorcal.device.capture import (
     gains_for,
     motion_for,
 )
-from scissorcal.device.coverage import CoverageGrid, cut_coverage, friction_coverage
-from scissorcal.device.drive import CaptureProgress, Drive
+from scissorcal.device.coverage import CoverageGrid, coverage_of
+from scissorcal.device.drive import Drive
 from scissorcal.device.link import Link
-from scissorcal.device.loading import Confirm, Loader
+from scissorcal.device.loading import Loader
 from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import Motion
 from scissorcal.device.parts import Part
 from scissorcal.device.recorder import Recorder
 from scissorcal.device.rig_record import rig_facts
+from scissorcal.device.session import RigSession
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.recipe.requirements import DesignedKind
-from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Recording, RecordingWriter, Stroke
-from scissorcal.recording.probe import ProbeResult
 from scissorcal.recording.recording import UNLOADED_MARK
 
 NextPart = Callable[[Recording, float], Part | None]
@@ -41,18 +40,13 @@ CHOOSING = "motors off, the fit is brought up to date"
 
 
 def capture_by_parts(
-    link: Link,
-    recipe: Recipe,
+    session: RigSession,
     kind: DesignedKind,
     writer: RecordingWriter,
     next_part: NextPart,
     *,
     longest_s: float,
     chosen: Callable[[], None] | None = None,
-    progress: CaptureProgress | None = None,
-    confirm: Confirm | None = None,
-    probe: ProbeResult | None = None,
-    cleared: bool = False,
 ) -> CaptureReport:
     """Drive one part after the other until ``next_part`` has none.
 
@@ -60,20 +54,20 @@ def capture_by_parts(
     ``next_part`` works; the material stays where it is unless the next part asks for a fresh piece.
     ``chosen`` is called after each choice, in this thread, between the samples before and after.
     ``longest_s`` bounds the capture, for the faults that it may clear. ``writer`` was opened
-    without strokes. Raises as `capture_cut` does, and what ``next_part`` raises; whatever was
+    without strokes. Raises as `capture` does, and what ``next_part`` raises; whatever was
     recorded stays in the writer.
     """
-    grid = (friction_coverage if kind == "friction" else cut_coverage)(recipe, link.identity)
-    recorder = _KeepingRecorder(writer, grid)
-    gains = gains_for(link, recipe, kind, probe, writer)
-    plan = friction_plan(recipe, link.identity)
-    with motion_for(link, recipe, plan, gains, probe, duration_s=longest_s) as motion:
-        loader = Loader(motion, recorder, confirm)
-        if not cleared:
+    recipe, identity, operator = session.recipe, session.identity, session.operator
+    recorder = _KeepingRecorder(writer, coverage_of(recipe, identity, kind))
+    gains = gains_for(session, kind, writer)
+    plan = friction_plan(recipe, identity)
+    with motion_for(session, plan, gains, duration_s=longest_s) as motion:
+        loader = Loader(motion, recorder, operator.confirm)
+        if not session.cleared:
             loader.clear(CLEAR_REQUEST if kind == "cut" else plan.segments[0].request)
         strokes: list[Stroke] = []
-        drive = Drive(motion, recorder, strokes, progress, 1, cuts=kind == "cut")
-        facts = rig_facts(link.identity, recipe.rig.motor_sign, probe)
+        drive = Drive(motion, recorder, strokes, operator.progress, 1, cuts=kind == "cut")
+        facts = rig_facts(identity, recipe.rig.motor_sign, session.probe)
 
         def recorded() -> Recording:
             return Recording(
@@ -81,7 +75,7 @@ def capture_by_parts(
                 samples=recorder.samples,
                 strokes=tuple(strokes),
                 joint=Joint(recipe.rig.joint),
-                handle_radius_m=link.identity.handle_radius,
+                handle_radius_m=identity.handle_radius,
                 device=facts,
                 source=str(writer.path),
                 marks=tuple((UNLOADED_MARK, str(stroke.index)) for stroke in recorder.empty),
@@ -89,7 +83,7 @@ def capture_by_parts(
 
         drive.idle()
         told = chosen or (lambda: None)
-        with _chooser(link, motion, drive) as choose:
+        with _chooser(session.link, motion, drive) as choose:
             while True:
                 part = choose(next_part, recorded())
                 told()

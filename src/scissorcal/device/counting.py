@@ -8,13 +8,7 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Mask
 from scissorcal.device.capture import planned
 from scissorcal.device.completeness import planned_excitation_s
-from scissorcal.device.coverage import (
-    NEEDED_S,
-    CoverageGrid,
-    advance_coverage,
-    cut_coverage,
-    friction_coverage,
-)
+from scissorcal.device.coverage import NEEDED_S, CoverageGrid, coverage_of
 from scissorcal.device.rig_record import identity_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
@@ -133,14 +127,12 @@ def _chosen(recording: Recording) -> tuple[list[list[Any]], list[int]]:
 def _grid(recording: Recording, recipe: Recipe, kind: CaptureKind) -> tuple[bool, CoverageGrid]:
     """Whether a hand moved the blades, and the cells of the plan."""
     identity = identity_of(recording.device, recording.source)
-    if kind == "friction":
-        return False, friction_coverage(recipe, identity)
-    if kind == "friction-advance":
-        return False, advance_coverage(recipe, identity)
+    if kind != "cut":
+        return False, coverage_of(recipe, identity, kind)
     planned = {round(speed, 9) for speed in recipe.capture.cut.speeds_rad_per_s}
     closing = [s for s in recording.strokes if s.kind in ("closing", "press")]
     by_hand = bool(closing) and all(round(s.speed, 9) not in planned for s in closing)
-    return by_hand, cut_coverage(recipe, identity, hand=by_hand)
+    return by_hand, coverage_of(recipe, identity, kind, hand=by_hand)
 
 
 def _labels(recording: Recording) -> Labels:

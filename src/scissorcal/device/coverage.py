@@ -12,6 +12,7 @@ from scissorcal.device.advance_trajectory import advance_range, sliding_speeds
 from scissorcal.device.cut_trajectory import cut_openings, press_openings
 from scissorcal.device.trajectory import opening_range
 from scissorcal.kernel import Identity
+from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe
 
 if TYPE_CHECKING:
@@ -209,31 +210,26 @@ def even_cells(opening: Range, count: int = ANGLE_CELLS) -> tuple[Range, ...]:
     return tuple(pairwise(edges))
 
 
-def friction_coverage(recipe: Recipe, identity: Identity) -> CoverageGrid:
-    """Grid of a friction capture: its speeds in both directions over the scene's openings."""
-    cells = even_cells(opening_range(recipe, identity))
-    return CoverageGrid(recipe.capture.friction.speeds_rad_per_s, cells)
+def coverage_of(
+    recipe: Recipe, identity: Identity, kind: CaptureKind, *, hand: bool = False
+) -> CoverageGrid:
+    """Grid of a capture: its speeds over the openings of the scene, or the travel of the sledge.
 
-
-def advance_coverage(recipe: Recipe, identity: Identity) -> CoverageGrid:
-    """Grid of a capture of the sledge: its speeds both ways over its travel."""
-    cells = even_cells(advance_range(recipe, identity))
-    return CoverageGrid(sliding_speeds(recipe), cells, ("backward", "forward"), axis=ADVANCE)
-
-
-def cut_coverage(recipe: Recipe, identity: Identity, *, hand: bool = False) -> CoverageGrid:
-    """Grid of a cut capture: its speeds while closing, over the openings at which it cuts.
-
-    Planned presses have a cell for each place at which they press.
+    Friction counts both directions, a cut closing alone. Planned presses have a cell for each place
+    at which they press.
     """
-    speeds = recipe.capture.cut.speeds_rad_per_s
-    if hand:
-        cells = even_cells(opening_range(recipe, identity))
-    elif recipe.scene.cut:
+    capture = recipe.capture
+    if kind == "friction-advance":
+        cells = even_cells(advance_range(recipe, identity))
+        return CoverageGrid(sliding_speeds(recipe), cells, ("backward", "forward"), axis=ADVANCE)
+    cells = even_cells(opening_range(recipe, identity))
+    if kind == "friction":
+        return CoverageGrid(capture.friction.speeds_rad_per_s, cells)
+    if not hand and recipe.scene.cut:
         cells = even_cells(cut_openings(recipe, identity))
-    else:
+    elif not hand:
         cells = press_openings(recipe, identity)
-    return CoverageGrid(speeds, cells, ("closing",))
+    return CoverageGrid(capture.cut.speeds_rad_per_s, cells, ("closing",))
 
 
 def _speed_edges(speeds: Array) -> Array:

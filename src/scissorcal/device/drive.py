@@ -1,15 +1,13 @@
 """Run the segments of a capture on a motion, record them, and say what is going on."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from scissorcal.device.motion import Motion, Samples
 from scissorcal.device.recorder import Recorder, unloaded_sentence
+from scissorcal.device.session import ShowProgress
 from scissorcal.device.trajectory import Segment
 from scissorcal.device.unloaded import LoadWatch
 from scissorcal.recording import Stroke
-
-CaptureProgress = Callable[[float, str, Recorder], None]
-"""Called with the share done (0 to 1), a sentence, and what was recorded so far."""
 
 IDLE_S = 1.5
 """Time with the motors off at the beginning and end of a capture: it shows the sensors' zeros."""
@@ -27,7 +25,7 @@ class Drive:
         motion: Motion,
         recorder: Recorder,
         strokes: Sequence[Stroke],
-        progress: CaptureProgress | None,
+        progress: ShowProgress,
         total: int,
         *,
         cuts: bool | None = None,
@@ -35,7 +33,7 @@ class Drive:
         self._motion = motion
         self._recorder = recorder
         self._strokes = strokes
-        self._tell = progress or silent
+        self._tell = progress
         self._total = total
         self._done = 0
         loaded = any(stroke.sheet >= 0 for stroke in strokes) if cuts is None else cuts
@@ -90,7 +88,3 @@ class Drive:
         sheet = f", piece {stroke.sheet + 1}" if stroke.sheet >= 0 else ""
         of = f"stroke {stroke.index + 1} of {len(self._strokes)}{sheet}"
         return f"{self._recorder.axis.motion(stroke.kind, stroke.speed)} ({of})"
-
-
-def silent(done: float, sentence: str, recorder: Recorder) -> None:
-    """Report no progress."""

@@ -1,6 +1,5 @@
 """Captures by hand: the motors are off, a person (or the virtual hand) moves the blades."""
 
-from collections.abc import Callable
 from itertools import cycle
 
 import numpy as np
@@ -10,6 +9,7 @@ from scissorcal.device.cut_trajectory import cut_plan, hand_requests, press_open
 from scissorcal.device.loading import Loader
 from scissorcal.device.motion import Motion, Samples
 from scissorcal.device.recorder import Recorder
+from scissorcal.device.session import ShowProgress
 from scissorcal.device.trajectory import opening_range
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, Identity
@@ -25,11 +25,9 @@ SETTLED_S = 0.4
 GIVE_UP_S = 60.0
 GIVE_UP_SIMULATED_S = 4.0
 
-Tell = Callable[[float, str], None]
-
 
 def hand_strokes(
-    motion: Motion, recipe: Recipe, recorder: Recorder, loader: Loader, tell: Tell
+    motion: Motion, recipe: Recipe, recorder: Recorder, loader: Loader, tell: ShowProgress
 ) -> None:
     """Record the strokes that a hand makes through each sheet.
 
@@ -74,7 +72,9 @@ def hand_travel(recipe: Recipe, identity: Identity) -> float:
 class _Watch:
     """Records samples and counts the strokes of the current sheet."""
 
-    def __init__(self, motion: Motion, recipe: Recipe, recorder: Recorder, tell: Tell) -> None:
+    def __init__(
+        self, motion: Motion, recipe: Recipe, recorder: Recorder, tell: ShowProgress
+    ) -> None:
         self._motion = motion
         self._recorder = recorder
         self._tell = tell
@@ -92,15 +92,15 @@ class _Watch:
 
     def until(self, strokes: int, give_up_s: float) -> bool:
         """Record until ``strokes`` of this sheet are made; False if nothing moved for too long."""
-        every = max(1, round(THINNED_S / self._motion.tick_s))
+        stride = max(1, round(THINNED_S / self._motion.tick_s))
         while True:
             for samples in self._motion.idle(LOOK_EVERY_S):
-                self._take(samples, every)
+                self._take(samples, stride)
             time, opening = np.concatenate(self._time), np.concatenate(self._opening)
             made = self._made(time, opening)
             done = (self._sheet + min(made / self._wanted, 1.0)) / self._sheets
             sentence = f"{made} of {self._wanted} strokes, piece {self._sheet + 1}"
-            self._tell(done, sentence)
+            self._tell(done, sentence, self._recorder)
             rest = _rest_s(time, opening, 0.1 * self.travel)
             if made >= strokes and rest >= SETTLED_S and not self._closed(opening):
                 return True
@@ -111,10 +111,10 @@ class _Watch:
                 )
                 return False
 
-    def _take(self, samples: Samples, every: int) -> None:
+    def _take(self, samples: Samples, stride: int) -> None:
         self._recorder.take(samples, self._motion.garbled)
-        self._time.append(samples["device_time_us"][::every] * 1e-6)
-        self._opening.append(samples["opening"][::every])
+        self._time.append(samples["device_time_us"][::stride] * 1e-6)
+        self._opening.append(samples["opening"][::stride])
 
     def _made(self, time: NDArray[np.float64], opening: NDArray[np.float64]) -> int:
         """Closing strokes so far, including the current one."""

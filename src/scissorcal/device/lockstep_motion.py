@@ -1,8 +1,8 @@
 """The servo in this process and in virtual time: one exchange, one tick."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from scissorcal.device.motion import (
     BLOCK_S,
     RELEASE_COMMANDS,
     SILENCE_S,
+    LoopTask,
     Motion,
     MotionReport,
     Samples,
@@ -25,11 +26,8 @@ from scissorcal.kernel import (
     SAMPLE_DTYPE,
     ConfigKey,
     Contour,
-    ControlConfig,
     ControlTask,
     Mode,
-    ModelTables,
-    Piece,
     Section,
     Servo,
     ServoConfig,
@@ -57,14 +55,12 @@ class LockstepMotion(Motion):
         self,
         link: Exchanging,
         config: ServoConfig,
-        tables: ModelTables | None,
+        task: LoopTask,
         every_s: float = BLOCK_S,
-        control: ControlConfig | None = None,
-        pieces: Sequence[Piece] | None = None,
     ) -> None:
         super().__init__(link.identity, every_s)
         self._link = link
-        self._servo = Servo(tables, config, control, pieces)
+        self._servo = Servo(task.tables, config, task.control, task.pieces)
         self._control_rows: list[bytes] = []
         self._frame: bytes | None = None
         self._ticks = max(1, round(every_s / self.tick_s))
@@ -155,18 +151,22 @@ class LockstepMotion(Motion):
             return
         self._servo.stop()
         try:
-            for _ in range(RELEASE_COMMANDS):
-                self._exchange()
+            for payload, came in self._received(RELEASE_COMMANDS):
+                self._frame = self._servo.answer(payload, **came)
             self._link.configure(ConfigKey.STREAM, 0.0)
         except DeviceError as error:
             self._failure = error
 
-    def _pass_time(self) -> Samples:
+    def step(self) -> Samples:
+        """Let a block of virtual time pass, as fast as the computer can."""
         stopped = self.stop_reason is not StopReason.NONE
         rows: list[bytes] = []
         try:
-            for _ in range(0 if stopped else self._ticks):
-                rows += self._exchange()
+            for payload, came in self._received(0 if stopped else self._ticks):
+                self._frame = self._servo.answer(payload, **came)
+                rows.append(self._servo.telemetry().tobytes())
+                if self._servo.mode is Mode.CONTROL:
+                    self._control_rows.append(self._servo.control_telemetry().tobytes())
         except DeviceError as error:
             self._failure = error
         samples = self._without_repeats(np.frombuffer(b"".join(rows), dtype=SAMPLE_DTYPE))
@@ -174,26 +174,21 @@ class LockstepMotion(Motion):
         if self._silent_s > SILENCE_S and not stopped:
             silence = StopReason.SILENCE
             self._failure = DeviceError(silence.sentence, silence.name)
-        return samples
+        return self._arrived(samples)
 
-    def _exchange(self) -> list[bytes]:
-        """Advance one tick: send the newest command, return the samples of the frames received."""
-        payloads = self._link.exchange(self._frame)
-        self._frame = None
-        rows = []
-        now_ns = round(1e9 * self._link.virtual_time)
-        for left, payload in zip(range(len(payloads) - 1, -1, -1), payloads, strict=True):
-            self._frame = self._servo.answer(
-                payload,
-                host_time_ns=now_ns,
-                answered=left == 0,
-                passed_us=round((now_ns - self._passed_ns) * 1e-3),
-            )
-            self._passed_ns = now_ns
-            rows.append(self._servo.telemetry().tobytes())
-            if self._servo.mode is Mode.CONTROL:
-                self._control_rows.append(self._servo.control_telemetry().tobytes())
-        return rows
+    def _received(self, ticks: int) -> Iterator[tuple[bytes, dict[str, Any]]]:
+        """The frames of some ticks, each with when it came; each tick sends the newest command."""
+        for _ in range(ticks):
+            payloads = self._link.exchange(self._frame)
+            self._frame = None
+            now_ns = round(1e9 * self._link.virtual_time)
+            for left, payload in zip(range(len(payloads) - 1, -1, -1), payloads, strict=True):
+                passed_us = round((now_ns - self._passed_ns) * 1e-3)
+                self._passed_ns = now_ns
+                yield (
+                    payload,
+                    {"host_time_ns": now_ns, "answered": left == 0, "passed_us": passed_us},
+                )
 
     def _without_repeats(self, samples: Samples) -> Samples:
         """Drop the samples of repeated frames, for which the servo returns the previous sample."""

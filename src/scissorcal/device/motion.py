@@ -5,7 +5,7 @@ in blocks, as they arrive.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 
@@ -19,9 +19,12 @@ from scissorcal.device.trajectory import approach, check_reference
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     Contour,
+    ControlConfig,
     EnergyLedger,
     Identity,
     Mode,
+    ModelTables,
+    Piece,
     Section,
     ServoCounters,
     StopReason,
@@ -68,6 +71,23 @@ class MotionReport:
     lag: FeltLag
     rights: LoopRights | None
     watched: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class LoopTask:
+    """What the loop does besides idling.
+
+    ``tables`` are needed to render, and ``pieces`` replace the uniform sheet; ``control`` to press
+    on a surface; ``longest_reference`` (ticks) to track or to follow a path.
+    """
+
+    tables: ModelTables | None = None
+    pieces: Sequence[Piece] | None = None
+    control: ControlConfig | None = None
+    longest_reference: int = 0
+
+
+IDLE = LoopTask()
 
 
 class Motion(AbstractContextManager["Motion"], ABC):
@@ -150,9 +170,12 @@ class Motion(AbstractContextManager["Motion"], ABC):
         finally:
             self.engage(Mode.IDLE)
 
+    @abstractmethod
     def step(self) -> Samples:
         """Wait for about a block, send a heartbeat, and return the samples that arrived."""
-        samples = self._pass_time()
+
+    def _arrived(self, samples: Samples) -> Samples:
+        """Note the position in a block; raises the error of a servo that sends none any more."""
         if len(samples):
             place = (float(samples["opening"][-1]), float(samples["advance"][-1]))
             if np.all(np.isfinite(place)):
@@ -229,9 +252,6 @@ class Motion(AbstractContextManager["Motion"], ABC):
     @abstractmethod
     def garbled(self) -> int:
         """Frames discarded so far."""
-
-    @abstractmethod
-    def _pass_time(self) -> Samples: ...
 
     @abstractmethod
     def _why_lost(self) -> DeviceError | None:

@@ -1,33 +1,19 @@
 """Start the servo on a link, whichever kind of link it is."""
 
-from collections.abc import Sequence
-
 from scissorcal.device.link import Link, PortLink
 from scissorcal.device.lockstep_motion import Exchanging, LockstepMotion
-from scissorcal.device.motion import BLOCK_S, Motion
+from scissorcal.device.motion import BLOCK_S, IDLE, LoopTask, Motion
 from scissorcal.device.port_motion import PortMotion
-from scissorcal.kernel import ControlConfig, ModelTables, Piece, ServoConfig
-
-SPARE_S = 30.0
-"""Room in the shared memory beyond the longest reference, for the approach to its start."""
+from scissorcal.kernel import ServoConfig
 
 
 def open_motion(
-    link: Link,
-    config: ServoConfig,
-    tables: ModelTables | None = None,
-    *,
-    longest_reference: int = 0,
-    every_s: float = BLOCK_S,
-    control: ControlConfig | None = None,
-    pieces: Sequence[Piece] | None = None,
+    link: Link, config: ServoConfig, task: LoopTask = IDLE, *, every_s: float = BLOCK_S
 ) -> Motion:
     """Start the servo on a link: in a separate process on a port, in this process in virtual time.
 
-    ``tables`` are needed to render, ``longest_reference`` (ticks) to track or to follow a path,
-    ``control`` to press on a surface; ``pieces`` replace the uniform sheet. Samples come in blocks
-    of about ``every_s``. It starts idle, with the rig's position known. A fault that the device has
-    latched is cleared.
+    Samples come in blocks of about ``every_s``. It starts idle, with the rig's position known. A
+    fault that the device has latched is cleared.
 
     >>> import numpy as np
     >>> from scissorcal.device.lockstep import LockstepLink
@@ -39,8 +25,7 @@ def open_motion(
     (200, False)
     """
     if isinstance(link, Exchanging):
-        return LockstepMotion(link, config, tables, every_s, control, pieces)
+        return LockstepMotion(link, config, task, every_s)
     if not isinstance(link, PortLink):
         raise TypeError(f"A {type(link).__name__} is neither a port nor a lockstep link.")
-    capacity = longest_reference + round(SPARE_S * 1e6 / config.tick_us)
-    return PortMotion(link, config, tables, capacity, every_s, control, pieces)
+    return PortMotion(link, config, task, every_s)

@@ -33,6 +33,20 @@ class Part:
         return self.segment.load == "sheet"
 
 
+@dataclass(frozen=True)
+class ChosenStroke:
+    """A stroke that comes next: its speed (rad/s), its place in its sheet from 0, its sheet.
+
+    ``first`` is its number in the recording; ``fresh`` has a fresh piece put in before it.
+    """
+
+    speed: float
+    place: int
+    sheet: int
+    first: int
+    fresh: bool
+
+
 def sweep_part(
     recipe: Recipe,
     identity: Identity,
@@ -60,38 +74,31 @@ def sweep_part(
     return _numbered(plan, whole, range(count), first)
 
 
-def stroke_part(
-    recipe: Recipe,
-    identity: Identity,
-    speed: float,
-    place: int,
-    *,
-    places: int,
-    sheet: int,
-    first: int,
-    fresh: bool,
-) -> Part:
-    """One stroke through material (or one press) and its return, at a speed in rad/s.
+def stroke_part(recipe: Recipe, identity: Identity, stroke: ChosenStroke, places: int) -> Part:
+    """One stroke through material (or one press) and its return.
 
-    ``place`` counts the strokes of a sheet from 0; a sheet has room for ``places``, as
-    ``strokes_per_sheet`` of a recipe. The stroke begins where the one before it left the crack; a
-    press, which may come after any other, with the blades clear of the material at every place.
+    A sheet has room for ``places``, as ``strokes_per_sheet`` of a recipe. The stroke begins
+    where the one before it left the crack; a press, which may come after any other, with the blades
+    clear of the material at every place.
     """
     wanted = recipe.capture.cut.model_copy(
-        update={"speeds_rad_per_s": (speed,), "strokes_per_sheet": places, "sheets": 1}
+        update={"speeds_rad_per_s": (stroke.speed,), "strokes_per_sheet": places, "sheets": 1}
     )
     plan = cut_plan(with_capture(recipe, "cut", wanted), identity)
     (whole,) = plan.segments
     request = (
-        f"Put in a fresh piece of {recipe.material.name} (piece {sheet + 1}), its near edge at the "
-        "mark; the blades stand open before it."
+        f"Put in a fresh piece of {recipe.material.name} (piece {stroke.sheet + 1}), its near "
+        "edge at the mark; the blades stand open before it."
         if recipe.scene.cut
         else whole.request
     )
     load = replace(
-        whole, load="sheet" if fresh else "nothing", sheet=sheet, request=request if fresh else ""
+        whole,
+        load="sheet" if stroke.fresh else "nothing",
+        sheet=stroke.sheet,
+        request=request if stroke.fresh else "",
     )
-    part = _numbered(plan, load, (2 * place, 2 * place + 1), first)
+    part = _numbered(plan, load, (2 * stroke.place, 2 * stroke.place + 1), stroke.first)
     return part if recipe.scene.cut else _from_clear(part, whole.reference, plan.tick_s)
 
 
@@ -100,12 +107,12 @@ def part_seconds(part: Part, identity: Identity) -> float:
     return 1e-6 * identity.tick_us * len(part.segment.reference)
 
 
-def _from_clear(part: Part, every: Reference, tick_s: float) -> Part:
+def _from_clear(part: Part, whole: Reference, tick_s: float) -> Part:
     """A press that begins at its place with the blades as wide as any press of a capture opens."""
-    found = part.segment.reference
-    begin = int(np.flatnonzero(found.stroke >= 0)[0])
-    press = Reference(*(axis[begin:] for axis in vars(found).values()))
-    path = PathBuilder(float(every.opening.max()), float(press.advance[0]), tick_s)
+    reference_of_part = part.segment.reference
+    begin = int(np.flatnonzero(reference_of_part.stroke >= 0)[0])
+    press = Reference(*(axis[begin:] for axis in vars(reference_of_part).values()))
+    path = PathBuilder(float(whole.opening.max()), float(press.advance[0]), tick_s)
     path.rest(DWELL_S)
     path.open_to(float(press.opening[0]), APPROACH_SPEED, TURN_ACCELERATION)
     path.rest(SETTLE_S)
@@ -120,11 +127,11 @@ def _numbered(plan: Plan, segment: Segment, wanted: Iterable[int], first: int) -
     inside = np.isin(stroke_of_tick(labels), kept)
     table = np.full(labels.max() + 2, -1, dtype=np.int32)
     table[list(kept)] = np.arange(first, first + len(kept))
-    found = segment.reference
+    whole = segment.reference
     cut = Reference(
-        found.opening[inside],
-        found.opening_rate[inside],
-        found.advance[inside],
+        whole.opening[inside],
+        whole.opening_rate[inside],
+        whole.advance[inside],
         table[labels[inside]],
     )
     rest = PathBuilder(float(cut.opening[-1]), float(cut.advance[-1]), plan.tick_s)

@@ -1,12 +1,12 @@
 """The servo on a port, in real time: a separate process runs it, this one supervises."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from scissorcal.aliases import Array
 from scissorcal.device.link import PortLink, check_echo
-from scissorcal.device.motion import BLOCK_S, Motion, MotionReport, Samples, Stages
+from scissorcal.device.motion import BLOCK_S, LoopTask, Motion, MotionReport, Samples, Stages
 from scissorcal.device.paths import Reference
 from scissorcal.device.servo_process import ServoProcess
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
@@ -15,11 +15,8 @@ from scissorcal.kernel import (
     Command,
     ConfigKey,
     Contour,
-    ControlConfig,
     LoopBlock,
     Mode,
-    ModelTables,
-    Piece,
     Section,
     ServoConfig,
     StopReason,
@@ -28,6 +25,8 @@ from scissorcal.kernel import (
 CONFIGURE_ATTEMPTS = 3
 IDLE_TIMEOUT_S = 2.0
 FIRST_POSITION_TIMEOUT_S = 2.0
+SPARE_S = 30.0
+"""Room in the shared memory beyond the longest reference, for the approach to its start."""
 
 
 class PortMotion(Motion):
@@ -40,16 +39,17 @@ class PortMotion(Motion):
         self,
         link: PortLink,
         config: ServoConfig,
-        tables: ModelTables | None,
-        capacity: int,
+        task: LoopTask,
         every_s: float = BLOCK_S,
-        control: ControlConfig | None = None,
-        pieces: Sequence[Piece] | None = None,
     ) -> None:
         super().__init__(link.identity, every_s)
         self._link = link
         self._block = LoopBlock.create(
-            config, tables, control=control, pieces=pieces, reference_capacity=capacity
+            config,
+            task.tables,
+            control=task.control,
+            pieces=task.pieces,
+            reference_capacity=task.longest_reference + round(SPARE_S * 1e6 / config.tick_us),
         )
         self._process = ServoProcess(link, self._block)
         self._drain_at = 0.0
@@ -170,14 +170,14 @@ class PortMotion(Motion):
             self._link.configure(ConfigKey.STREAM, 0.0)
             self._link.flush()
 
-    def _pass_time(self) -> Samples:
+    def step(self) -> Samples:
         """Wait until a block after the last call, or the end of the loop; empty the ring buffer."""
         self._process.heartbeat.seen()
         self._drain_at = max(self._drain_at + self.every_s, time.monotonic())
         left = self._drain_at - time.monotonic()
         if left > 0 and self._process.alive:
             time.sleep(left)  # in one piece: each time this process wakes may delay the loop
-        return self._block.read()
+        return self._arrived(self._block.read())
 
     def _why_lost(self) -> DeviceError | None:
         reason = self._block.stop_reason

@@ -5,7 +5,6 @@ may hold fewer strokes than the recipe allows, never more.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.pace import (
@@ -19,9 +18,8 @@ from scissorcal.recipe.pace import (
     glide_time,
     ramp_way,
 )
+from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe
-
-CaptureKind = Literal["friction", "friction-advance", "cut"]
 
 RATE_HZ = 1000.0
 BYTES_A_SAMPLE = 60

@@ -1,7 +1,7 @@
 """The rendering loop on a rig: limits, ramp, watchdog, telemetry, and verdicts at the end."""
 
 from scissorcal.render.admission import Admission, admit_package
-from scissorcal.render.engine import VirtualStrokes, open_writer, render
+from scissorcal.render.engine import Rendering, VirtualStrokes, open_writer, render
 from scissorcal.render.plate_estimate import PlateReport
 from scissorcal.render.result import AppliedLimits, RenderResult, latency_of
 from scissorcal.render.rig_facts import RigFacts
@@ -14,6 +14,7 @@ __all__ = [
     "PlateReport",
     "PoseSource",
     "RenderResult",
+    "Rendering",
     "RigFacts",
     "VirtualStrokes",
     "admit_package",

@@ -4,19 +4,18 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from scissorcal.aliases import Progress
-from scissorcal.device.link import Link
 from scissorcal.device.loading import Confirm, is_simulator
-from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, Motion
+from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, LoopTask, Motion
 from scissorcal.device.open_motion import open_motion
 from scissorcal.device.rig_record import rig_facts
+from scissorcal.device.session import RigSession
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, PlateConfig, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingWriter
-from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult
+from scissorcal.recording.probe import UNKNOWN_REST, RestFacts
 from scissorcal.render.admission import (
     Admission,
     admit_package,
@@ -65,35 +64,40 @@ class VirtualStrokes:
     rate_rad_per_s: float = 0.3
 
 
+@dataclass(frozen=True)
+class Rendering:
+    """How a package is rendered: for how long, what a simulator's hand does, what a person accepts.
+
+    ``accept_derated``: what is felt may differ from the package's by more than the scene's
+    tolerance. ``allow_mismatch``: the package may be of another rig (`mismatch`).
+    """
+
+    seconds: float = 30.0
+    strokes: VirtualStrokes = VirtualStrokes()
+    accept_derated: bool = False
+    allow_mismatch: bool = False
+
+
 def render(
-    link: Link,
+    session: RigSession,
     package: ModelPackage,
+    how: Rendering = Rendering(),
     *,
-    seconds: float = 30.0,
-    limits: Limits | None = None,
-    motor_sign: int = 1,
-    strokes: VirtualStrokes | None = None,
     writer: RecordingWriter | None = None,
-    progress: Progress | None = None,
-    confirm: Confirm | None = None,
     rig: RigFacts | None = None,
     plate: PoseSource | None = None,
-    accept_derated: bool = False,
-    allow_mismatch: bool = False,
 ) -> RenderResult:
-    """Render a package for ``seconds`` of the device's time, a fresh sheet between the blades.
+    """Render a package for ``how.seconds`` of the device's time, a fresh sheet between the blades.
 
     Of a package with a drawn plate that plate is rendered.
 
     The loop runs in a separate process, paced by the device's frames, or frame by frame in
-    virtual time on a LockstepLink; ``motor_sign`` is the recipe's. It keeps to the tightest of
-    three limits: ``limits`` (a recipe's), the package's own, the device's. Force is ramped up from
-    zero, also after a fault. On a simulator the virtual hand makes ``strokes`` (four, unless
-    given), and the rendering ends with them; on a real rig ``confirm`` asks a person to clear the
-    blades before any force.
+    virtual time on a LockstepLink. It keeps to the tightest of three limits: the recipe's, the
+    package's own, the device's. Force is ramped up from zero, also after a fault. On a simulator
+    the virtual hand makes ``how.strokes``, and the rendering ends with them; on a real rig a person
+    is asked to clear the blades before any force.
     ``writer`` records every sample; see `open_writer`. What is wrong with the package or does not
     match the device becomes a note of the recording at the start, and ``warnings`` of the result.
-    A package of another rig (`mismatch`) is refused unless ``allow_mismatch``.
 
     Where the package's scene has ``plate_pose = "estimated"``, the torque is that of the plate
     where ``plate`` has it, or without one where the package's fitted pose has it. The force falls
@@ -106,70 +110,84 @@ def render(
     inertia, delay and the force sensor's zero, by default the package's friction fit. The result's
     ``admission`` states it. Where the felt torque then differs from the package's by more than the
     scene's tolerance, the verdict *felt torque* fails, unless a person wants it so
-    (``accept_derated``), which result and recording then state.
+    (``how.accept_derated``), which result and recording then state.
 
     Raises InputError, before anything moves, where package and device do not match, where the rig
     cannot render the package stably, or nobody can be asked; MissingError where an estimated plate
     has no pose; DeviceError where the rig fails, and what was recorded is kept.
     """
-    identity = link.identity
-    _refuse_impossible(identity, seconds, confirm)
-    applied = _applied(package, limits, identity)
-    mismatch = find_mismatch(package, identity)
-    if not allow_mismatch:
-        refuse_other_rig(package, identity)
-    admission = admit_package(package, identity, rig, applied.torque_Nm)
-    differs = mismatch.other_rig + mismatch.notes
-    warnings = package.warnings + differs + _admitted(admission)
-    tables = rendered_tables(package.tables, admission)
-    follower = plate_placer(package, plate, tables, applied.torque_Nm, writer)
-    placed = plate_config(tables) if follower else PlateConfig()
-    config = _servo_config(applied, admission, identity, seconds, rig, placed)
-    config = replace(config, motor_sign=motor_sign)
-    accepted = accept_derated and admission.is_felt
+    identity, operator = session.identity, session.operator
+    _refuse_impossible(session, how.seconds)
+    start = _judged(session, package, how, rig)
+    tables = rendered_tables(package.tables, start.admission)
+    follower = plate_placer(package, plate, tables, start.limits.torque_Nm, writer)
+    config = replace(
+        _servo_config(start, identity, how.seconds, rig.rest if rig else UNKNOWN_REST),
+        motor_sign=session.recipe.rig.motor_sign,
+        plate=plate_config(tables) if follower else PlateConfig(),
+    )
     if writer:
-        for sentence in warnings:
+        for sentence in start.warnings:
             writer.note(sentence)
-        if admission.is_felt:
-            writer.note(felt_verdict(admission, accepted=accepted).why)
-    watch = Watch(_travel(package), writer, progress or _silent, seconds)
-    every_s, pieces = EVERY_S if follower else BLOCK_S, package.pieces or None
-    with open_motion(link, config, tables, every_s=every_s, pieces=pieces) as motion:
-        watch.wanted = _prepare(motion, strokes, confirm)
+        if start.admission.is_felt:
+            writer.note(felt_verdict(start.admission, accepted=start.accepted).why)
+    watch = Watch(_travel(package), writer, operator.progress, how.seconds)
+    task = LoopTask(tables, package.pieces or None)
+    every_s = EVERY_S if follower else BLOCK_S
+    with open_motion(session.link, config, task, every_s=every_s) as motion:
+        watch.wanted = _prepare(motion, how.strokes, operator.confirm)
         motion.fresh_sheet(0.0)
         with follower or nullcontext():
             if follower:
                 follower.follow(motion, motion.step())
-            for samples in motion.render(seconds):
+            for samples in motion.render(how.seconds):
                 if follower:
                     follower.follow(motion, samples)
                 if watch.take(samples):
                     break
         for samples in motion.idle(LOOK_EVERY_S):
             watch.record(samples)
-        if is_simulator(identity):
+        if session.simulated:
             motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
-    result = _result(
-        motion, watch, package, applied, admission, warnings, follower, accepted=accepted
-    )
+    result = _result(motion, watch, package, start, follower)
     if writer:
-        _note(writer, result, result.warnings[len(warnings) :])
+        _note(writer, result, result.warnings[len(start.warnings) :])
     return result
+
+
+@dataclass(frozen=True)
+class _Start:
+    """What is known before any force: limits, admission, whether it is accepted, warnings."""
+
+    limits: AppliedLimits
+    admission: Admission
+    accepted: bool
+    warnings: tuple[str, ...]
+
+
+def _judged(
+    session: RigSession, package: ModelPackage, how: Rendering, rig: RigFacts | None
+) -> _Start:
+    """Compare the package with the rig; InputError where it cannot be rendered there."""
+    identity = session.identity
+    limits = _applied(package, session.recipe.limits, identity)
+    mismatch = find_mismatch(package, identity)
+    if not how.allow_mismatch:
+        refuse_other_rig(package, identity)
+    admission = admit_package(package, identity, rig, limits.torque_Nm)
+    warnings = package.warnings + mismatch.other_rig + mismatch.notes + _admitted(admission)
+    return _Start(limits, admission, how.accept_derated and admission.is_felt, warnings)
 
 
 def _result(
     motion: Motion,
     watch: Watch,
     package: ModelPackage,
-    applied: AppliedLimits,
-    admission: Admission,
-    warnings: tuple[str, ...],
+    start: _Start,
     follower: PlatePlacer | None,
-    *,
-    accepted: bool,
 ) -> RenderResult:
-    """Figures of a rendering that has ended; ``warnings`` are those known at its start."""
-    report = motion.report()
+    """Figures of a rendering that has ended."""
+    report, admission, accepted = motion.report(), start.admission, start.accepted
     out_s = report.counters.plate_out_frames * motion.tick_s
     seconds = watch.frames * motion.tick_s
     plate = follower.report(seconds, out_s) if follower else None
@@ -193,7 +211,7 @@ def _result(
         limited_share=limited,
         largest_torque_Nm=watch.largest_torque,
         ledger=report.ledger,
-        limits=applied,
+        limits=start.limits,
         admission=admission,
         accepted_derated=accepted,
         plate=plate,
@@ -201,34 +219,26 @@ def _result(
         verdicts=render_verdicts(
             report, latency, motion.identity.tick_us, admission, plate, accepted=accepted
         ),
-        warnings=warnings
-        + _limited_warning(limited, applied)
+        warnings=start.warnings
+        + _limited_warning(limited, start.limits)
         + _still_warning(watch.still_s)
         + (plate.sentences if plate else ()),
     )
 
 
-def open_writer(
-    path: Path,
-    link: Link,
-    package: ModelPackage,
-    recipe_toml: str = "",
-    *,
-    motor_sign: int = 1,
-    probe: ProbeResult | None = None,
-) -> RecordingWriter:
+def open_writer(session: RigSession, package: ModelPackage, path: Path) -> RecordingWriter:
     """Open the recording of a rendering; the package's manifest travels in it.
 
-    ``recipe_toml`` is the recipe's text, unchanged, ``probe`` what a probe of this
-    rig found. Raises as RecordingWriter does.
+    Raises as RecordingWriter does.
     """
+    identity = session.identity
     writer = RecordingWriter(
         path,
         "render",
         Joint("rotary"),
-        recipe_toml,
-        rig_facts(link.identity, motor_sign, probe),
-        link.identity.handle_radius,
+        session.recipe_toml,
+        rig_facts(identity, session.recipe.rig.motor_sign, session.probe),
+        identity.handle_radius,
         min_travel=_travel(package),
     )
     manifest = package.manifest.model_dump_json(indent=2).encode("utf-8")
@@ -236,41 +246,35 @@ def open_writer(
     return writer
 
 
-def _refuse_impossible(identity: Identity, seconds: float, confirm: Confirm | None) -> None:
+def _refuse_impossible(session: RigSession, seconds: float) -> None:
     if not 0.0 < seconds < float("inf"):
         raise InputError(
             f"Rendering for {seconds:g} s is not possible: give a finite time above 0."
         )
-    if not is_simulator(identity) and confirm is None:
+    if not session.simulated and session.operator.confirm is None:
         raise InputError(
             "Rendering must ask a person to clear the blades first: pass a confirm callback that "
             "shows a sentence and returns when that is done."
         )
 
 
-def _applied(package: ModelPackage, limits: Limits | None, identity: Identity) -> AppliedLimits:
-    own = package.manifest.limits
-    recipe = limits or own
+def _applied(package: ModelPackage, recipe: Limits, identity: Identity) -> AppliedLimits:
+    stated = package.manifest.limits
     translates = "translation_force" in package.manifest.mechanics.render
     return AppliedLimits(
-        torque_Nm=min(recipe.torque_Nm, own.torque_Nm, identity.torque_limit),
-        torque_slew_Nm_per_s=min(recipe.torque_slew_Nm_per_s, own.torque_slew_Nm_per_s),
-        force_N=min(recipe.force_N, own.force_N, identity.force_limit) if translates else 0.0,
-        force_slew_N_per_s=min(recipe.force_slew_N_per_s, own.force_slew_N_per_s),
-        engagement_ramp_s=max(recipe.engagement_ramp_s, own.engagement_ramp_s),
-        held_at_limit_s=(limits or Limits()).held_at_limit_s,
+        torque_Nm=min(recipe.torque_Nm, stated.torque_Nm, identity.torque_limit),
+        torque_slew_Nm_per_s=min(recipe.torque_slew_Nm_per_s, stated.torque_slew_Nm_per_s),
+        force_N=min(recipe.force_N, stated.force_N, identity.force_limit) if translates else 0.0,
+        force_slew_N_per_s=min(recipe.force_slew_N_per_s, stated.force_slew_N_per_s),
+        engagement_ramp_s=max(recipe.engagement_ramp_s, stated.engagement_ramp_s),
+        held_at_limit_s=recipe.held_at_limit_s,
     )
 
 
 def _servo_config(
-    applied: AppliedLimits,
-    admission: Admission,
-    identity: Identity,
-    seconds: float,
-    rig: RigFacts | None,
-    plate: PlateConfig,
+    start: _Start, identity: Identity, seconds: float, rest: RestFacts
 ) -> ServoConfig:
-    rest = rig.rest if rig else UNKNOWN_REST
+    applied = start.limits
     return ServoConfig(
         torque_limit=applied.torque_Nm,
         torque_slew=applied.torque_slew_Nm_per_s,
@@ -285,9 +289,8 @@ def _servo_config(
         supervisor_ms=round(SUPERVISOR_S * 1e3),
         fault_clearings=FAULT_CLEARINGS + round(FAULT_CLEARINGS_PER_S * seconds),
         tick_us=identity.tick_us,
-        passivity=passivity_config(admission, identity),
+        passivity=passivity_config(start.admission, identity),
         watch=watches_of(identity, applied.torque_Nm, applied.held_at_limit_s, rest),
-        plate=plate,
     )
 
 
@@ -299,14 +302,13 @@ def _admitted(admission: Admission) -> tuple[str, ...]:
     return (f"{' '.join(admission.reasons)}{cures}",)
 
 
-def _prepare(motion: Motion, strokes: VirtualStrokes | None, confirm: Confirm | None) -> int | None:
+def _prepare(motion: Motion, strokes: VirtualStrokes, confirm: Confirm | None) -> int | None:
     """Clear the blades and start the virtual hand; return how many strokes it will make, if any."""
     if not is_simulator(motion.identity):
         assert confirm is not None
         with motion.paused():
             confirm(REQUEST)
         return None
-    strokes = strokes or VirtualStrokes()
     motion.configure(ConfigKey.MATERIAL, 0.0)
     motion.configure(ConfigKey.HAND_STROKES, float(strokes.count))
     motion.configure(ConfigKey.HAND_SPEED_rad_per_s, strokes.rate_rad_per_s)
@@ -353,7 +355,3 @@ def _note(writer: RecordingWriter, result: RenderResult, late: tuple[str, ...]) 
     ):
         if count:
             writer.note(f"{count} {words}")
-
-
-def _silent(done: float, sentence: str) -> None:
-    pass

@@ -72,7 +72,7 @@ def plate_section(
         )
     else:
         numbers, slopes = _between_blades(
-            place, by_place, run, by_run, out, turned[2], upper_face_m
+            (place, by_place), (run, by_run), (out, turned[2]), upper_face_m
         )
     below = upper_face_m if moving_blades == 1 else upper_face_m * out[1] / (out[:2] @ out[:2])
     section = Section(*(float(number) for number in numbers))
@@ -80,19 +80,18 @@ def plate_section(
 
 
 def _between_blades(
-    place: Array,
-    by_place: Array,
-    run: Array,
-    by_run: Array,
-    out: Array,
-    turned: Array,
+    near_edge: tuple[Array, Array],
+    length: tuple[Array, Array],
+    normal: tuple[Array, Array],
     upper_face_m: float,
 ) -> tuple[tuple[float, ...], Array]:
     """Numbers of a plate that gives way along its normal until the crack is in the middle.
 
     A point of its middle over (x, y) then stands at x + y tan(pitch). The plate's closing depth
     and its length count as seen along the advance, whence cos(pitch) in the fracture energy.
+    ``near_edge``, ``length`` and ``normal`` are vectors with their slopes.
     """
+    (place, by_place), (run, by_run), (out, turned) = near_edge, length, normal
     square, by_square = out[:2] @ out[:2], _widen(2.0 * out[:2] @ turned[:2])
     tan, by_tan = -out[0] / out[1], _widen(-(turned[0] - out[0] / out[1] * turned[1]) / out[1])
     by_upward = _widen(turned[1])

@@ -5,8 +5,8 @@ from collections import deque
 
 import numpy as np
 
-from scissorcal.aliases import Progress
 from scissorcal.device.motion import Samples
+from scissorcal.device.session import ShowProgress
 from scissorcal.device.timing import Percentiles, TimeHistogram
 from scissorcal.kernel import SampleFlag, StateFlag
 from scissorcal.recording import RecordingWriter, TurningPoints
@@ -27,7 +27,7 @@ class Watch:
     """
 
     def __init__(
-        self, travel: float, writer: RecordingWriter | None, tell: Progress, seconds: float
+        self, travel: float, writer: RecordingWriter | None, tell: ShowProgress, seconds: float
     ) -> None:
         self.wanted: int | None = None
         self.frames = 0

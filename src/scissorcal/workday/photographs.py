@@ -24,6 +24,7 @@ PhotoKind = Literal["camera", "blade", "plate", "rig"]
 DRAWN_SUFFIX = "-detected.png"
 """How the name of a picture ends that shows what was found in the photograph beside it."""
 KEPT_SUFFIX = ".interrupted"
+NOTHING = "No photograph was given, or no picture showed the target held still."
 
 
 class Photograph(BaseModel):
@@ -96,12 +97,16 @@ def photo_captures(workspace: Workspace, kind: PhotoKind) -> tuple[PhotoCapture,
 
 @dataclass(frozen=True)
 class Seen:
-    """What was found in one photograph, and the sentence that reports it."""
+    """What was found in one photograph, and the sentence that reports it.
+
+    ``board`` is the target that it shows where there is no detection.
+    """
 
     words: str
     detection: "Detection | None" = None
     stance: tuple[float, float] | None = None
     drawn: "Callable[[Path], object] | None" = None
+    board: "CharucoBoard | MarkerBoard | Chessboard | None" = None
 
 
 @dataclass(frozen=True)
@@ -123,43 +128,41 @@ def take_photographs(
     paths: Iterable[Path],
     look: "Callable[[Path, Photo], Seen]",
     tell: Callable[[str], None],
-    nothing: str = "No photograph was given.",
     *,
-    board: "CharucoBoard | MarkerBoard | Chessboard | None" = None,
     blade: BladeSetup | None = None,
 ) -> Taken:
     """Copy photographs byte for byte into captures/<kind>-<stamp>/, each looked at at once.
 
     ``look`` finds what the photograph must show and raises InputError where it does not; such a
     photograph, and one that was taken before, is left out with its reason. ``tell`` hears of each.
-    ``board`` is noted where ``look`` detects none, ``blade`` is how a blade was laid down.
+    ``blade`` is how a blade was laid down.
     Raises InputError, and keeps nothing, where none is left.
     """
     from scissorcal.vision.photo import read_photo
 
     before = photo_captures(workspace, kind)
-    seen: list[Seen] = []
+    sightings: list[Seen] = []
     refused: list[str] = []
     with PhotoWriter(workspace, kind) as writer:
         for path in paths:
             try:
                 photo = read_photo(path, colour=False)
                 refuse_known(photo, before, writer)
-                found = look(path, photo)
+                sighting = look(path, photo)
             except InputError as error:
                 refused.append(str(error))
                 tell(f"left out: {error}")
                 continue
-            stored = writer.add(path, photo, found.detection, found.stance)
-            if found.drawn is not None:
-                found.drawn(writer.part / f"{Path(stored.file).stem}{DRAWN_SUFFIX}")
-            seen.append(found)
-            tell(found.words)
-        if not seen:
-            raise InputError(" ".join(refused[:3] or [nothing]) + " Nothing was kept.")
-        found_in = seen[-1].detection
-        capture = writer.finish(found_in.board if found_in else board, blade)
-    return Taken(capture, tuple(seen), tuple(refused))
+            stored = writer.add(path, photo, sighting.detection, sighting.stance)
+            if sighting.drawn is not None:
+                sighting.drawn(writer.part / f"{Path(stored.file).stem}{DRAWN_SUFFIX}")
+            sightings.append(sighting)
+            tell(sighting.words)
+        if not sightings:
+            raise InputError(" ".join(refused[:3] or [NOTHING]) + " Nothing was kept.")
+        last = sightings[-1]
+        capture = writer.finish(last.detection.board if last.detection else last.board, blade)
+    return Taken(capture, tuple(sightings), tuple(refused))
 
 
 class PhotoWriter:

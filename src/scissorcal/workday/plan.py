@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scissorcal.recipe.capture_cost import CaptureCost, CaptureKind, capture_cost
+from scissorcal.recipe.capture_cost import CaptureCost, capture_cost
 from scissorcal.recipe.edge import edge_sentence
 from scissorcal.recipe.plate_layers import plate_pieces, plate_sentence
-from scissorcal.recipe.requirements import Requirement, requirements
+from scissorcal.recipe.requirements import CaptureKind, Requirement, requirements
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.probe import probe_state
 from scissorcal.workday.states import StepState

@@ -1,16 +1,45 @@
 """Open the rig that a command names: a port, or a virtual rig started for the occasion."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
     from scissorcal.device.link import Link, PortLink
+    from scissorcal.device.session import Operator, RigSession
     from scissorcal.recipe.schema import Line, Recipe
+    from scissorcal.workday.options import RigOptions
 
 SIM = "sim"
+
+
+@contextmanager
+def open_session(
+    recipe: "Recipe",
+    rig: "RigOptions",
+    operator: "Operator | None" = None,
+    *,
+    recipe_toml: str = "",
+    run: int = 0,
+    world: "AbstractContextManager[Link] | None" = None,
+) -> "Iterator[RigSession]":
+    """Open the rig that ``rig`` names, for everything that is done there until the block ends.
+
+    ``recipe_toml`` is the recipe's text, ``run`` as in `open_rig`; ``world`` is the rig of a
+    simulated world, which takes the place of the device. Raises as `open_rig` does.
+    """
+    from scissorcal.device.session import Operator, RigSession
+
+    line = line_of(recipe, rig.baud)
+    opened = world or open_rig(
+        rig.device, recipe.specimen, rig.seed, run=run, realtime=rig.realtime, line=line
+    )
+    with opened as link:
+        if world:
+            set_line(link, line)
+        yield RigSession(link, recipe, operator or Operator(), recipe_toml=recipe_toml)
 
 
 @contextmanager

@@ -30,7 +30,7 @@ from scissorcal.calibration.design.state import (
 )
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.device.capture_by_parts import CHOOSING_S
-from scissorcal.device.parts import Part, part_seconds, stroke_part, sweep_part
+from scissorcal.device.parts import ChosenStroke, Part, part_seconds, stroke_part, sweep_part
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
 from scissorcal.model import EdgeBelief
@@ -50,11 +50,13 @@ deviations."""
 class Limits:
     """At least so many strokes (pairs of sweeps), at most so many planned minutes.
 
-    The first part runs in any case.
+    The first part runs in any case. Empty sweeps are at ``slowest_sweep`` (rad/s) and faster
+    (`capture_stock`).
     """
 
     max_minutes: float
     at_least: int = 0
+    slowest_sweep: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,7 @@ class UntilTolerance:
 
     The fit is brought up to date by what was recorded, the band of the torque over the scene is
     judged by the scene's tolerance and confidence, and the stroke comes next that lowers what is
-    beyond the tolerance the most per minute. ``marks`` has the state after each update. Empty
-    sweeps are at ``slowest_sweep`` (rad/s) and faster (`capture_stock`).
+    beyond the tolerance the most per minute. ``marks`` has the state after each update.
     """
 
     def __init__(
@@ -90,12 +91,11 @@ class UntilTolerance:
         earlier: Earlier,
         limits: Limits,
         *,
-        slowest_sweep: float = 0.0,
         seed: int = 0,
     ) -> None:
         self._kind, self._recipe, self._identity = kind, recipe, identity
         self._earlier, self._limits = earlier, limits
-        self._seed, self._slowest_sweep = seed, slowest_sweep
+        self._seed = seed
         self._taken = Taken()
         self._seconds = 0.0
         self._why_no_fit = ""
@@ -145,16 +145,9 @@ class UntilTolerance:
                 self._recipe, self._identity, (following.speed,), first=first, advance=advance
             )
         else:
-            part = stroke_part(
-                self._recipe,
-                self._identity,
-                following.speed,
-                following.place,
-                places=MOST_PLACES,
-                sheet=0 if self._stock.rotates else self._taken.pieces - 1,
-                first=first,
-                fresh=fresh,
-            )
+            sheet = 0 if self._stock.rotates else self._taken.pieces - 1
+            stroke = ChosenStroke(following.speed, following.place, sheet, first, fresh)
+            part = stroke_part(self._recipe, self._identity, stroke, MOST_PLACES)
         return self._counted(part, view.seconds - following.seconds)
 
     @property
@@ -206,17 +199,17 @@ class UntilTolerance:
         recipe, earlier = self._recipe, self._earlier
         try:
             if self._kind == "friction":
-                every = (*earlier.friction_recordings, recorded)
+                recordings = (*earlier.friction_recordings, recorded)
                 rng = np.random.default_rng((self._seed, len(self._taken.strokes)))
                 settings = recipe.fit.friction
-                fit = fit_friction(every, settings, effort="draft", rng=rng)
-                self._friction = fitted_friction(every, recipe, fit)
+                fit = fit_friction(recordings, settings, effort="draft", rng=rng)
+                self._friction = fitted_friction(recordings, recipe, fit)
                 self._used = shares_used(recorded, fit.used[-1])
             else:
-                every = (*earlier.cut_recordings, recorded)
+                recordings = (*earlier.cut_recordings, recorded)
                 assert earlier.friction is not None
                 self._cut = latest_cut(
-                    every, recipe, earlier.friction, earlier.edge, earlier.last_law
+                    recordings, recipe, earlier.friction, earlier.edge, earlier.last_law
                 )
         except InputError as error:
             self._why_no_fit = str(error)
@@ -228,7 +221,7 @@ class UntilTolerance:
     def _renew_stock(self) -> None:
         """Judge the offers by the fits as they are."""
         self._stock = capture_stock(
-            self._recipe, self._identity, self._friction, self._cut, self._slowest_sweep
+            self._recipe, self._identity, self._friction, self._cut, self._limits.slowest_sweep
         )
         self._stock_of = (self._friction, self._cut)
 
@@ -323,11 +316,11 @@ def shares_used(recorded: Recording, spans: NDArray[np.int64]) -> dict[float, fl
     np.add.at(edges, spans[:, 0], 1)
     np.add.at(edges, spans[:, 1], -1)
     used = np.cumsum(edges)[:-1] > 0
-    found = {}
+    shares = {}
     for speed in {s.speed for s in recorded.strokes if np.isfinite(s.speed)}:
-        own = np.isin(label, [s.index for s in recorded.strokes if s.speed == speed])
-        found[speed] = float(np.mean(used[own])) if own.any() else 1.0
-    return found
+        of_speed = np.isin(label, [s.index for s in recorded.strokes if s.speed == speed])
+        shares[speed] = float(np.mean(used[of_speed])) if of_speed.any() else 1.0
+    return shares
 
 
 def _differ(now: FrictionState | CutState, then: FrictionState | CutState) -> bool:
@@ -364,7 +357,7 @@ def largest_cause(known: TorqueKnowledge) -> str:
     """What bounds the band in the end, as a sentence with the command that would lower it."""
     now = expected_band(known).excess
     without = {name: band.excess for name, band in bounds(known).items()}
-    name = min(without, key=lambda one: without[one])
+    name = min(without, key=lambda cause: without[cause])
     if now <= 0.0 or without[name] > (1.0 - NOTABLE) * now:
         return (
             "No single cause stands out: what differs between strokes, pieces and recordings is "

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.recording import Recording, read_recording
 from tests.device.recipes import short
@@ -19,10 +20,10 @@ def captured(name: str) -> Case:
     link = LockstepLink(load_specimen(recipe.specimen), np.random.default_rng(11))
     found: dict[str, tuple[Recording, ...]] = {}
     with tempfile.TemporaryDirectory() as folder:
-        for kind, capture in (("friction", capture_friction), ("cut", capture_cut)):
+        for kind in ("friction", "cut"):
             path = Path(folder) / f"{kind}.mcap"
-            with open_writer(path, kind, link, recipe, "") as writer:
-                capture(link, recipe, writer)
+            with open_writer(RigSession(link, recipe), kind, path) as writer:
+                capture(RigSession(link, recipe), kind, writer)
             found[kind] = (read_recording(path),)
     link.close()
     return Case(recipe, found["friction"], found["cut"], None, (), None, None, "draft")

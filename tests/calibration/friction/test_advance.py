@@ -15,9 +15,9 @@ from scissorcal.calibration.friction.commanded import driven
 from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.simulator import friction_simulator
-from scissorcal.device.capture import capture_friction_advance as capture
-from scissorcal.device.capture import open_writer
+from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.errors import InputError
 from scissorcal.recipe.friction import AdvanceSettings, FitFrictionAdvance
@@ -49,8 +49,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     path = tmp_path_factory.mktemp("advance") / "friction-advance.mcap"
     recipe = changed("paper-80gsm", capture__friction_advance=SHORT)
     link = LockstepLink("office-paper", np.random.default_rng(5))
-    with open_writer(path, "friction-advance", link, recipe, "") as writer:
-        capture(link, recipe, writer)
+    with open_writer(RigSession(link, recipe), "friction-advance", path) as writer:
+        capture(RigSession(link, recipe), "friction-advance", writer)
     return read_recording(path)
 
 

@@ -8,6 +8,7 @@ from scissorcal.device.probe.clipping import clipping
 from scissorcal.device.probe.probe import ProbeRefusedError, bounds_of, probe
 from scissorcal.device.probe.result import Estimate
 from scissorcal.device.probe.talk import StalledError, Talk
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, ConfigKey, decode
 from scissorcal.recipe.library import builtin_recipe
@@ -51,7 +52,7 @@ def test_a_heavy_device_that_does_not_clip_fails(late_s: float) -> None:
 def test_a_probe_refuses_a_device_that_does_not_clip() -> None:
     device = StrangeDevice(heavy(clips=False), seed=1)
     with pytest.raises(ProbeRefusedError, match="must clip what exceeds its limit"):
-        probe(VirtualPort(device), RECIPE, confirm=Person(device))
+        probe(RigSession(VirtualPort(device), RECIPE, Operator(Person(device))))
     assert device.largest_rate < RECIPE.rig.probe.largest_rate_rad_per_s
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from scissorcal.device.probe.idle import largest_correlation
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.recipe.library import builtin_recipe
 from tests.strange_device import Faults, Person, StrangeDevice, VirtualPort
 
@@ -29,7 +30,9 @@ def test_an_encoder_that_jitters_is_named_before_blades_that_move(sd_mrad: float
     noise = Faults(encoder_noise_rad=1e-3 * sd_mrad)
     device = StrangeDevice(noise, seed=2)
     with pytest.raises(ProbeRefusedError, match="The opening jitters by"):
-        probe(VirtualPort(device), builtin_recipe("paper-80gsm"), confirm=Person(device))
+        probe(
+            RigSession(VirtualPort(device), builtin_recipe("paper-80gsm"), Operator(Person(device)))
+        )
     assert device.largest_torque == 0.0
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from scissorcal.device.link import open_link
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.recipe.library import builtin_recipe
 from tests.strange_device import FAULTS, Person, StrangeDevice, serve_on_pty
 
@@ -28,7 +29,7 @@ def most_rate(device: StrangeDevice) -> float:
 def test_a_rig_on_a_port_is_probed_in_real_time() -> None:
     device = StrangeDevice(FAULTS["none"], seed=1)
     with serve_on_pty(device) as port, open_link(port) as link:
-        result = probe(link, RECIPE, confirm=Person(device))
+        result = probe(RigSession(link, RECIPE, Operator(Person(device))))
     assert result.facts["real_time"] == 1.0
     assert result.force_zero_N is not None
     assert abs(result.force_zero_N.mean) < 0.01
@@ -40,5 +41,5 @@ def test_a_reversed_motor_on_a_port_is_named() -> None:
     device = StrangeDevice(FAULTS["motor reversed"], seed=1)
     refusal = pytest.raises(ProbeRefusedError, match="Positive torque closes the blades")
     with serve_on_pty(device) as port, open_link(port) as link, refusal:
-        probe(link, RECIPE, confirm=Person(device))
+        probe(RigSession(link, RECIPE, Operator(Person(device))))
     assert device.largest_rate < most_rate(device)

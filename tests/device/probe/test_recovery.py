@@ -9,6 +9,7 @@ from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.idle import correlation_time, mean_of, observed_step
 from scissorcal.device.probe.probe import probe
 from scissorcal.device.probe.result import Estimate, ProbeResult, probe_from_dict
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.device.sim.truth import varied
 from scissorcal.recipe.library import builtin_recipe
@@ -21,7 +22,7 @@ SYMPLECTIC_S = 2.5e-4
 
 def found(faults: Faults, seed: int) -> ProbeResult:
     device = StrangeDevice(faults, seed)
-    return probe(VirtualPort(device), RECIPE, confirm=Person(device))
+    return probe(RigSession(VirtualPort(device), RECIPE, Operator(Person(device))))
 
 
 def holds(estimate: Estimate | None, truth: float, widths: float = 2.0) -> bool:
@@ -78,7 +79,7 @@ def test_the_virtual_rig_is_recovered_although_its_friction_follows_another_law(
     rng = np.random.default_rng(seed)
     for _ in range(rigs):
         specimen = varied(load_specimen("office-paper"), rng)
-        result = probe(LockstepLink(specimen, rng), RECIPE)
+        result = probe(RigSession(LockstepLink(specimen, rng), RECIPE))
         mechanism = specimen.mechanism
         law = mechanism.friction
         assert holds(result.inertia_kg_m2, mechanism.inertia_kg_m2)

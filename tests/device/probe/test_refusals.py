@@ -6,6 +6,7 @@ import pytest
 
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.probe.result import ProbeResult
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
@@ -74,13 +75,13 @@ WARNED = {
 
 def probed(faults: Faults, recipe: Recipe = RECIPE) -> tuple[ProbeResult, StrangeDevice]:
     device = StrangeDevice(faults, seed=1)
-    return probe(VirtualPort(device), recipe, confirm=Person(device)), device
+    return probe(RigSession(VirtualPort(device), recipe, Operator(Person(device)))), device
 
 
 def refused(faults: Faults, recipe: Recipe = RECIPE) -> tuple[ProbeRefusedError, StrangeDevice]:
     device = StrangeDevice(faults, seed=1)
     with pytest.raises(ProbeRefusedError) as caught:
-        probe(VirtualPort(device), recipe, confirm=Person(device))
+        probe(RigSession(VirtualPort(device), recipe, Operator(Person(device))))
     return caught.value, device
 
 
@@ -152,7 +153,7 @@ def test_what_can_be_subtracted_or_only_worries_is_a_warning() -> None:
 def test_a_device_that_is_gone_is_a_device_error(fault: str) -> None:
     device = StrangeDevice(FAULTS[fault], seed=1)
     with pytest.raises(DeviceError):
-        probe(VirtualPort(device), RECIPE, confirm=Person(device))
+        probe(RigSession(VirtualPort(device), RECIPE, Operator(Person(device))))
 
 
 def test_motor_sign_cures_a_reversed_motor_whose_torque_is_measured_as_it_acts() -> None:
@@ -169,18 +170,18 @@ def test_motor_sign_cures_a_reversed_motor_whose_torque_is_measured_as_it_acts()
 def test_nobody_who_moves_the_blades_leaves_the_encoder_unchecked() -> None:
     """Pushes then stay so small that light blades behind a dead encoder keep within the bound."""
     device = StrangeDevice(Faults(dry_Nm=0.003, inertia=1e-4), seed=1)
-    result = probe(VirtualPort(device), RECIPE, confirm=lambda request: None)
+    result = probe(RigSession(VirtualPort(device), RECIPE, Operator(lambda request: None)))
     verdict = next(item for item in result.verdicts if item.check == "count scale")
     assert (verdict.status, verdict.value) == ("not_evaluated", None)
     assert "either nobody moved them or the encoder is stuck" in verdict.why
     dead = StrangeDevice(Faults(dry_Nm=0.003, inertia=1e-4, encoder_stuck_at_s=0.0), seed=1)
     with pytest.raises(ProbeRefusedError, match="Not determined: no push up to"):
-        probe(VirtualPort(dead), RECIPE, confirm=lambda request: None)
+        probe(RigSession(VirtualPort(dead), RECIPE, Operator(lambda request: None)))
     assert dead.largest_rate < LARGEST_RATE
 
 
 def test_nobody_to_ask_is_refused_before_anything_is_sent() -> None:
     device = StrangeDevice(seed=1)
     with pytest.raises(InputError, match="must ask a person to clear the blades"):
-        probe(VirtualPort(device), RECIPE)
+        probe(RigSession(VirtualPort(device), RECIPE))
     assert device.time_s < 0.1

@@ -6,6 +6,7 @@ import pytest
 
 from scissorcal.device.link import open_link
 from scissorcal.device.probe.probe import probe
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, decode
 from scissorcal.recipe.library import builtin_recipe
@@ -39,7 +40,7 @@ def test_a_device_that_falls_mute_in_a_pulse_is_told_to_release() -> None:
     device = StrangeDevice(seed=1)
     line = Tapped(device, "silent_at_s")
     with pytest.raises(DeviceError, match="stopped sending STATE"):
-        probe(line, RECIPE, confirm=Person(device))
+        probe(RigSession(line, RECIPE, Operator(Person(device))))
     *before, first, second, last = line.commands
     assert (before[-1].flags, before[-1].torque != 0.0) == (1, True)
     for command in (first, second, last):
@@ -52,7 +53,7 @@ def test_a_device_on_a_port_that_falls_mute_is_told_to_release() -> None:
     device = StrangeDevice(Faults(silent_at_s=2.0), seed=1)
     silent = pytest.raises(DeviceError, match="stopped sending STATE")
     with serve_on_pty(device) as port, open_link(port) as link, silent:
-        probe(link, RECIPE, confirm=Person(device))
+        probe(RigSession(link, RECIPE, Operator(Person(device))))
     assert not device._enabled
 
 
@@ -60,7 +61,7 @@ def test_no_torque_goes_out_after_the_release_of_a_runaway() -> None:
     device = StrangeDevice(seed=1)
     line = Tapped(device, "encoder_fault_at_s")
     with pytest.raises(DeviceError, match="fault of its encoder"):
-        probe(line, RECIPE, confirm=Person(device))
+        probe(RigSession(line, RECIPE, Operator(Person(device))))
     driven = [index for index, command in enumerate(line.commands) if command.torque != 0.0]
     after = line.commands[driven[-1] + 1 :]
     assert len(after) >= 3

@@ -4,6 +4,7 @@ import pytest
 
 from scissorcal.device.probe.hand_pass import CLOSE, OPEN
 from scissorcal.device.probe.probe import probe, request_of
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.kernel import Capability
 from scissorcal.recipe.library import builtin_recipe
 from tests.strange_device import Person, StrangeDevice, VirtualPort
@@ -36,6 +37,6 @@ def test_what_is_told_is_asked_before_anything_moves_and_holds() -> None:
 
     link = VirtualPort(device)
     sledge = device.sledge.place
-    probe(link, RECIPE, confirm=confirm)
+    probe(RigSession(link, RECIPE, Operator(confirm)))
     assert person.heard == [CLOSE, OPEN, request_of(RECIPE, link.identity)]
     assert abs(device.sledge.place - sledge) < 4e-3  # pushes, both ways

@@ -5,6 +5,7 @@ import pytest
 
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.probe import probe
+from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.device.sim.truth import varied
 from scissorcal.recipe.library import builtin_recipe
@@ -19,7 +20,7 @@ def test_no_lag_is_found_in_place_of_the_inertia(seed: int) -> None:
     rng = np.random.default_rng(seed)
     specimen = varied(load_specimen("office-paper"), rng)
     link = LockstepLink(specimen, rng.spawn(2)[0])
-    found = probe(link, builtin_recipe("paper-80gsm"))
+    found = probe(RigSession(link, builtin_recipe("paper-80gsm")))
     inertia, delay = found.inertia_kg_m2, found.delay_s
     assert inertia is not None
     assert delay is not None

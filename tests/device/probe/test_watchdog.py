@@ -6,6 +6,7 @@ import pytest
 
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.probe.result import ProbeResult
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
@@ -25,7 +26,7 @@ def probed(faults: Faults, recipe: Recipe = RECIPE) -> ProbeResult:
         patch("scissorcal.device.probe.probe._push"),
         patch("scissorcal.device.probe.probe._push_sledge"),
     ):
-        return probe(VirtualPort(device), recipe, confirm=Person(device))
+        return probe(RigSession(VirtualPort(device), recipe, Operator(Person(device))))
 
 
 def status(result: ProbeResult) -> dict[str, str]:

@@ -11,6 +11,7 @@ from scissorcal.errors import InputError, MissingError
 from scissorcal.vision.sim.sim_camera import render_blade_photographs
 from scissorcal.workday.demo.sim_photographs import specimen_blade
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.photographs import BladeSetup, photo_captures
 from scissorcal.workday.runs.blade import capture_blade
 from scissorcal.workday.runs.fit import fit_workspace
@@ -50,7 +51,7 @@ def test_the_virtual_blade_is_captured_and_fitted(workspace, photographs):
     assert len(done.taken) == 2
     assert "given twice" in done.refused[0]
     assert len(photo_captures(workspace, "blade")) == 1
-    (outcome,) = fit_workspace(workspace, ["blade"], effort="draft")
+    (outcome,) = fit_workspace(workspace, ["blade"], FitOptions(effort="draft"))
     assert not outcome.cached
     assert all(path.read_bytes()[:4] == b"\x89PNG" for path in outcome.pictures)
     assert len(outcome.pictures) == 2
@@ -60,7 +61,7 @@ def test_the_virtual_blade_is_captured_and_fitted(workspace, photographs):
     found = float(belief.edge.offset_at(middle))
     stated = 1e-3 * edge.offset_mm + middle * 0.0349208
     assert found == pytest.approx(stated, abs=6e-5)
-    (again,) = fit_workspace(workspace, ["blade"], effort="draft")
+    (again,) = fit_workspace(workspace, ["blade"], FitOptions(effort="draft"))
     assert again.cached
     assert again.result.belief.edge == belief.edge
     assert again.pictures == outcome.pictures
@@ -79,7 +80,7 @@ def test_both_blades_of_virtual_scissors(tmp_path):
         specimen_blade(lab.recipe()), tmp_path, seed=2, count=1, both=True
     )
     capture_blade(lab, made, BladeSetup(both=True), lambda _: None)
-    (outcome,) = fit_workspace(lab, ["blade"], effort="draft")
+    (outcome,) = fit_workspace(lab, ["blade"], FitOptions(effort="draft"))
     result = outcome.result
     assert [blade.name for blade in result.blades] == ["left", "right"]
     assert 0.45 < result.openings[0].opening_rad < 0.95
@@ -105,7 +106,7 @@ def test_a_pair_has_verdicts_on_its_lengths_and_its_lamps(tmp_path):
         cv2.imwrite(str(paths[-1]), pair.photo.image)
     setup = BladeSetup(both=True, mat=False, length_mm=78.0)
     capture_blade(lab, paths, setup, lambda _: None)
-    (outcome,) = fit_workspace(lab, ["blade"], effort="draft")
+    (outcome,) = fit_workspace(lab, ["blade"], FitOptions(effort="draft"))
     checks = {verdict.check for verdict in outcome.result.verdicts}
     assert {"residual against claimed sd", "blade lengths", "lamps apart"} <= checks
     again = load(Engine.of(lab).file("fit blade"), BladeResult)

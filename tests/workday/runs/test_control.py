@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +12,22 @@ import pytest
 
 from scissorcal.control.plate_request import REQUEST_FIRST
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError, InputError, MissingError
 from scissorcal.kernel import Capability
 from scissorcal.recording import read_attachments, read_recording, read_telemetry
 from scissorcal.recording.telemetry import CONTROL
 from scissorcal.verdicts import failed
+from scissorcal.workday.options import (
+    SIM_RIG,
+    CaptureOptions,
+    ControlOptions,
+    FitOptions,
+    RigOptions,
+)
 from scissorcal.workday.rigs import open_rig
 from scissorcal.workday.runs import control as runs_control
-from scissorcal.workday.runs.capture import capture_advance_into, capture_into
+from scissorcal.workday.runs.capture import capture_into
 from scissorcal.workday.runs.control import control_workspace
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.probe import ensure_probed
@@ -60,9 +68,9 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     text = workspace.recipe_path.read_text(encoding="utf-8")
     assert LONG in text
     workspace.recipe_path.write_text(text.replace(LONG, FEWER) + SHORT, encoding="utf-8")
-    capture_into(workspace, "friction", "sim", designed=False)
-    capture_advance_into(workspace, "sim")
-    fit_workspace(workspace, ("friction", "friction-advance"), effort="draft")
+    capture_into(workspace, "friction", SIM_RIG, CaptureOptions(designed=False))
+    capture_into(workspace, "friction-advance", SIM_RIG)
+    fit_workspace(workspace, ("friction", "friction-advance"), FitOptions(effort="draft"))
     (workspace.root / "path.csv").write_text("x_mm,force_N\n10,2\n30,2\n20,3\n")
     return workspace
 
@@ -73,7 +81,7 @@ def path_of(workspace: Workspace) -> Path:
 
 def test_a_path_is_followed_with_what_was_fitted(fitted: Workspace) -> None:
     """The recipe's specimen has its plate at 20, 10 mm, pitched by 3 degrees."""
-    done = control_workspace(fitted, "sim", path_of(fitted), pose="20,10,3")
+    done = control_workspace(fitted, SIM_RIG, ControlOptions(path_of(fitted), pose="20,10,3"))
     figures = done.result.figures
     assert failed(done.result.verdicts) == ()
     assert figures.force_rms_N < 0.12
@@ -98,12 +106,12 @@ def test_without_fits_it_says_what_to_run(tmp_path: Path) -> None:
     path = workspace.root / "path.csv"
     path.write_text("x_mm\n10\n30\n")
     with pytest.raises(MissingError, match="scissorcal capture friction"):
-        control_workspace(workspace, "sim", path, pose="20,10,3")
+        control_workspace(workspace, SIM_RIG, ControlOptions(path, pose="20,10,3"))
 
 
 def test_without_a_pose_it_says_what_to_do(fitted: Workspace) -> None:
     with pytest.raises(MissingError, match=r"--pose"):
-        control_workspace(fitted, "sim", path_of(fitted))
+        control_workspace(fitted, SIM_RIG, ControlOptions(path_of(fitted)))
 
 
 def test_without_friction_of_the_sledge_it_says_what_to_run(
@@ -115,7 +123,7 @@ def test_without_friction_of_the_sledge_it_says_what_to_run(
     shutil.copytree(fitted.root, other.root)
     (other.root / "fits" / "friction-advance.nc").unlink()
     with pytest.raises(MissingError, match="--axis advance"):
-        control_workspace(other, "sim", path_of(other), pose="20,10,3")
+        control_workspace(other, SIM_RIG, ControlOptions(path_of(other), pose="20,10,3"))
 
 
 def test_a_specimen_without_a_plate_is_said(fitted: Workspace, tmp_path: Path) -> None:
@@ -128,7 +136,9 @@ def test_a_specimen_without_a_plate_is_said(fitted: Workspace, tmp_path: Path) -
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(LockstepLink, "configure", refuse)
         with pytest.raises(Exception, match="give the virtual rig's specimen a plate"):
-            control_workspace(fitted, "sim", path_of(fitted), pose="20,10,3", record=False)
+            control_workspace(
+                fitted, SIM_RIG, ControlOptions(path_of(fitted), pose="20,10,3", no_record=True)
+            )
 
 
 def test_a_person_puts_the_plate_in_before_a_camera_looks_for_it(
@@ -150,9 +160,7 @@ def test_a_person_puts_the_plate_in_before_a_camera_looks_for_it(
         events.append((what, link.rig.opening, link.rig.advance))
 
     class Eye:
-        @contextmanager
-        def open_rig(self, *given: Any) -> Iterator[LockstepLink]:
-            yield link
+        world_rig = nullcontext(link)
 
         @contextmanager
         def follow(self, *given: Any, **held: float) -> Iterator[None]:
@@ -160,14 +168,15 @@ def test_a_person_puts_the_plate_in_before_a_camera_looks_for_it(
             raise DeviceError("There is no pose of the plate.")
             yield
 
-    monkeypatch.setattr(runs_control, "_camera", lambda *given, **more: Eye())
+    monkeypatch.setattr(runs_control, "_camera", lambda *given: Eye())
+    port, tracked = RigOptions("port"), ControlOptions(path_of(fitted), camera="0", no_record=True)
     with pytest.raises(DeviceError, match="no pose"):
-        control_workspace(fitted, "port", path_of(fitted), camera="0", confirm=note, record=False)
+        control_workspace(fitted, port, tracked, Operator(note))
     (asked, *_), (looked, *_) = events[-2:]
     assert (asked, looked) == (REQUEST_FIRST, "looked")
     assert events[-2][1:] == events[-1][1:], "nothing moved since"
     with pytest.raises(InputError, match="A person must be asked"):
-        control_workspace(fitted, "port", path_of(fitted), camera="0", record=False)
+        control_workspace(fitted, port, tracked)
     assert [what for what, *_ in events].count("looked") == 1
 
 
@@ -183,7 +192,9 @@ def test_the_surface_and_its_material_are_the_recipes(fitted: Workspace, tmp_pat
     other = Workspace(tmp_path / "paper")
     shutil.copytree(fitted.root, other.root)
     with open_rig("sim", other.recipe().specimen, 0) as link:
-        ensure_probed(other, link, other.recipe())  # the last one may be of another test's rig
+        ensure_probed(
+            other, RigSession(link, other.recipe())
+        )  # the last one may be of another test's rig
     late = json.loads(other.probe_path.read_text())
     late["delay_s"] = {"mean": 4e-3, "sd": 1e-4}
     other.probe_path.write_text(json.dumps(late))
@@ -191,11 +202,11 @@ def test_the_surface_and_its_material_are_the_recipes(fitted: Workspace, tmp_pat
     meant = 'unusual = ["plate.touch.stiffness_N_per_mm"]\n' + recipe.read_text()
     recipe.write_text(meant + "\n[plate.touch]\nstiffness_N_per_mm = 900\n")
     with pytest.raises(InputError, match="No gains hold a force against 900 N/mm"):
-        control_workspace(other, "sim", path_of(other), pose="20,10,3")
+        control_workspace(other, SIM_RIG, ControlOptions(path_of(other), pose="20,10,3"))
     text = re.sub(r"(?m)^stiffness.*", "peak_N = 1.0", recipe.read_text())
     recipe.write_text(text + '[plate.surface]\nkind = "sphere"\nradius_mm = 20.0\n')
     with pytest.raises(InputError, match="line 3: x = 30 mm leaves the surface"):
-        control_workspace(other, "sim", path_of(other), pose="20,10,3")
+        control_workspace(other, SIM_RIG, ControlOptions(path_of(other), pose="20,10,3"))
 
 
 def test_the_command_tells_and_keeps(fitted: Workspace, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,6 +12,7 @@ from scissorcal.cli.fit_law import text
 from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import scatter_on_record
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.plan import Plan, make_plan
 from scissorcal.workday.recordings import exclude_recording
 from scissorcal.workday.runs.fit import fit_workspace, load_result
@@ -50,14 +51,15 @@ def edit(workspace: Workspace, old: str, new: str) -> None:
 
 def test_nothing_changed_means_nothing_done(fitted: Workspace) -> None:
     before = fitted.fit_path("friction").read_bytes()
-    (outcome,) = fit_workspace(fitted, ("friction",), seed=99)
+    (outcome,) = fit_workspace(fitted, ("friction",), FitOptions(seed=99))
     assert outcome.cached
     assert fitted.fit_path("friction").read_bytes() == before
 
 
 def test_the_same_seed_gives_the_same_draws_and_another_seed_others(copied: Workspace) -> None:
     first, again, other = (
-        fit_workspace(copied, ("friction",), seed=seed, force=True)[0] for seed in (1, 1, 2)
+        fit_workspace(copied, ("friction",), FitOptions(seed=seed, force=True))[0]
+        for seed in (1, 1, 2)
     )
     assert not again.cached
     assert np.array_equal(first.result.draws, again.result.draws)
@@ -65,7 +67,7 @@ def test_the_same_seed_gives_the_same_draws_and_another_seed_others(copied: Work
 
 
 def test_another_effort_is_another_fit(copied: Workspace) -> None:
-    (outcome,) = fit_workspace(copied, ("friction",), effort="standard")
+    (outcome,) = fit_workspace(copied, ("friction",), FitOptions(effort="standard"))
     assert not outcome.cached
     assert outcome.result.effort == "standard"
     assert states(make_plan(copied))["fit friction"] == "unverified"
@@ -90,7 +92,7 @@ def test_a_fit_of_one_recording_takes_the_scatter_of_an_earlier_fit_of_two(
     seen = two.result.diagnostics[NEXT_RECORDING]
     exclude_recording(copied, again.name, "a loose screw")
     for force in (False, True):
-        (one,) = fit_workspace(copied, ("friction",), force=force)
+        (one,) = fit_workspace(copied, ("friction",), FitOptions(force=force))
         assert len(one.result.sources) == 1
         assert NEXT_RECORDING not in one.result.diagnostics
         assert one.result.diagnostics[ON_RECORD] == seen

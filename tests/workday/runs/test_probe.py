@@ -12,9 +12,11 @@ import pytest
 
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.probe import ProbeRefusedError
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording
 from scissorcal.recording.probe import probe_of
+from scissorcal.workday.options import SIM_RIG, RigOptions
 from scissorcal.workday.runs.capture import capture_into
 from scissorcal.workday.runs.probe import _store, ensure_probed, last_probe, probe_into, probe_state
 from scissorcal.workday.workspace import Workspace, create_workspace
@@ -38,12 +40,16 @@ def changed(recipe: Recipe, **keys: object) -> Recipe:
 def test_the_first_run_probes_and_the_next_ones_do_not(workspace: Workspace) -> None:
     recipe = workspace.recipe()
     said: list[str] = []
-    first = ensure_probed(workspace, virtual_rig(), recipe, say=said.append)
+    first = ensure_probed(
+        workspace, RigSession(virtual_rig(), recipe, Operator(say=said.append))
+    ).probe
     assert said[0] == (
         "Probing the rig first, with up to 150 mN m at the blades: there is no probe of it yet."
     )
     said.clear()
-    again = ensure_probed(workspace, virtual_rig(2), recipe, say=said.append)
+    again = ensure_probed(
+        workspace, RigSession(virtual_rig(2), recipe, Operator(say=said.append))
+    ).probe
     assert again == first
     assert said == [
         f"The rig was probed at {first.made_at} ('scissorcal device probe' repeats it)."
@@ -52,17 +58,21 @@ def test_the_first_run_probes_and_the_next_ones_do_not(workspace: Workspace) -> 
 
 def test_an_old_probe_another_rig_and_another_sign_do_not_count(workspace: Workspace) -> None:
     recipe = workspace.recipe()
-    first = ensure_probed(workspace, virtual_rig(), recipe)
+    first = ensure_probed(workspace, RigSession(virtual_rig(), recipe)).probe
     said: list[str] = []
     later = datetime.fromisoformat(first.made_at) + timedelta(hours=5)
-    ensure_probed(workspace, virtual_rig(), recipe, say=said.append, now=later)
+    ensure_probed(
+        workspace, RigSession(virtual_rig(), recipe, Operator(say=said.append)), now=later
+    )
     assert "5.0 h old, and rig.probe.max_age_h allows 4 h" in said[0]
     _store(workspace, replace(first, motor_sign=-1))
-    ensure_probed(workspace, virtual_rig(), recipe, say=said.append)
+    ensure_probed(workspace, RigSession(virtual_rig(), recipe, Operator(say=said.append)))
     assert "rig.motor_sign changed since" in said[-1]
     device = StrangeDevice(seed=1)
     person = Person(device)
-    ensure_probed(workspace, VirtualPort(device), recipe, say=said.append, confirm=person)
+    ensure_probed(
+        workspace, RigSession(VirtualPort(device), recipe, Operator(person, say=said.append))
+    )
     assert f"another rig, firmware or line ({first.device})" in said[-1]
     assert "let go of the handles and keep clear" in person.heard[-1]
 
@@ -72,14 +82,15 @@ def test_a_refused_rig_is_probed_again(workspace: Workspace) -> None:
     said: list[str] = []
     broken = StrangeDevice(FAULTS["motor reversed"], seed=1)
     with pytest.raises(ProbeRefusedError) as caught:
-        probe_into(workspace, VirtualPort(broken), recipe, confirm=Person(broken))
+        probe_into(workspace, RigSession(VirtualPort(broken), recipe, Operator(Person(broken))))
     assert caught.value.kept == (workspace.probe_path,)
     kept = last_probe(workspace)
     assert kept is not None
     assert any(verdict.status == "fail" for verdict in kept.verdicts)
     repaired = StrangeDevice(seed=1)
     ensure_probed(
-        workspace, VirtualPort(repaired), recipe, say=said.append, confirm=Person(repaired)
+        workspace,
+        RigSession(VirtualPort(repaired), recipe, Operator(Person(repaired), say=said.append)),
     )
     assert "the last probe refused it" in said[0]
 
@@ -102,7 +113,7 @@ def test_a_capture_probes_and_its_recording_holds_what_was_found(workspace: Work
     ]
     workspace.recipe_path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     said: list[str] = []
-    captured = capture_into(workspace, "friction", "sim", say=said.append)
+    captured = capture_into(workspace, "friction", SIM_RIG, operator=Operator(say=said.append))
     recording = read_recording(captured.path)
     found = probe_of(recording.device)
     assert found == last_probe(workspace)
@@ -118,9 +129,9 @@ def test_probe_and_capture_ask_once_to_clear_the_blades(workspace: Workspace) ->
         device = StrangeDevice(seed=1)
         person = Person(device)
         port = nullcontext(VirtualPort(device))
-        rig = patch("scissorcal.workday.runs.capture.open_rig", return_value=port)
+        rig = patch("scissorcal.workday.rigs.open_rig", return_value=port)
         with rig, patch.object(Workspace, "recipe", return_value=recipe):
-            capture_into(workspace, "friction", "a port", confirm=person)
+            capture_into(workspace, "friction", RigOptions("a port"), operator=Operator(person))
         assert expected in person.heard[-1]
         assert len(person.heard) == requests
 
@@ -128,7 +139,7 @@ def test_probe_and_capture_ask_once_to_clear_the_blades(workspace: Workspace) ->
 def test_the_plan_says_whether_the_probe_counts(workspace: Workspace) -> None:
     recipe = workspace.recipe()
     assert "there is no probe of it yet" in probe_state(workspace, recipe)
-    first = ensure_probed(workspace, virtual_rig(), recipe)
+    first = ensure_probed(workspace, RigSession(virtual_rig(), recipe)).probe
     good = probe_state(workspace, recipe)
     assert good.startswith(f"{first.device} was probed at {first.made_at}: no check failed")
     assert "count scale" in good

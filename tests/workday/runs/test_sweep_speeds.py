@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from scissorcal.device.counting import count_recorded
+from scissorcal.device.session import Operator
 from scissorcal.errors import InputError
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recording import read_recording
 from scissorcal.recording.probe import Estimate, ProbeResult
+from scissorcal.workday.options import SIM_RIG
 from scissorcal.workday.runs.capture import capture_into
 from scissorcal.workday.runs.sweep_speeds import with_usable_sweeps
 from scissorcal.workday.workspace import create_workspace
@@ -78,7 +80,7 @@ def test_a_capture_follows_the_shorter_list_and_is_judged_by_it(tmp_path: Path) 
     workspace.recipe_path.write_text(text, encoding="utf-8")
     said: list[str] = []
     with patch("scissorcal.workday.runs.sweep_speeds.NEXT", 1e3):
-        captured = capture_into(workspace, "friction", "sim", say=said.append)
+        captured = capture_into(workspace, "friction", SIM_RIG, operator=Operator(say=said.append))
     assert any("Sweeps at 0.005 rad/s are left out" in sentence for sentence in said)
     recording = read_recording(captured.path)
     swept = {stroke.speed for stroke in recording.strokes if np.isfinite(stroke.speed)}

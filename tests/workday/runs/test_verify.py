@@ -22,12 +22,13 @@ from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign.formats import RECORDS
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import VerifySettings
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.pool import open_pool
 from scissorcal.workday.records import RecordFile
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.report import write_workspace_report
-from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
+from scissorcal.workday.runs.verify import verify_workspace
 from scissorcal.workday.workspace import Workspace
 from tests.guard import GUARD_S
 from tests.workday.made import fitted_workspace, quick_workspace, record_friction
@@ -247,7 +248,8 @@ def test_a_cluster_gives_the_same_numbers(cleared: Workspace, whole: VerifyResul
 KILLED = """
 import sys
 from pathlib import Path
-from scissorcal.workday.runs.verify import VerifySettings, verify_workspace
+from scissorcal.workday.options import VerifySettings
+from scissorcal.workday.runs.verify import verify_workspace
 from scissorcal.workday.workspace import Workspace
 if __name__ == "__main__":
     many = VerifySettings(fits=500)

@@ -4,8 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
-from scissorcal.aliases import Progress
-from scissorcal.device.link import Link, PortLink
+from scissorcal.device.link import PortLink
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.probe.clipping import clipping
 from scissorcal.device.probe.hand_pass import (
@@ -38,6 +37,7 @@ from scissorcal.device.probe.swings import Swung, swings
 from scissorcal.device.probe.talk import Bounds, RunawayError, Talk
 from scissorcal.device.probe.watchdog import watchdog
 from scissorcal.device.rig_record import identity_facts
+from scissorcal.device.session import RigSession, ShowProgress
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.identity import digest
 from scissorcal.kernel import Capability, ConfigKey, Identity
@@ -99,23 +99,15 @@ class _Finding:
             raise ProbeRefusedError(outcome.undetermined, self.result)
 
 
-def probe(
-    link: Link,
-    recipe: Recipe,
-    *,
-    progress: Progress | None = None,
-    confirm: Confirm | None = None,
-    then: str = "",
-    now: datetime | None = None,
-) -> ProbeResult:
+def probe(session: RigSession, *, then: str = "", now: datetime | None = None) -> ProbeResult:
     """Check a rig before its motors run: sensors, clock, line, watchdog, signs, gains, mechanics.
 
     First a person moves the blades to both stops, motors off, so that scale, sign and zero of the
     encoder show without torque. Then pushes of torque grow until the blades move each way, pairs of
     pushes tell which way, and swings are planned until a model of inertia, friction, load and delay
-    is known. Torque, rate and the angle of each push stay within ``rig.probe``. ``confirm`` asks
-    the person, and tells what comes ``then``; a simulator moves and clears the blades itself. Where
-    nobody follows the requests, pushes stay so small that light blades behind a stuck encoder keep
+    is known. Torque, rate and the angle of each push stay within ``rig.probe``. The person is asked
+    and told what comes ``then``; a simulator moves and clears the blades itself. Where nobody
+    follows the requests, pushes stay so small that light blades behind a stuck encoder keep
     within the bound of the rate.
 
     Raises ProbeRefusedError (a DeviceError) at the first stage that finds something wrong or cannot
@@ -123,8 +115,8 @@ def probe(
     nobody can be asked; DeviceError where the link fails. The motors are off afterwards in every
     case.
     """
-    identity = link.identity
-    tell = progress or (lambda done, sentence: None)
+    identity, recipe = session.identity, session.recipe
+    confirm, tell = session.operator.confirm, session.operator.progress
     if confirm is None and not is_simulator(identity):
         raise InputError(
             "The probe must ask a person to clear the blades first: pass a confirm callback that "
@@ -132,9 +124,9 @@ def probe(
         )
     made = (now or datetime.now(UTC)).astimezone(UTC).isoformat(timespec="seconds")
     finding = _Finding(
-        ProbeResult(rig_name(identity), identity_digest(identity), made, recipe.rig.motor_sign)
+        ProbeResult(session.name, identity_digest(identity), made, recipe.rig.motor_sign)
     )
-    with Talk(link, bounds_of(recipe, identity), recipe.rig.motor_sign) as talk:
+    with Talk(session.link, bounds_of(recipe, identity), recipe.rig.motor_sign) as talk:
         tell(0.0, "the blades by hand, motors off")
         try:
             hand = _by_hand(talk, finding, recipe, confirm, then)
@@ -145,7 +137,7 @@ def probe(
     return finding.result
 
 
-def _stages(talk: Talk, finding: _Finding, recipe: Recipe, hand: bool, tell: Progress) -> None:
+def _stages(talk: Talk, finding: _Finding, recipe: Recipe, hand: bool, tell: ShowProgress) -> None:
     """Everything after the pass by hand to the last motion; ends at the first that stops it."""
     identity = talk.identity
     tell(0.1, "listening with the motors off")
@@ -207,11 +199,6 @@ def bounds_of(recipe: Recipe, identity: Identity) -> Bounds:
     )
 
 
-def rig_name(identity: Identity) -> str:
-    """Name and serial number, as people know the rig."""
-    return f"{identity.name} {identity.serial}"
-
-
 def identity_digest(identity: Identity) -> str:
     """Digest of everything that the device states: another firmware or limit is another rig."""
     return digest(identity_facts(identity))
@@ -271,7 +258,7 @@ def _of_idle(found: Idle, identity: Identity) -> dict[str, object]:
 
 
 def _push(
-    talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe, *, hand: bool, tell: Progress
+    talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe, *, hand: bool, tell: ShowProgress
 ) -> None:
     """Pushes on the blades: what moves them, which way, how the torque follows; then swings."""
     identity = talk.identity

@@ -1,6 +1,6 @@
 """Pushes: a torque, or a force on the sledge, for a time by the device's ticks, rest to rest."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -48,6 +48,10 @@ class Axis:
     rest: float
     seen: float
 
+    def until(self, way: float, rate: float | None = None) -> "Axis":
+        """The axis whose push ends at ``way`` and ``rate``, not where it counts as moved."""
+        return replace(self, moved=way, rate_moved=rate or self.rate_moved)
+
     def answer(self, effort: float) -> Answer:
         """The command with this effort on this axis."""
         return Answer(torque=effort) if self.name == "opening" else Answer(force=effort)
@@ -84,17 +88,17 @@ class Pushed:
 def axis_of(talk: Talk, name: AxisName, jitter: float, step: float) -> Axis:
     """The axis as the bounds of the talk allow to push it; ``jitter`` and ``step`` as seen idle."""
     bounds = talk.bounds
-    seen = max(MOVED_STEPS * step, MOVED_JITTERS * jitter)
+    shown = max(MOVED_STEPS * step, MOVED_JITTERS * jitter)
     still = max(1.5 * step, 6.0 * jitter)
     if name == "opening":
-        moved, rest = max(seen, MOVED_RAD), max(still, REST_RAD)
+        moved, rest = max(shown, MOVED_RAD), max(still, REST_RAD)
         return Axis(
             name, bounds.torque_Nm, bounds.angle_rad, bounds.rate_rad_per_s, moved, MOVED_RATE,
-            rest, seen,
+            rest, shown,
         )  # fmt: skip
-    moved, rest = max(seen, MOVED_M), max(still, REST_M)
+    moved, rest = max(shown, MOVED_M), max(still, REST_M)
     return Axis(
-        name, bounds.force_N, bounds.way_m, bounds.speed_m_per_s, moved, MOVED_SPEED, rest, seen
+        name, bounds.force_N, bounds.way_m, bounds.speed_m_per_s, moved, MOVED_SPEED, rest, shown
     )
 
 
@@ -105,18 +109,15 @@ def push(
     seconds: float,
     *,
     hold: float = 0.0,
-    way: float | None = None,
-    rate: float | None = None,
 ) -> Pushed:
-    """Push with ``hold + effort`` for ``seconds``, at most until ``way`` or ``rate`` is reached.
+    """Push with ``hold + effort`` for ``seconds``, at most until the axis has moved.
 
-    ``hold`` acts before and after. Repeated where a fault, lost frames or a stall of this computer
-    disturbed it.
+    `Axis.until` gives it another end. ``hold`` acts before and after. Repeated where a fault, lost
+    frames or a stall of this computer disturbed it.
     """
-    most_way, most_rate = way or axis.moved, rate or axis.rate_moved
     for _ in range(ATTEMPTS):
         begin = talk.mark()
-        start, rested = talk.play(_pushed(talk, axis, effort, seconds, hold, most_way, most_rate))
+        start, rested = talk.play(_pushed(talk, axis, effort, seconds, hold))
         heard = talk.heard(begin)
         faulty = bool(np.any(heard["flags"] & int(StateFlag.FAULT_LATCHED)))
         gaps = bool(np.any(np.diff(heard["sequence"]) > 1))
@@ -124,13 +125,13 @@ def push(
         places = heard[axis.name][first:]
         off = places - float(np.mean(places[: max(1, talk.ticks(BEFORE_S) // 2)]))
         went = float(off[int(np.argmax(np.abs(off)))])
-        found = Pushed(
+        pushed = Pushed(
             effort, hold, seconds, went, fastest(talk, places), begin + first, talk.mark(),
             faulty or gaps, rested,
         )  # fmt: skip
-        if not found.disturbed:
+        if not pushed.disturbed:
             break
-    return found
+    return pushed
 
 
 def fastest(talk: Talk, places: NDArray[np.float64]) -> float:
@@ -142,13 +143,7 @@ def fastest(talk: Talk, places: NDArray[np.float64]) -> float:
 
 
 def _pushed(
-    talk: Talk,
-    axis: Axis,
-    effort: float,
-    seconds: float,
-    hold: float,
-    way: float,
-    rate: float,
+    talk: Talk, axis: Axis, effort: float, seconds: float, hold: float
 ) -> Stage[tuple[int, bool]]:
     """One push; returns the sequence at which its rest began, and whether it came to rest again."""
     state = yield RELEASE if hold == 0.0 else axis.answer(hold)
@@ -171,8 +166,8 @@ def _pushed(
     while talk.sequence - begun < lasting:
         state = yield axis.answer(hold + effort)
         places.append(axis.place(state))
-        seen = abs(places[-1] - places[max(0, len(places) - 1 - span)]) / (span * talk.tick_s)
-        if abs(places[-1] - start) >= way or seen >= rate:
+        rate = abs(places[-1] - places[max(0, len(places) - 1 - span)]) / (span * talk.tick_s)
+        if abs(places[-1] - start) >= axis.moved or rate >= axis.rate_moved:
             break
         if state.flags & StateFlag.FAULT_LATCHED:
             break

@@ -126,15 +126,15 @@ def sense(talk: Talk, axis: Axis, found: Search) -> Sense:
     seconds = max(one.seconds for one in found.movers)
     hold, effort = found.hold, found.effort
     votes, factor = 0, PAIRS[0]
+    wide = axis.until(2.0 * axis.moved)
     pushes: list[Pushed] = []
     for wanted in PAIRS:
         if not pushes or max(one.rate for one in pushes[-2:]) < CALM * axis.rate:
             factor = wanted
         pair = [
-            push(talk, axis, sign * min(factor * effort, axis.effort), seconds, hold=hold,
-                 way=2.0 * axis.moved)
+            push(talk, wide, sign * min(factor * effort, axis.effort), seconds, hold=hold)
             for sign in (1, -1)
-        ]  # fmt: skip
+        ]
         pushes += pair
         apart = pair[0].went - pair[1].went
         if not any(one.disturbed for one in pair) and abs(apart) >= axis.seen:
@@ -179,7 +179,7 @@ def _make_room(talk: Talk, axis: Axis, moved: Pushed) -> list[Pushed]:
         left = here - low if moved.went > 0.0 else high - here
         if left >= ROOM * axis.moved:
             break
-        made.append(push(talk, axis, moved.effort, moved.seconds, way=2.0 * axis.moved))
+        made.append(push(talk, axis.until(2.0 * axis.moved), moved.effort, moved.seconds))
         there = float(talk.heard(talk.mark() - 1)[axis.name][0])
         if abs(there - here) <= axis.rest:
             break  # something carries it back, as it will the next time

@@ -61,30 +61,31 @@ def swings(
     pushes = list(before)
     least = TELLING * prior.breakaway_Nm
     strongest = max(abs(one.effort) for one in pushes)
-    fit = _fitted(talk, axis, pushes, least, prior, noise_rad)
+    wide = axis.until(_most_way(axis), MOST_RATE)
+
+    def telling() -> list[Push]:
+        return pushes_of(talk, pushes, least, prior.stop, axis.seen)
+
+    fit = _fitted(talk, telling(), prior, noise_rad)
     for pairs in range(MOST_PAIRS + 1):
         if pairs == MOST_PAIRS or (pairs >= LEAST_PAIRS and known(fit, strongest)):
-            fit = _fitted(talk, axis, pushes, least, prior, noise_rad, fit.values, modes=True)
+            fit = _fitted(talk, telling(), prior, noise_rad, fit.values, modes=True)
             if pairs == MOST_PAIRS or known(fit, strongest):
                 break
         for sign in (prior.stop, prior.stop) if prior.stop else (1, -1):
-            effort, seconds = _planned(talk, axis, fit, sign, prior.breakaway_Nm, strongest, hold)
-            one = push(talk, axis, effort, seconds, hold=hold, way=_most_way(axis), rate=MOST_RATE)
+            effort, seconds = _planned(talk, axis, fit, sign * prior.breakaway_Nm, strongest, hold)
+            one = push(talk, wide, effort, seconds, hold=hold)
             pushes.append(one)
             if not one.disturbed:
                 strongest = max(strongest, abs(effort))
-        fit = _fitted(talk, axis, pushes, least, prior, noise_rad, fit.values)
-    shown = swings_of(
-        pushes_of(talk, pushes, least, prior.stop, axis.seen), prior, noise_rad, fit.values, SHOWN
-    )
+        fit = _fitted(talk, telling(), prior, noise_rad, fit.values)
+    shown = swings_of(telling(), prior, noise_rad, fit.values, SHOWN)
     return Swung(tuple(pushes), fit, strongest, shown)
 
 
 def _fitted(
     talk: Talk,
-    axis: Axis,
-    pushes: list[Pushed],
-    least: float,
+    pushes: list[Push],
     prior: Prior,
     noise_rad: float,
     start: Array | None = None,
@@ -96,12 +97,11 @@ def _fitted(
     Where the mode that was followed so far does not explain the pushes, it is sought anew; with
     ``modes`` others are sought in any case.
     """
-    some = pushes_of(talk, pushes, least, prior.stop, axis.seen)
     with talk.paused():
-        fit = fit_joint(some, prior, noise_rad, start=start, modes=modes)
+        fit = fit_joint(pushes, prior, noise_rad, start=start, modes=modes)
         if modes or (fit.misfit <= EXPLAINED and not fit.strange):
             return fit
-        anew = fit_joint(some, prior, noise_rad, modes=False)
+        anew = fit_joint(pushes, prior, noise_rad, modes=False)
         return min(fit, anew, key=lambda one: (bool(one.strange), one.misfit))
 
 
@@ -162,17 +162,18 @@ def _planned(
     talk: Talk,
     axis: Axis,
     fit: JointFit,
-    sign: int,
-    breakaway: float,
+    breakaway_Nm: float,
     strongest: float,
     hold: float,
 ) -> tuple[float, float]:
     """Torque and time of the next swing: the safe one that goes farthest towards the aim.
 
+    It has the sign of ``breakaway_Nm``, the effort that moved the blades at first.
     While nothing stronger than BEYOND times the friction was tried, such torques go first. Light
     blades (LIGHT_SDS below the mean of ln inertia) bound way and rate.
     """
     aim = min(max(AIM_RAD, AIM_STEPS * axis.seen / MOVED_STEPS), AIM_SHARE * _most_way(axis))
+    sign, breakaway = math.copysign(1.0, breakaway_Nm), abs(breakaway_Nm)
     needed = BEYOND * math.exp(fit.value("log_coulomb"))
     lightest = fit.values.copy()
     lightest[NAMES.index("log_inertia")] -= LIGHT_SDS * min(fit.sd("log_inertia"), 0.7)

@@ -16,12 +16,13 @@ from scissorcal.workday.demo.photographs import (
     photograph,
 )
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import FitOptions, VerifySettings
 from scissorcal.workday.pool import open_pool, usable_cores
 from scissorcal.workday.runs.fit import FitOutcome, fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
 from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.runs.report import write_workspace_report
-from scissorcal.workday.runs.verify import VerifyOutcome, VerifySettings, verify_workspace
+from scissorcal.workday.runs.verify import VerifyOutcome, verify_workspace
 from scissorcal.workday.workspace import Workspace, create_workspace
 
 if TYPE_CHECKING:
@@ -121,10 +122,12 @@ def run_demo(
     tell(0.96, "rendering")
     package, rendering, recording = _render(workspace, recipe, LockstepLink(specimen, streams[1]))
     tell(0.98, "judging")
-    verdicts = [verdict for found in geometry for verdict in found.verdicts]
+    verdicts = [verdict for outcome in geometry for verdict in outcome.verdicts]
     verdicts += [verdict for fit in fits_made for verdict in fit.verdicts]
     verdicts += [verdict for check in verified for verdict in check.result.verdicts]
-    files = [found.path for found in (*geometry, *outcomes)] + [check.path for check in verified]
+    files = [outcome.path for outcome in (*geometry, *outcomes)] + [
+        check.path for check in verified
+    ]
     return DemoResult(
         workspace=workspace.root,
         specimen=specimen.name,
@@ -170,7 +173,7 @@ def make_day(
             ) from error
     what = RIG_FITS[recipe.rig.joint]
     part = _part(tell, 0.47, 1.0)
-    return geometry, fit_workspace(workspace, what, effort=effort, seed=seed, progress=part)
+    return geometry, fit_workspace(workspace, what, FitOptions(effort, seed=seed), progress=part)
 
 
 def judge(fit: "FitResult", specimen: "Specimen") -> tuple[Judged, ...]:
@@ -256,21 +259,18 @@ def _drawn(
 
 def _capture(root: Path, seed: int, capture: int = 0) -> None:
     """Capture friction and cuts of a seed's specimen; another process may do it."""
-    from scissorcal.device.capture import capture_cut, capture_friction, open_writer
+    from scissorcal.device import capture as rig_capture
     from scissorcal.device.lockstep import LockstepLink
+    from scissorcal.device.session import RigSession
 
     workspace = Workspace(root)
     recipe, text = workspace.recipe(), read_text(workspace.recipe_path)
     specimen, streams = _drawn(recipe, seed, capture)
-    link = LockstepLink(specimen, streams[0])
-    probe = ensure_probed(workspace, link, recipe)
-    path = workspace.new_recording("friction")
-    with open_writer(path, "friction", link, recipe, text, probe=probe) as writer:
-        capture_friction(link, recipe, writer, probe=probe)
-    path = workspace.new_recording("cut")
-    with open_writer(path, "cut", link, recipe, text, probe=probe) as writer:
-        capture_cut(link, recipe, writer, probe=probe)
-    link.close()
+    with LockstepLink(specimen, streams[0]) as link:
+        session = ensure_probed(workspace, RigSession(link, recipe, recipe_toml=text))
+        for kind in ("friction", "cut"):
+            with rig_capture.open_writer(session, kind, workspace.new_recording(kind)) as writer:
+                rig_capture.capture(session, kind, writer)
 
 
 def _truth_for(fit: "FitResult", specimen: "Specimen") -> dict[str, float]:
@@ -312,19 +312,18 @@ def _mean_share(truth: dict[str, float]) -> float:
 def _render(
     workspace: Workspace, recipe: "Recipe", link: "LockstepLink"
 ) -> "tuple[ModelPackage, RenderResult, Path]":
+    from scissorcal.device.session import RigSession
     from scissorcal.package import open_package
-    from scissorcal.render import open_writer, render
+    from scissorcal.render import Rendering, open_writer, render
     from scissorcal.render.rig_facts import rig_facts, with_probe
 
     package = open_package(workspace.package_path(recipe), warn=False)
-    probe = ensure_probed(workspace, link, recipe)
-    path = workspace.new_recording("render")
     text = read_text(workspace.recipe_path)
-    with open_writer(path, link, package, text, probe=probe) as writer:
-        rig = with_probe(rig_facts(package), probe)
-        result = render(
-            link, package, seconds=RENDER_S, limits=recipe.limits, writer=writer, rig=rig
-        )
+    session = ensure_probed(workspace, RigSession(link, recipe, recipe_toml=text))
+    path = workspace.new_recording("render")
+    with open_writer(session, package, path) as writer:
+        facts = with_probe(rig_facts(package), session.probe)
+        result = render(session, package, Rendering(RENDER_S), writer=writer, rig=facts)
     return package, result, path
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from scissorcal.aliases import Progress
 from scissorcal.recipe.requirements import requirements
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.photographs import BladeSetup
 from scissorcal.workday.runs.blade import capture_blade
 from scissorcal.workday.runs.camera import capture_camera
@@ -80,7 +81,8 @@ def fit_photographs(
 ) -> tuple[FitOutcome, ...]:
     """Fit what the scene requires of its photographs, in order."""
     wanted = [item.name for item in requirements(recipe).geometry]
-    return fit_workspace(workspace, wanted, seed=seed, progress=progress) if wanted else ()
+    options = FitOptions(seed=seed)
+    return fit_workspace(workspace, wanted, options, progress=progress) if wanted else ()
 
 
 def judge_photographs(

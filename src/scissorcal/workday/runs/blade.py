@@ -54,10 +54,9 @@ def capture_blade(
                 f"{photo.source}: no open blades: where this is a pair of scissors, it is closed, "
                 "and each blade hides the other's edge. Open it by 30 to 80 deg."
             )
-        return Seen(found.sentence())
+        return Seen(found.sentence(), board=BLADE_MAT if setup.mat else None)
 
-    board = BLADE_MAT if setup.mat else None
-    return take_photographs(workspace, "blade", paths, look, tell, board=board, blade=setup)
+    return take_photographs(workspace, "blade", paths, look, tell, blade=setup)
 
 
 def fit(engine: "Engine", request: "Request") -> "Made":

@@ -69,8 +69,7 @@ def capture_camera(
             drawn=lambda file: write_picture(detection_overlay(photo, detection), file),
         )
 
-    nothing = f"No picture showed the {board.name} held still."
-    taken = take_photographs(workspace, "camera", paths, look, tell, nothing)
+    taken = take_photographs(workspace, "camera", paths, look, tell)
     return taken, coverage
 
 

@@ -1,42 +1,35 @@
 """Follow a path on a plate with a workspace's rig, and record it."""
 
 import math
-from contextlib import ExitStack, nullcontext
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.aliases import Say
 from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import PATH
 from scissorcal.recipe.euler_angles import quaternion_words
-from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.rigs import line_of, open_rig
+from scissorcal.workday.options import NONE, ControlOptions, RigOptions
+from scissorcal.workday.runs.at_rig import RigRun, RigTask, run_at_rig
 from scissorcal.workday.runs.cut import edge_of_photographs
 from scissorcal.workday.runs.fit import load_result
-from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.tracking.stated_pose import stated_pose
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.aliases import Progress
     from scissorcal.calibration.result import FitResult
     from scissorcal.control.mechanics import RigMechanics
+    from scissorcal.control.path_file import SurfacePoints
     from scissorcal.control.result import ControlResult
-    from scissorcal.device.link import Link
-    from scissorcal.device.loading import Confirm
+    from scissorcal.device.session import Operator, RigSession
     from scissorcal.model.edge import Edge
     from scissorcal.model.friction import FrictionLaw
     from scissorcal.model.mechanism import AxisLaw
     from scissorcal.recipe.schema import Recipe
     from scissorcal.recording import RecordingWriter
-    from scissorcal.recording.probe import ProbeResult
     from scissorcal.tracking.plate_pose import PoseSource
-    from scissorcal.workday.tracking.plate_camera import PlateCamera, TrackedRun
+    from scissorcal.workday.tracking.plate_camera import PlateCamera
 
-NONE = "none"
 LATE_TICKS = 2.0
 """Where no probe measured the delay: one tick for line and host, one for the motor."""
 LACK_OF_FIT = 0.03
@@ -47,129 +40,123 @@ SLOW = 0.05
 UNMEASURED_NOISE_Nm = 1e-3
 
 
-@dataclass(frozen=True)
-class Controlled:
-    """A path that was followed: its result, its recording (None if not wanted), and the rig.
-
-    ``tracked`` is what became of a camera's pictures and of contacts, None without a camera.
-    """
-
-    result: "ControlResult"
-    recording: Path | None
-    rig: str
-    tracked: "TrackedRun | None" = None
-
-
 def control_workspace(
     workspace: Workspace,
-    device: str,
-    path_file: Path,
-    *,
-    force_N: float = 2.0,
-    speed_mm_per_s: float = 10.0,
-    pose: str | None = None,
-    camera: str = NONE,
+    rig: RigOptions,
+    options: ControlOptions,
+    operator: "Operator | None" = None,
     source: "PoseSource | None" = None,
-    record: bool = True,
-    seed: int = 0,
-    baud: int | None = None,
-    realtime: bool = False,
-    progress: "Progress | None" = None,
-    confirm: "Confirm | None" = None,
-    say: "Say | None" = None,
-) -> Controlled:
-    """Press on the plate and follow the path in ``path_file`` (CSV) with the rig on ``device``.
+) -> "RigRun[ControlResult]":
+    """Press on the plate and follow a path with a rig.
 
-    ``force_N`` and ``speed_mm_per_s`` hold where the file does not state them. The plate stands
-    where ``source`` says, or ``pose`` (text; `workday.tracking.stated_pose` reads it), or where
-    ``camera`` (a camera's number, or "sim" with the device "sim") and contacts have it while the
-    path is followed, or where the fit of its photographs found it. A person is asked for the plate
-    before a source or camera looks for it, else once the
-    blades are over its place. Mass, inertia and friction are those of the fits of both axes; the
-    surface and what it is made of are the recipe's (plate.surface, plate.touch). Samples and
-    telemetry go to captures/control-<stamp>.mcap unless ``record`` is False; with them the rows of
-    a track. Otherwise as `render_workspace`.
+    The plate stands where ``source`` says, or the options do. A person is asked for the plate
+    before a source or camera looks for it, else once the blades are over its place. Mass, inertia
+    and friction are those of the fits of both axes; the surface and what it is made of are the
+    recipe's (plate.surface, plate.touch). Samples and telemetry go to
+    captures/control-<stamp>.mcap. A rig without a probe that counts is probed first.
 
     Raises MissingError where a fit or the pose is missing, InputError where the pose is stated
     twice or the camera does not go with the device, and what `scissorcal.control.follow.control`
     raises.
     """
-    from scissorcal.control.follow import Job, control
     from scissorcal.control.path_file import read_path
-    from scissorcal.control.plate_request import ask_for_plate
-    from scissorcal.control.settings import Material
-    from scissorcal.recipe.plate_surface import plate_surface
 
-    recipe = workspace.recipe()
     engine = Engine.of(workspace)
-    points = read_path(path_file).stated(force_N, 1e-3 * speed_mm_per_s)
-    if source is not None and (pose is not None or camera != NONE):
+    points = read_path(options.path_file).stated(options.force_N, 1e-3 * options.speed_mm_per_s)
+    if source is not None and (options.pose is not None or options.camera != NONE):
         raise InputError(
             "The plate's pose comes from a source, a stated pose or a camera: give one."
         )
-    eye = _camera(engine, camera, device, pose, seed=seed, realtime=realtime)
-    known = None if eye else source or _pose_source(engine, pose)
-    if pose is not None and say:
-        say(f"The plate stands {_told(pose, camera, source)}.")
-    touch = recipe.plate.touch
-    fits = _fits(engine)
-    edge = blade_edge(engine, recipe)
-    line = line_of(recipe, baud)
-    with ExitStack() as stack:
-        opened = (
-            eye.open_rig(device, seed, line)
-            if eye
-            else open_rig(device, recipe.specimen, seed, realtime=realtime, line=line)
+    task = _ControlTask(engine, options, points)
+    task.tracked = source is not None or options.camera != NONE
+    task.camera = _camera(engine, rig, options)
+    task.source = source if task.tracked else _pose_source(engine, options.pose)
+    task.held_N = float(points.force.min())
+    if options.pose is not None and operator is not None:
+        operator.say(f"The plate stands {task.told}.")
+    task.fits, task.edge = _fits(engine), blade_edge(engine, engine.recipe)
+    return run_at_rig(workspace, task, rig, operator, record=not options.no_record)
+
+
+class _ControlTask(RigTask["ControlResult"]):
+    """Following ``points``; a plate is ``tracked`` where it stands before the blades move."""
+
+    kind = "control"
+    tracked: bool
+    fits: "tuple[FitResult, FitResult]"
+    edge: "Edge"
+
+    def __init__(self, engine: Engine, options: ControlOptions, points: "SurfacePoints") -> None:
+        self._engine, self._options, self._points = engine, options, points
+
+    def prepare(self, session: "RigSession") -> None:
+        from scissorcal.control.plate_request import ask_for_plate
+
+        if self.tracked:
+            ask_for_plate(session)
+
+    def open_writer(self, session: "RigSession", path: Path) -> "RecordingWriter":
+        from scissorcal.device.rig_record import rig_facts
+        from scissorcal.recording import Joint, RecordingWriter
+
+        identity, sign = session.identity, session.recipe.rig.motor_sign
+        writer = RecordingWriter(
+            path,
+            self.kind,
+            Joint("rotary"),
+            session.recipe_toml,
+            rig_facts(identity, sign, session.probe),
+            identity.handle_radius,
         )
-        link = stack.enter_context(opened)
-        rig = f"{link.identity.name} {link.identity.serial}"
-        probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
-        tracked = eye is not None or source is not None
-        if tracked:
-            ask_for_plate(link.identity, confirm)
-        path = workspace.new_recording("control") if record else None
-        writer = _open_writer(path, link, workspace, path_file, probe) if path else nullcontext()
-        with writer as recording, ExitStack() as seeing:
-            if eye:
-                known = seeing.enter_context(
-                    eye.follow(link, recording, held_N=float(points.force.min()))
-                )
-            assert known is not None
-            job = Job(
-                points=points,
-                surface=plate_surface(recipe.plate.surface, workspace.root),
-                source=known,
-                material=Material(1e3 * touch.stiffness_N_per_mm, touch.friction, touch.peak_N),
-                length_m=1e-3 * recipe.material.sheet_length_mm,
-                tracked=tracked,
-            )
-            done = control(
-                link,
-                recipe,
-                _mechanics(fits, edge, recipe, link, probe),
-                job,
-                writer=recording,
-                progress=progress,
-                confirm=confirm,
-                probe=probe,
-            )
-            seeing.close()
-            if recording is not None:
-                recording.note(_note(done, _told(pose, camera, source)))
-    return Controlled(done, path, rig, eye.tracked() if eye else None)
+        writer.attach("path.csv", read_foreign(self._options.path_file, PATH), "text/csv")
+        return writer
+
+    def do(
+        self,
+        session: "RigSession",
+        writer: "RecordingWriter | None",
+        source: "PoseSource | None",
+    ) -> "ControlResult":
+        from scissorcal.control.follow import Job, control
+        from scissorcal.control.settings import Material
+        from scissorcal.recipe.plate_surface import plate_surface
+
+        assert source is not None
+        recipe = session.recipe
+        touch = recipe.plate.touch
+        job = Job(
+            self._points,
+            plate_surface(recipe.plate.surface, self._engine.workspace.root),
+            source,
+            Material(1e3 * touch.stiffness_N_per_mm, touch.friction, touch.peak_N),
+            1e-3 * recipe.material.sheet_length_mm,
+            self.tracked,
+        )
+        result = control(session, _mechanics(self.fits, self.edge, session), job, writer)
+        if writer is not None:
+            writer.note(_note(result, self.told))
+        return result
+
+    @property
+    def told(self) -> str:
+        """Where the plate's pose was from, as an end of a sentence."""
+        if self._options.pose is None:
+            return "where it was tracked" if self.tracked else "as it was fitted"
+        stated = stated_pose(self._options.pose)
+        place = ", ".join(f"{1e3 * value:.2f}" for value in stated.translation_m)
+        turn = f"{stated.euler_angles.words}; {quaternion_words(stated.quaternion)}"
+        return f"as it was stated, ({place}) mm, {turn}"
 
 
-def _camera(
-    engine: Engine, camera: str, device: str, pose: str | None, *, seed: int, realtime: bool
-) -> "PlateCamera | None":
+def _camera(engine: Engine, rig: RigOptions, options: ControlOptions) -> "PlateCamera | None":
     """The camera that follows the plate; None without one."""
     from scissorcal.workday.tracking.plate_camera import PlateCamera
 
-    if camera == NONE:
+    if options.camera == NONE:
         return None
-    if pose is not None:
+    if options.pose is not None:
         raise InputError("The plate stands where --pose or where --camera has it: give one.")
-    return PlateCamera(engine, engine.recipe, camera, device, seed=seed, realtime=realtime)
+    return PlateCamera(engine, options.camera, rig)
 
 
 def _pose_source(engine: Engine, pose: str | None) -> "PoseSource":
@@ -189,8 +176,10 @@ def _pose_source(engine: Engine, pose: str | None) -> "PoseSource":
             "The fit of the plate has no pose in the rig's frame: photograph the rig's card too "
             "('scissorcal capture plate --help'), or state where the plate stands with --pose."
         )
-    found = fit.rig_plate
-    return fixed_pose(found.matrix, np.asarray(found.translation_m), found.covariance)
+    pose_of_fit = fit.rig_plate
+    return fixed_pose(
+        pose_of_fit.matrix, np.asarray(pose_of_fit.translation_m), pose_of_fit.covariance
+    )
 
 
 def _fits(engine: Engine) -> "tuple[FitResult, FitResult]":
@@ -207,16 +196,14 @@ def blade_edge(engine: Engine, recipe: "Recipe") -> "Edge":
 
 
 def _mechanics(
-    fits: "tuple[FitResult, FitResult]",
-    edge: "Edge",
-    recipe: "Recipe",
-    link: "Link",
-    probe: "ProbeResult",
+    fits: "tuple[FitResult, FitResult]", edge: "Edge", session: "RigSession"
 ) -> "RigMechanics":
     from scissorcal.control.mechanics import RigMechanics
     from scissorcal.model.blade_point import BladePoint
 
-    tick_s = link.identity.tick_us * 1e-6
+    recipe, probe = session.recipe, session.probe
+    assert probe is not None
+    tick_s = session.identity.tick_us * 1e-6
     zero = probe.torque_zero_Nm
     opening = axis_of_fit(fits[0], "kg m^2")
     return RigMechanics(
@@ -263,35 +250,6 @@ def _sliding_sd(fit: "FitResult", law: "FrictionLaw") -> float:
     sliding = friction_torque(FrictionLaw.of_fit(drawn, centre), centre, rates)
     level = float(np.abs(friction_torque(law, centre, rates)).max())
     return math.hypot(float(np.std(sliding, axis=0).max()), LACK_OF_FIT * level)
-
-
-def _open_writer(
-    path: Path, link: "Link", workspace: Workspace, path_file: Path, probe: "ProbeResult"
-) -> "RecordingWriter":
-    from scissorcal.device.rig_record import rig_facts
-    from scissorcal.recording import Joint, RecordingWriter
-
-    recipe = workspace.recipe()
-    writer = RecordingWriter(
-        path,
-        "control",
-        Joint("rotary"),
-        read_text(workspace.recipe_path),
-        rig_facts(link.identity, recipe.rig.motor_sign, probe),
-        link.identity.handle_radius,
-    )
-    writer.attach("path.csv", read_foreign(path_file, PATH), "text/csv")
-    return writer
-
-
-def _told(pose: str | None, camera: str, source: "PoseSource | None") -> str:
-    """Where the plate's pose was from, as an end of a sentence."""
-    if pose is not None:
-        stated = stated_pose(pose)
-        place = ", ".join(f"{1e3 * value:.2f}" for value in stated.translation_m)
-        turn = f"{stated.euler_angles.words}; {quaternion_words(stated.quaternion)}"
-        return f"as it was stated, ({place}) mm, {turn}"
-    return "where it was tracked" if source or camera != NONE else "as it was fitted"
 
 
 def _note(done: "ControlResult", told: str) -> str:

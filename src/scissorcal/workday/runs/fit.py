@@ -10,6 +10,7 @@ from scissorcal.aliases import Progress
 from scissorcal.errors import InputError, MissingError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine, refuse_other_fit
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.states import WAITING, StepState
 from scissorcal.workday.steps import BY_NAME, Step, steps_of
 from scissorcal.workday.workspace import Workspace
@@ -80,19 +81,16 @@ class FitOutcome:
 def fit_workspace(
     workspace: Workspace,
     wanted: Sequence[str] = (),
+    options: FitOptions = FitOptions(),
     *,
-    effort: "Effort | None" = None,
-    seed: int = 0,
-    force: bool = False,
     progress: Progress | None = None,
     stop: Stop | None = None,
 ) -> tuple[FitOutcome, ...]:
     """Run the fits in ``wanted`` ("camera", "blade", "friction-advance", ...), or all required.
 
-    A fit whose identity equals that of the stored one is read back; ``force`` does those in
+    A fit whose identity equals that of the stored one is read back; ``options.force`` does those in
     ``wanted`` again all the same. Fits that a wanted one builds on are run first where they are
-    missing or stale. ``effort`` is the recipe's where not given. The result that was there is kept
-    (`workday.history`).
+    missing or stale. The result that was there is kept (`workday.history`).
 
     Raises InputError where the scene does not require what is wanted, MissingError where nothing
     was captured, and what the fits themselves raise.
@@ -103,9 +101,7 @@ def fit_workspace(
         fit_step(
             engine,
             step,
-            effort=effort,
-            seed=seed,
-            force=force and (not wanted or step.what in wanted),
+            for_step(options, step, wanted),
             progress=share_of(progress, index, len(steps)),
             stop=stop,
         )
@@ -135,51 +131,49 @@ def steps_to_fit(engine: Engine, wanted: Sequence[str] = ()) -> list[Step]:
     return [step for step in steps_of("fit") if step.name in names]
 
 
+def for_step(options: FitOptions, step: Step, wanted: Sequence[str]) -> FitOptions:
+    """The options of one fit: it is forced, and its critic asked, only where it is wanted."""
+    named = step.what in wanted
+    return replace(
+        options, force=options.force and (named or not wanted), critic=options.critic and named
+    )
+
+
 def fit_step(
     engine: Engine,
     step: Step,
+    options: FitOptions = FitOptions(),
     *,
-    effort: "Effort | None" = None,
-    seed: int = 0,
-    force: bool = False,
     progress: Progress | None = None,
     stop: Stop | None = None,
-    save_to: Path | None = None,
-    critic: bool = False,
 ) -> FitOutcome:
-    """Run one fit, or read it back where its identity is the stored one's, unless ``force``.
-
-    ``critic`` asks for the critic of friction, at draft effort too; a stored fit without it is made
-    again.
-
-    Where the workspace cannot be written, the fit is kept in ``save_to`` (`workday.elsewhere`).
-    """
+    """Run one fit, or read it back where its identity is the stored one's, unless forced."""
     from scissorcal.workday.elsewhere import refuse_unwritable, save_anywhere
 
-    chosen: Effort = effort or engine.recipe.fit.effort
+    chosen: Effort = options.effort or engine.recipe.fit.effort
     identity = engine.identity(step.name, chosen)
     path = engine.file(step.name)
     stored = _stored(engine, step)
     current = stored.get("inputs") == identity or stored.get("imported")
-    if stored and current and not force and engine.state(step.name).state != "stale":
+    if stored and current and not options.force and engine.state(step.name).state != "stale":
         state, result = engine.state(step.name), _load(step, path)
-        if not (critic and not stored.get("imported") and _unasked(result)):
+        if not (options.critic and not stored.get("imported") and _unasked(result)):
             return FitOutcome(step.what, result, path, pictures_beside(path), True, state)
     _refuse_without_data(engine, BY_NAME[step.inputs[0]])
-    refuse_unwritable(engine, save_to)
+    refuse_unwritable(engine, options.save_to)
     request = Request(
         effort=chosen,
-        seed=seed,
+        seed=options.seed,
         inputs_hash=identity,
         checkpoint=path.with_name(f"{step.what}-{identity[:12]}.chains"),
         last_model=str(stored.get("model", "")),
         progress=progress or (lambda done, sentence: None),
         stop=stop or (lambda: False),
-        critic=critic,
+        critic=options.critic,
     )
     made = cast(FitModule, import_module(step.run)).fit(engine, request)
     result = _on_record(engine, step, made.result)
-    save_anywhere(engine, step, result, made.draw, save_to)
+    save_anywhere(engine, step, result, made.draw, options.save_to)
     state = engine.state(step.name)
     if state.state != "incomplete":
         request.checkpoint.unlink(missing_ok=True)

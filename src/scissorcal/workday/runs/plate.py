@@ -60,8 +60,7 @@ def capture_plate(
         )
         return Seen(words, detection, stance)
 
-    nothing = "No picture showed the plate's target held still."
-    return take_photographs(workspace, kind, paths, look, tell, nothing)
+    return take_photographs(workspace, kind, paths, look, tell)
 
 
 def fit(engine: "Engine", request: "Request") -> "Made":

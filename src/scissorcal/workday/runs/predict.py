@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from scissorcal.aliases import Progress
 from scissorcal.errors import InputError, needs_extra
@@ -11,6 +11,7 @@ from scissorcal.files import replacing
 from scissorcal.foreign import open_foreign, reading
 from scissorcal.foreign.formats import LOG
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import PredictOptions
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.workspace import Workspace
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from scissorcal.calibration.friction.predict import Band, Prediction
     from scissorcal.recording import Joint, Recording
 
-What = Literal["friction", "load"]
 
 CHANNELS = ("opening", "motor_torque", "handle_force", "torque_command", "force_command")
 _LONGEST_HEADING = 100_000
@@ -41,22 +41,12 @@ class PredictionOutcome:
 
 
 def predict_workspace(
-    workspace: Workspace,
-    what: What,
-    motion: Path,
-    *,
-    level: float = 0.9,
-    table: Path | None = None,
-    plot: Path | None = None,
-    progress: Progress | None = None,
+    workspace: Workspace, options: PredictOptions, progress: Progress | None = None
 ) -> PredictionOutcome:
     """Predict the effort of empty motion, or the load at a tool's far end, for one file.
 
-    ``motion`` is a recording, or a table as ``export`` writes it (``time_s`` and ``opening_rad``,
-    or ``opening_m``; for a load ``motor_torque_Nm`` too). The band is calibrated on the
-    workspace's own friction recordings. ``table`` (.csv) and ``plot`` (.svg, .png) are written
-    where named. Raises MissingError where the fit is missing or stale, InputError for files that
-    are no motion.
+    The band is calibrated on the friction recordings of the workspace. Raises MissingError where
+    the fit is missing or stale, InputError for files that are no motion.
     """
     from scissorcal.calibration import friction_experiment
     from scissorcal.calibration.friction.predict import (
@@ -67,6 +57,7 @@ def predict_workspace(
     )
 
     tell = progress or (lambda done, sentence: None)
+    level, table, plot = options.level, options.table, options.plot
     _refuse_files(table, plot)
     engine = Engine.of(workspace)
     recipe = engine.recipe
@@ -74,10 +65,10 @@ def predict_workspace(
     settings = recipe.fit.friction
     tell(0.0, "prediction: reading recordings")
     own = used_recordings(workspace, recipe, "friction", engine.index)
-    given = read_motion(motion, own[0].joint, own[0].handle_radius_m)
+    given = read_motion(options.motion, own[0].joint, own[0].handle_radius_m)
     tell(0.2, "prediction: calibrating the band on what the fit had not seen")
     design = friction_experiment(own, settings, fit)
-    if what == "load":
+    if options.what == "load":
         band = load_band(design, fit, own, settings.cutoff_Hz, level)
         tell(0.8, "prediction: solving for the load")
         found = predict_far_load(fit, band, (given,), settings.cutoff_Hz)

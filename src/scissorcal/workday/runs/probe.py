@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
@@ -12,59 +13,41 @@ from scissorcal.files import replacing
 from scissorcal.foreign import read_json, reading
 from scissorcal.foreign.formats import STATE
 from scissorcal.verdicts import failed
-from scissorcal.workday.rigs import line_of, open_rig
+from scissorcal.workday.rigs import open_session
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.aliases import Progress, Say
     from scissorcal.device.link import Link
-    from scissorcal.device.loading import Confirm
     from scissorcal.device.probe.result import ProbeResult
+    from scissorcal.device.session import Operator, RigSession
     from scissorcal.recipe.schema import Recipe
+    from scissorcal.workday.options import RigOptions
 
 
 def probe_device(
     recipe: Recipe,
-    device: str,
+    rig: RigOptions,
+    operator: Operator | None = None,
     *,
     workspace: Workspace | None = None,
-    seed: int = 0,
-    baud: int | None = None,
-    realtime: bool = False,
-    progress: Progress | None = None,
-    confirm: Confirm | None = None,
 ) -> ProbeResult:
-    """Probe ``device`` (a port, or "sim") and keep the result in the workspace, if there is one.
-
-    "sim" is a virtual rig in virtual time, unless ``realtime``; ``baud`` takes the place of the
-    recipe's rate.
+    """Probe a rig and keep the result in the workspace, if there is one.
 
     A probe that refuses the rig is kept as well, so that what it found can be looked up. Raises
     what `scissorcal.device.probe.probe.probe` raises.
     """
     from scissorcal.device.probe.probe import probe
 
-    line = line_of(recipe, baud)
-    with open_rig(device, recipe.specimen, seed, realtime=realtime, line=line) as link:
-        if workspace is None:
-            return probe(link, recipe, progress=progress, confirm=confirm)
-        return probe_into(workspace, link, recipe, progress=progress, confirm=confirm)
+    with open_session(recipe, rig, operator) as session:
+        return probe(session) if workspace is None else probe_into(workspace, session)
 
 
-def probe_into(
-    workspace: Workspace,
-    link: Link,
-    recipe: Recipe,
-    *,
-    progress: Progress | None = None,
-    confirm: Confirm | None = None,
-    then: str = "",
-) -> ProbeResult:
-    """Probe the rig on a link, and keep what was found; as `probe_device`."""
+def probe_into(workspace: Workspace, session: RigSession, then: str = "") -> ProbeResult:
+    """Probe the rig of a session, and keep what was found; as `probe_device`."""
     from scissorcal.device.probe.probe import ProbeRefusedError, probe
 
     try:
-        result = probe(link, recipe, progress=progress, confirm=confirm, then=then)
+        result = probe(session, then=then)
     except ProbeRefusedError as error:
         _store(workspace, error.result)
         error.kept = (workspace.probe_path,)
@@ -74,46 +57,36 @@ def probe_into(
 
 
 def ensure_probed(
-    workspace: Workspace,
-    link: Link,
-    recipe: Recipe,
-    *,
-    progress: Progress | None = None,
-    confirm: Confirm | None = None,
-    then: str = "",
-    say: Say | None = None,
-    now: datetime | None = None,
-) -> ProbeResult:
-    """The workspace's probe of this rig, or a new one where there is none that still counts.
+    workspace: Workspace, session: RigSession, then: str = "", now: datetime | None = None
+) -> RigSession:
+    """The session with the workspace's probe of its rig, or a new one where none still counts.
 
     One counts if it is of exactly this rig (all that it states) and this ``rig.motor_sign``, found
-    nothing wrong, and is not older than ``rig.probe.max_age_h``. ``say`` tells which it was; a
-    person is told what comes ``then``. Raises
+    nothing wrong, and is not older than ``rig.probe.max_age_h``. The operator is told which it was,
+    and what comes ``then``; a person whom a new probe asked has cleared the blades for it. Raises
     DeviceError, besides what the probe raises, where blades of its inertia would get too fast
     without commands (`refuse_unanswered`).
     """
-    tell = say or (lambda sentence: None)
-    last = _kept(workspace)
-    why = _why_again(last, link, recipe, now or datetime.now(UTC))
-    if not isinstance(last, str) and not why:
-        tell(f"The rig was probed at {last.made_at} ('scissorcal device probe' repeats it).")
-        _refuse_unanswered(last, link, recipe, tell)
-        return last
-    tell(f"Probing the rig first, with up to {_most(recipe)} at the blades: {why}.")
-    result = probe_into(workspace, link, recipe, progress=progress, confirm=confirm, then=then)
-    for verdict in result.verdicts:
-        if verdict.status == "not_evaluated" and verdict.value is not None:
-            tell(verdict.why)
-    _refuse_unanswered(result, link, recipe, tell)
-    return result
-
-
-def _refuse_unanswered(result: ProbeResult, link: Link, recipe: Recipe, tell: Say) -> None:
     from scissorcal.device.unanswered import refuse_unanswered
 
-    said = refuse_unanswered(recipe, link.identity, result.inertia_kg_m2)
-    if said:
-        tell(said)
+    recipe, say = session.recipe, session.operator.say
+    last = _kept(workspace)
+    why = _why_again(last, session.link, recipe, now or datetime.now(UTC))
+    if not isinstance(last, str) and not why:
+        say(f"The rig was probed at {last.made_at} ('scissorcal device probe' repeats it).")
+        probed = replace(session, probe=last)
+    else:
+        say(f"Probing the rig first, with up to {_most(recipe)} at the blades: {why}.")
+        result = probe_into(workspace, session, then)
+        for verdict in result.verdicts:
+            if verdict.status == "not_evaluated" and verdict.value is not None:
+                say(verdict.why)
+        probed = replace(session, probe=result, cleared=not session.simulated)
+    assert probed.probe is not None
+    warning = refuse_unanswered(recipe, session.identity, probed.probe.inertia_kg_m2)
+    if warning:
+        say(warning)
+    return probed
 
 
 def last_probe(workspace: Workspace, link: Link | None = None) -> ProbeResult | None:
@@ -121,10 +94,10 @@ def last_probe(workspace: Workspace, link: Link | None = None) -> ProbeResult | 
 
     None where there is none that can be read.
     """
-    found = _kept(workspace)
-    if isinstance(found, str) or (link is not None and _differs(found, link)):
+    kept = _kept(workspace)
+    if isinstance(kept, str) or (link is not None and _differs(kept, link)):
         return None
-    return found
+    return kept
 
 
 def probe_state(workspace: Workspace, recipe: Recipe, now: datetime | None = None) -> str:

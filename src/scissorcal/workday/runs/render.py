@@ -2,143 +2,112 @@
 
 import json
 import math
-from contextlib import ExitStack, nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scissorcal.aliases import Say
 from scissorcal.errors import InputError, MissingError, ScissorcalError, VerdictError
 from scissorcal.files import replacing
-from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.rigs import line_of, open_rig
+from scissorcal.workday.options import NONE, RenderOptions, RigOptions
+from scissorcal.workday.runs.at_rig import RigRun, RigTask, run_at_rig
 from scissorcal.workday.runs.fit import available, load_result
-from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from scissorcal.aliases import Progress
-    from scissorcal.device.loading import Confirm
+    from scissorcal.device.session import Operator, RigSession
     from scissorcal.package import ModelPackage
     from scissorcal.recipe.plate_tracking import PlateTracking
     from scissorcal.recipe.schema import Recipe
-    from scissorcal.render import PoseSource, RenderResult, RigFacts, VirtualStrokes
-    from scissorcal.workday.tracking.plate_camera import PlateCamera, TrackedRun
-
-NONE = "none"
-
-
-@dataclass(frozen=True)
-class Rendered:
-    """A finished rendering: its result, its recording (None if not wanted), and the rig.
-
-    ``tracked`` is what became of a camera's pictures and of taps, None without a camera.
-    """
-
-    result: "RenderResult"
-    recording: Path | None
-    rig: str
-    tracked: "TrackedRun | None" = None
+    from scissorcal.recording import RecordingWriter
+    from scissorcal.render import PoseSource, RenderResult, RigFacts
+    from scissorcal.workday.tracking.plate_camera import PlateCamera
 
 
 def render_workspace(
     workspace: Workspace,
-    device: str,
-    *,
-    package_path: Path | None = None,
-    seconds: float = 30.0,
-    strokes: "VirtualStrokes | None" = None,
-    record: bool = True,
-    seed: int = 0,
-    baud: int | None = None,
-    realtime: bool = False,
-    progress: "Progress | None" = None,
-    confirm: "Confirm | None" = None,
-    say: "Say | None" = None,
-    plate: "PoseSource | None" = None,
-    camera: str = NONE,
-    taps_s: float = 0.0,
-    accept_derated: bool = False,
-    allow_mismatch: bool = False,
-    trusted: "Sequence[str] | None" = None,
-) -> Rendered:
-    """Render the workspace's package (or another) on ``device``, within the recipe's limits.
+    rig: RigOptions,
+    options: RenderOptions = RenderOptions(),
+    operator: "Operator | None" = None,
+    source: "PoseSource | None" = None,
+) -> "RigRun[RenderResult]":
+    """Render the workspace's package (or another) on a rig, within the recipe's limits.
 
-    ``device`` is a port, or "sim" for a virtual rig whose virtual hand makes ``strokes``, in
-    virtual time unless ``realtime``; ``baud`` takes the place of the recipe's rate. The samples go
-    to captures/render-<stamp>.mcap unless ``record`` is False. A rig without a probe that counts is
-    probed first (`ensure_probed`), and ``say`` tells so. ``plate`` tracks a plate whose pose the
-    scene estimates, or ``camera`` does (a camera's number, or "sim" with the device "sim"); without
-    them the pose fitted to photographs is taken. Before the rendering a person taps the tracked
-    plate with the blade's tip for ``taps_s``, motors off. ``accept_derated``: a person wants what
-    is felt to differ by more than the scene's tolerance, see `scissorcal.render.render`.
+    A rig without a probe that counts is probed first (`ensure_probed`). ``source`` tracks a plate
+    whose pose the scene estimates, or the camera of the options does; without them the pose fitted
+    to photographs is taken. Samples go to captures/render-<stamp>.mcap.
 
     Raises MissingError where there is no package or no pose, or where the package is stale,
-    InputError where it is of another rig, both unless ``allow_mismatch``, InputError where a camera
-    is named for a known pose or does not go with the device, and what opening them and the
-    rendering raise.
+    InputError where it is of another rig, both unless the options allow it, InputError where a
+    camera is named for a known pose or does not go with the device, VerdictError where nobody
+    trusted signed the package, and what opening them and the rendering raise.
     """
     from scissorcal.package import open_package
-    from scissorcal.render import open_writer, render
-    from scissorcal.render.mismatch import refuse_other_rig
-    from scissorcal.render.rig_facts import with_probe
+    from scissorcal.package.keys import read_public_keys
 
-    recipe = workspace.recipe()
-    package = open_package(package_path or workspace.package_path(recipe), warn=False)
-    if trusted is not None:
-        _refuse_untrusted(package, trusted)
-    stale = "" if package_path else _stale(Engine.of(workspace))
-    if not allow_mismatch:
+    recipe, of_workspace = workspace.recipe(), options.package_path is None
+    package = open_package(options.package_path or workspace.package_path(recipe), warn=False)
+    if options.trusted_key:
+        _refuse_untrusted(package, read_public_keys(options.trusted_key))
+    stale = _stale(Engine.of(workspace)) if of_workspace else ""
+    if not options.allow_mismatch:
         if stale:
             raise MissingError(f"{stale} To render it all the same: --allow-mismatch.")
         _refuse_other_blades(recipe, package)
-    eye = _camera(workspace, package, camera, device, taps_s, seed=seed, realtime=realtime)
-    line = line_of(recipe, baud)
-    with ExitStack() as stack:
-        opened = (
-            eye.open_rig(device, seed, line)
-            if eye
-            else open_rig(device, recipe.specimen, seed, realtime=realtime, line=line)
+    task = _RenderTask(workspace, package, options, stale)
+    task.camera = _camera(workspace, package, rig, options)
+    task.source, task.taps_s = source, options.taps_s
+    run = run_at_rig(workspace, task, rig, operator, record=not options.no_record)
+    if of_workspace:
+        _write_admission(workspace.package_path(recipe), run.result, run.rig)
+    return run
+
+
+class _RenderTask(RigTask["RenderResult"]):
+    """Rendering a package; a recording notes that it is stale."""
+
+    kind = "render"
+
+    def __init__(
+        self, workspace: Workspace, package: "ModelPackage", options: RenderOptions, stale: str
+    ) -> None:
+        self._workspace, self._package = workspace, package
+        self._options, self._stale = options, stale
+
+    def check(self, session: "RigSession") -> None:
+        from scissorcal.render.mismatch import refuse_other_rig
+
+        if not self._options.allow_mismatch:
+            refuse_other_rig(self._package, session.identity)
+
+    def open_writer(self, session: "RigSession", path: Path) -> "RecordingWriter":
+        from scissorcal.render import open_writer
+
+        writer = open_writer(session, self._package, path)
+        if self._stale:
+            writer.note(self._stale)
+        return writer
+
+    def do(
+        self,
+        session: "RigSession",
+        writer: "RecordingWriter | None",
+        source: "PoseSource | None",
+    ) -> "RenderResult":
+        from scissorcal.render import Rendering, VirtualStrokes, render
+        from scissorcal.render.rig_facts import with_probe
+
+        options = self._options
+        how = Rendering(
+            options.seconds,
+            VirtualStrokes(options.strokes, options.rate_rad_per_s),
+            options.accept_derated,
+            options.allow_mismatch,
         )
-        link = stack.enter_context(opened)
-        rig = f"{link.identity.name} {link.identity.serial}"
-        if not allow_mismatch:
-            refuse_other_rig(package, link.identity)
-        probe = ensure_probed(workspace, link, recipe, confirm=confirm, say=say)
-        path = workspace.new_recording("render") if record else None
-        text = read_text(workspace.recipe_path)
-        sign = recipe.rig.motor_sign
-        recording = (
-            open_writer(path, link, package, text, motor_sign=sign, probe=probe)
-            if path
-            else nullcontext()
-        )
-        with recording as writer, ExitStack() as seeing:
-            if stale and writer:
-                writer.note(stale)
-            if eye:
-                plate = seeing.enter_context(eye.follow(link, writer, taps_s=taps_s, say=say))
-            done = render(
-                link,
-                package,
-                seconds=seconds,
-                limits=recipe.limits,
-                motor_sign=sign,
-                strokes=strokes,
-                writer=writer,
-                progress=progress,
-                confirm=confirm,
-                rig=with_probe(_known_rig(workspace, package), probe),
-                plate=plate,
-                accept_derated=accept_derated,
-                allow_mismatch=allow_mismatch,
-            )
-    if package_path is None:
-        _write_admission(workspace.package_path(recipe), done, rig)
-    return Rendered(done, path, rig, eye.tracked() if eye else None)
+        facts = with_probe(_known_rig(self._workspace, self._package), session.probe)
+        return render(session, self._package, how, writer=writer, rig=facts, plate=source)
 
 
 def _stale(engine: Engine) -> str:
@@ -172,20 +141,13 @@ def _refuse_other_blades(recipe: "Recipe", package: "ModelPackage") -> None:
 
 
 def _camera(
-    workspace: Workspace,
-    package: "ModelPackage",
-    camera: str,
-    device: str,
-    taps_s: float,
-    *,
-    seed: int,
-    realtime: bool,
+    workspace: Workspace, package: "ModelPackage", rig: RigOptions, options: RenderOptions
 ) -> "PlateCamera | None":
     """The camera that follows the plate of an estimated scene; None without one."""
     from scissorcal.workday.tracking.plate_camera import PlateCamera
 
-    if camera == NONE:
-        if taps_s:
+    if options.camera == NONE:
+        if options.taps_s:
             raise InputError("Taps tell where a tracked plate is: name a camera too (--camera).")
         return None
     if package.manifest.plate_pose == "known":
@@ -195,11 +157,9 @@ def _camera(
             "'scissorcal package build'."
         )
     engine = Engine.of(workspace)
-    if taps_s:
+    if options.taps_s:
         _refuse_clamped(engine.recipe.plate.tracking)
-    return PlateCamera(
-        engine, engine.recipe, camera, device, seed=seed, realtime=realtime, cut=True
-    )
+    return PlateCamera(engine, options.camera, rig, cut=True)
 
 
 def _refuse_clamped(tracking: "PlateTracking") -> None:

@@ -26,7 +26,6 @@ def sign_report(
     *,
     key: Path | None = None,
     passphrase: Callable[[], str] = str,
-    now: datetime | None = None,
 ) -> "Review":
     """Write report/signature.json: who decided what on the report, and all that it rests on.
 
@@ -53,7 +52,7 @@ def sign_report(
             name=" ".join(name.split()),
             decision=decision,
             note=note.strip(),
-            time_utc=stamp(now or datetime.now(UTC)),
+            time_utc=stamp(datetime.now(UTC)),
             content=reviewed_content(engine),
             fit_hashes={what: engine.facts(f"fit {what}")["inputs"] for what in available(engine)},
         )

@@ -18,14 +18,15 @@ from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.live import camera_number, frames_of, timed
 from scissorcal.vision.track import STATES, State
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.rigs import SIM, line_of, open_rig
+from scissorcal.workday.options import NONE, TrackOptions
+from scissorcal.workday.rigs import SIM, open_session
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.feeds import Feed
 from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
 from scissorcal.workday.tracking.session import Tell, TrackSession
 from scissorcal.workday.tracking.sim_world import SimWorld
-from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder, read_track
+from scissorcal.workday.tracking.track_recorder import TrackRecorder, read_track
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from scissorcal.device.motion import Motion
     from scissorcal.recipe.schema import Recipe
 
-NONE = "none"
 PATIENCE_S = 10.0
 """Without a pose to start from for so long, a track ends and says why."""
 SIM_CAMERA_S, SIM_RIG_S = 2.4, 6.0
@@ -81,49 +81,40 @@ class TrackResult:
 
 
 def track_plate(
-    workspace: Workspace,
-    camera: str = NONE,
-    device: str = NONE,
-    *,
-    seconds: float | None = None,
-    camera_delay_ms: float | None = None,
-    seed: int = 0,
-    baud: int | None = None,
-    tell: "Tell | None" = None,
+    workspace: Workspace, options: TrackOptions = TrackOptions(), tell: "Tell | None" = None
 ) -> TrackResult:
     """Follow the plate by a camera, by contacts of a rig's blade tip, or by both, and record it.
 
-    ``camera`` is a camera's number, a video file, a track's recording (which is followed again, by
-    the recipe as it is now), "sim" or "none"; ``device`` a port, "sim" or "none". The rig's motors
-    stay off: a person moves the handles (or the virtual hand does). Without a camera the pose of
-    the fit of the plate is the start. ``camera_delay_ms`` takes the place of the recipe's
-    plate.tracking.camera_delay_ms. Ends after ``seconds``, with the pictures, or by an interrupt
-    from the keyboard; "sim" ends by itself. ``tell`` is called after each picture and each block of
-    samples. Into captures/track-<stamp>.mcap go samples, pictures and the pose after each of them,
-    within a quarter of a second, so that a killed track keeps them.
+    The rig's motors stay off: a person moves the handles (or the virtual hand does). Without a
+    camera the pose of the fit of the plate is the start. "sim" ends by itself. ``tell`` is called
+    after each picture and each block of samples. Into captures/track-<stamp>.mcap go samples,
+    pictures and the pose after each of them, within a quarter of a second, so that a killed track
+    keeps them.
 
     Raises InputError, and keeps nothing, where no pose was found within `PATIENCE_S` or the sources
     do not fit together; MissingError where a fit or the rig's frame is missing; DeviceError where
     camera, rig or a clock fails.
 
     >>> from scissorcal.workday.workspace import find_workspace
-    >>> found = track_plate(find_workspace(), "0", "/dev/ttyUSB0", seconds=10)  # doctest: +SKIP
-    >>> found.state, found.sd_mm  # doctest: +SKIP
+    >>> options = TrackOptions("0", "/dev/ttyUSB0", seconds=10)
+    >>> track = track_plate(find_workspace(), options)  # doctest: +SKIP
+    >>> track.state, track.sd_mm  # doctest: +SKIP
     ('fused', 0.08)
     """
     engine = Engine.of(workspace)
-    if camera.endswith(".mcap"):
-        return _again(engine, Path(camera), camera_delay_ms, tell)
-    feeds.refuse_strange_pairs(camera, device)
-    recipe = _with_delay(engine.recipe, camera_delay_ms)
-    with _opened(engine, recipe, camera, device, seed, baud) as opened:
-        return _follow(engine, recipe, opened, camera, seconds or opened.default_s, tell)
+    recipe = _with_delay(engine.recipe, options.camera_delay_ms)
+    if options.camera.endswith(".mcap"):
+        return _again(engine, recipe, Path(options.camera), tell)
+    feeds.refuse_strange_pairs(options.camera, options.device)
+    with _opened(engine, recipe, options) as opened:
+        return _follow(engine, opened, options, tell)
 
 
 @dataclass(frozen=True, eq=False)
 class _Opened:
-    """Everything that a track is fed from."""
+    """Everything that a track is fed from, and the recipe that it follows."""
 
+    recipe: "Recipe"
     feed: Feed
     eye: PlateEye | None
     link: "Link | None"
@@ -131,99 +122,84 @@ class _Opened:
 
 
 @contextmanager
-def _opened(
-    engine: Engine, recipe: "Recipe", camera: str, device: str, seed: int, baud: int | None
-) -> Iterator[_Opened]:
+def _opened(engine: Engine, recipe: "Recipe", options: TrackOptions) -> Iterator[_Opened]:
     """Open camera and device, or the simulated world of both."""
+    from scissorcal.device.session import RigSession
+
+    camera, device = options.camera, options.device
     eye = None
     if camera != NONE:
         eye = inputs.plate_eye(engine, recipe, camera, needs_rig=device != NONE)
     with ExitStack() as stack:
         if SIM in (camera, device):
-            world = SimWorld(recipe, seed, rig=device == SIM)
+            world = SimWorld(recipe, options.seed, rig=device == SIM)
             if device != SIM and eye is not None:
-                yield _Opened(feeds.sim_feed(world, eye), eye, None, SIM_CAMERA_S)
+                yield _Opened(recipe, feeds.sim_feed(world, eye), eye, None, SIM_CAMERA_S)
                 return
-            motion = stack.enter_context(feeds.idle_rig(world.link, recipe))
+            motion = stack.enter_context(feeds.idle_rig(RigSession(world.link, recipe)))
             feed = feeds.sim_rig_feed(world, motion, eye)
-            yield _Opened(feed, eye, world.link, SIM_RIG_S)
+            yield _Opened(recipe, feed, eye, world.link, SIM_RIG_S)
             return
         link: Link | None = None
         on: Motion | None = None
         if device != NONE:
-            line = line_of(recipe, baud)
-            link = stack.enter_context(open_rig(device, recipe.specimen, seed, line=line))
+            session = stack.enter_context(open_session(recipe, options.rig))
+            link = session.link
             feeds.refuse_without_sledge(link)
-            on = stack.enter_context(feeds.idle_rig(link, recipe))
+            on = stack.enter_context(feeds.idle_rig(session))
         frames = frames_of(camera) if camera != NONE else None
         if eye is not None and frames is not None and camera_number(camera) is None:
-            yield _Opened(feeds.video_feed(timed(frames, camera), eye), eye, None, None)
+            feed = feeds.video_feed(timed(frames, camera), eye)
+            yield _Opened(recipe, feed, eye, None, None)
             return
-        yield _Opened(feeds.live_feed(stack, eye, frames, on), eye, link, None)
+        yield _Opened(recipe, feeds.live_feed(stack, eye, frames, on), eye, link, None)
 
 
 def _follow(
-    engine: Engine,
-    recipe: "Recipe",
-    opened: _Opened,
-    camera: str,
-    seconds: float | None,
-    tell: Tell | None,
+    engine: Engine, opened: _Opened, options: TrackOptions, tell: Tell | None
 ) -> TrackResult:
-    workspace, link, eye = engine.workspace, opened.link, opened.eye
-    about = inputs.track_about(engine, recipe, camera, eye)
+    workspace, recipe, link, eye = engine.workspace, opened.recipe, opened.link, opened.eye
+    about = inputs.track_about(engine, recipe, options.camera, eye)
     known = inputs.known_pose(engine) if eye is None else None
+    base_ns = opened.feed.base_ns
     recorder = TrackRecorder(
         workspace.new_recording("track"),
         read_text(workspace.recipe_path),
         _facts(link, recipe),
         link.identity.handle_radius if link else math.nan,
-        opened.feed.base_ns,
+        base_ns,
     )
     try:
-        session = _session(engine, recipe, about, link, recorder, opened.feed.base_ns, tell)
-        _feed(session, opened.feed, seconds, known)
+        facts = inputs.track_facts(engine, about, link, recipe=recipe)
+        track = TrackSession(recipe, facts, recorder=recorder, base_ns=base_ns, tell=tell)
+        _feed(track, opened.feed, options.seconds or opened.default_s, known)
     except BaseException as error:
         kept = recorder.close(keep=recorder.estimates > 0, note=f"The track ended early: {error}")
         if isinstance(error, ScissorcalError) and kept is not None:
             error.kept = (kept,)
         raise
-    for sentence in _notes(session):
+    for sentence in _notes(track):
         recorder.note(sentence)
-    path = recorder.close(keep=session.started)
-    if not session.started:
-        source = Path(camera).name if camera != NONE else "The rig"
-        raise InputError(f"{source}: {session.why_waiting()} Nothing was kept.")
+    path = recorder.close(keep=track.started)
+    if not track.started:
+        source = Path(options.camera).name if options.camera != NONE else "The rig"
+        raise InputError(f"{source}: {track.why_waiting()} Nothing was kept.")
     rig = f"{link.identity.name} {link.identity.serial}" if link else ""
-    return _result(session, path, rig)
+    return _result(track, path, rig)
 
 
-def _again(
-    engine: Engine, path: Path, camera_delay_ms: float | None, tell: Tell | None
-) -> TrackResult:
+def _again(engine: Engine, recipe: "Recipe", path: Path, tell: Tell | None) -> TrackResult:
     """Follow what a track was given once more, by the recipe as it is now; record nothing."""
-    recipe = _with_delay(engine.recipe, camera_delay_ms)
-    track = read_track(path)
-    camera = load_result(engine, "camera")
-    inputs.refuse_other_camera(path, track, camera)
-    about = replace(track.about, camera_delay_ms=recipe.plate.tracking.camera_delay_ms)
-    contacts, known = inputs.tip_contacts(engine, recipe) if len(track.samples) else (None, True)
-    session = TrackSession(
-        recipe,
-        inputs.surface_of(engine, recipe),
-        about,
-        drive=inputs.rig_drive(engine, track.handle_radius_m) if len(track.samples) else None,
-        contacts=contacts,
-        friction_known=known,
-        calibrated=camera.camera.covariance is not None,
-        base_ns=track.base_ns,
-        tell=tell,
-    )
-    feed = feeds.recorded_feed(track)
-    _feed(session, feed, None, None)
-    if not session.started:
-        raise InputError(f"{path.name}: {session.why_waiting()}")
-    return _result(session, None, str(track.device.get("name", "")))
+    given = read_track(path)
+    inputs.refuse_other_camera(path, given, load_result(engine, "camera"))
+    about = replace(given.about, camera_delay_ms=recipe.plate.tracking.camera_delay_ms)
+    radius_m = given.handle_radius_m if len(given.samples) else None
+    facts = inputs.track_facts(engine, about, radius_m=radius_m, recipe=recipe)
+    track = TrackSession(recipe, facts, base_ns=given.base_ns, tell=tell)
+    _feed(track, feeds.recorded_feed(given), None, None)
+    if not track.started:
+        raise InputError(f"{path.name}: {track.why_waiting()}")
+    return _result(track, None, str(given.device.get("name", "")))
 
 
 def _feed(
@@ -257,10 +233,10 @@ def _result(session: TrackSession, path: Path | None, rig: str) -> TrackResult:
     follower = session.follower
     delay = session.delay
     figures = track_figures(follower, delay)
-    found = follower.now()
-    assert found is not None
-    pose = Pose.from_matrix(found.rotation, found.place_m)
-    sds = np.sqrt(np.diag(found.covariance))
+    estimate = follower.now()
+    assert estimate is not None
+    pose = Pose.from_matrix(estimate.rotation, estimate.place_m)
+    sds = np.sqrt(np.diag(estimate.covariance))
     pictures = sum(session.states.values())
     return TrackResult(
         path=path,
@@ -276,7 +252,7 @@ def _result(session: TrackSession, path: Path | None, rig: str) -> TrackResult:
         state=follower.state,
         quaternion=pose.quaternion,
         translation_m=pose.translation_m,
-        covariance=tuple(tuple(row) for row in found.covariance.tolist()),
+        covariance=tuple(tuple(row) for row in estimate.covariance.tolist()),
         sd_mm=float(1e3 * sds[3:].max()),
         sd_deg=float(np.degrees(sds[:3].max())),
         figures=figures,
@@ -310,37 +286,6 @@ def _with_delay(recipe: "Recipe", camera_delay_ms: float | None) -> "Recipe":
     tracking = recipe.plate.tracking.model_copy(update={"camera_delay_ms": camera_delay_ms})
     plate = recipe.plate.model_copy(update={"tracking": tracking})
     return recipe.model_copy(update={"plate": plate})
-
-
-def _session(
-    engine: Engine,
-    recipe: "Recipe",
-    about: TrackAbout,
-    link: "Link | None",
-    recorder: TrackRecorder,
-    base_ns: int,
-    tell: Tell | None,
-) -> TrackSession:
-
-    contacts, known, drive = None, True, None
-    if link is not None:
-        drive = inputs.rig_drive(engine, link.identity.handle_radius, link)
-        contacts, known = inputs.tip_contacts(engine, recipe)
-    calibrated = True
-    if about.camera_inputs_hash:
-        calibrated = load_result(engine, "camera").camera.covariance is not None
-    return TrackSession(
-        recipe,
-        inputs.surface_of(engine, recipe),
-        about,
-        drive=drive,
-        contacts=contacts,
-        friction_known=known,
-        calibrated=calibrated,
-        recorder=recorder,
-        base_ns=base_ns,
-        tell=tell,
-    )
 
 
 def _facts(link: "Link | None", recipe: "Recipe") -> dict[str, Any]:

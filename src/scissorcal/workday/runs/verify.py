@@ -12,6 +12,7 @@ from scissorcal.aliases import Progress
 from scissorcal.errors import InputError, MissingError
 from scissorcal.identity import digest
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import VerifySettings
 from scissorcal.workday.pool import Pool, open_pool
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.records import Record, RecordFile
@@ -22,7 +23,7 @@ from scissorcal.workday.workspace import FitKind, Workspace
 if TYPE_CHECKING:
     from scissorcal.calibration import FitResult
     from scissorcal.calibration.fit_model import Experiment
-    from scissorcal.calibration.verify.result import Check, PriorKind, VerifyResult
+    from scissorcal.calibration.verify.result import Check, VerifyResult
     from scissorcal.calibration.verify.simulator import Simulator
     from scissorcal.calibration.verify.study import Study, Task
     from scissorcal.recording import Recording
@@ -32,17 +33,6 @@ ALGORITHM = 6
 """Raised whenever a fit of the same inputs would give other numbers."""
 
 CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")
-
-
-@dataclass(frozen=True)
-class VerifySettings:
-    """What is checked: how many simulated ``fits``, drawn from which prior (see `make_study`)."""
-
-    checks: "tuple[Check, ...]" = CHECKS
-    fits: int = 100
-    prior: "PriorKind" = "local"
-    spread: float = 3.0
-    seed: int = 0
 
 
 @dataclass(frozen=True)

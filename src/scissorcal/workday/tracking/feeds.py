@@ -18,7 +18,7 @@ from scissorcal.workday.tracking.track_recorder import RecordedTrack
 if TYPE_CHECKING:
     from scissorcal.device.link import Link
     from scissorcal.device.motion import Motion
-    from scissorcal.recipe.schema import Recipe
+    from scissorcal.device.session import RigSession
 
 Event = PlatePicture | NDArray[np.void]
 """A picture, or a block of the rig's samples."""
@@ -70,12 +70,12 @@ def live_feed(
     return Feed(_live(camera, eye, motion, begun), base_ns)
 
 
-def idle_rig(link: "Link", recipe: "Recipe") -> AbstractContextManager["Motion"]:
+def idle_rig(session: "RigSession") -> AbstractContextManager["Motion"]:
     """Start the servo with the motors off: the rig only tells where it is."""
     from scissorcal.device.capture import servo_config
     from scissorcal.device.open_motion import open_motion
 
-    return open_motion(link, servo_config(recipe, link.identity))
+    return open_motion(session.link, servo_config(session.recipe, session.identity))
 
 
 def refuse_without_sledge(link: "Link") -> None:

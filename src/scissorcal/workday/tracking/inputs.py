@@ -11,12 +11,11 @@ from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.runs.fit import available, load_result
-from scissorcal.workday.tracking.session import RigDrive
+from scissorcal.workday.tracking.session import RigDrive, TrackFacts
 from scissorcal.workday.tracking.track_recorder import RecordedTrack, TrackAbout
 
 if TYPE_CHECKING:
     from scissorcal.device.link import Link
-    from scissorcal.model.surface import Surface
     from scissorcal.recipe.schema import Recipe
     from scissorcal.tracking.contacts import TipContacts
     from scissorcal.workday.tracking.pictures import PlateEye
@@ -77,6 +76,33 @@ def track_about(
     )
 
 
+def track_facts(
+    engine: Engine,
+    about: TrackAbout,
+    link: "Link | None" = None,
+    radius_m: float | None = None,
+    recipe: "Recipe | None" = None,
+) -> TrackFacts:
+    """What a track builds on, with a rig where ``link`` or ``radius_m`` (of its handles) is given.
+
+    ``recipe`` takes the place of the workspace's.
+    """
+    from scissorcal.recipe.plate_surface import plate_surface
+
+    recipe = recipe or engine.recipe
+    facts = TrackFacts(plate_surface(recipe.plate.surface, engine.workspace.root), about)
+    if about.camera_inputs_hash:
+        calibrated = load_result(engine, "camera").camera.covariance is not None
+        facts = replace(facts, calibrated=calibrated)
+    if link is not None:
+        radius_m = link.identity.handle_radius
+    if radius_m is None:
+        return facts
+    contacts, known = tip_contacts(engine, recipe)
+    drive = rig_drive(engine, radius_m, link)
+    return replace(facts, drive=drive, contacts=contacts, friction_known=known)
+
+
 def tip_contacts(engine: Engine, recipe: "Recipe") -> "tuple[TipContacts, bool]":
     """Contacts of the upper blade's tip, and whether friction of the opening was fitted."""
     from scissorcal.model.blade_point import BladePoint
@@ -102,12 +128,6 @@ def rig_drive(engine: Engine, radius_m: float, link: "Link | None" = None) -> Ri
     return RigDrive(radius_m, 0.0 if zero is None else zero.mean, probe.rest.handle_zero_N)
 
 
-def surface_of(engine: Engine, recipe: "Recipe") -> "Surface":
-    from scissorcal.recipe.plate_surface import plate_surface
-
-    return plate_surface(recipe.plate.surface, engine.workspace.root)
-
-
 def known_pose(engine: Engine) -> KnownPose:
     """The fitted pose of the plate in the rig's frame; MissingError where there is none."""
     fit = load_result(engine, "plate")
@@ -117,8 +137,8 @@ def known_pose(engine: Engine) -> KnownPose:
             "rig's frame: photograph the rig card too ('scissorcal capture plate --help'), or name "
             "a camera."
         )
-    found = fit.rig_plate
-    return found.matrix, np.array(found.translation_m), found.covariance
+    pose = fit.rig_plate
+    return pose.matrix, np.array(pose.translation_m), pose.covariance
 
 
 def refuse_other_camera(path: Path, track: RecordedTrack, fitted: Any) -> None:

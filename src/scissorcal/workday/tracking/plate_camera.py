@@ -12,7 +12,8 @@ from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdict
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.live import frames_of
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.rigs import SIM, open_rig, set_line
+from scissorcal.workday.options import RigOptions
+from scissorcal.workday.rigs import SIM
 from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.camera_thread import CameraThread
 from scissorcal.workday.tracking.pictures import PlatePicture
@@ -22,10 +23,9 @@ from scissorcal.workday.tracking.sim_world import CARRY_S, SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackChannels
 
 if TYPE_CHECKING:
-    from scissorcal.aliases import Say
-    from scissorcal.device.link import Link
+    from scissorcal.device.lockstep import LockstepLink
     from scissorcal.device.motion import Motion
-    from scissorcal.recipe.schema import Line, Recipe
+    from scissorcal.device.session import RigSession
     from scissorcal.recording import RecordingWriter
 
 PATIENCE_S = 10.0
@@ -82,49 +82,40 @@ class PlateCamera:
     def __init__(
         self,
         engine: Engine,
-        recipe: "Recipe",
         camera: str,
-        device: str,
+        rig: RigOptions,
         *,
-        seed: int = 0,
-        realtime: bool = False,
         cut: bool = False,
     ) -> None:
-        feeds.refuse_strange_pairs(camera, device)
-        if camera == SIM and realtime:
+        feeds.refuse_strange_pairs(camera, rig.device)
+        if camera == SIM and rig.realtime:
             raise InputError(
                 "--camera sim runs in virtual time, with the virtual rig: leave --realtime out."
             )
-        self._engine, self._recipe, self._camera, self._cut = engine, recipe, camera, cut
+        recipe = engine.recipe
+        self._engine, self._camera, self._cut = engine, camera, cut
         without = "state the pose with --pose"
         if cut:
             without = 'set plate_pose = "known" in [scene], and build the package again'
         self._eye = inputs.plate_eye(engine, recipe, camera, needs_rig=True, otherwise=without)
         self._about = inputs.track_about(engine, recipe, camera, self._eye)
         world = camera == SIM
-        self._world = SimWorld(recipe, seed, rig=True, cut=cut) if world else None
-        self._session: TrackSession | None = None
+        self._world = SimWorld(recipe, rig.seed, rig=True, cut=cut) if world else None
+        self._track: TrackSession | None = None
 
-    @contextmanager
-    def open_rig(self, device: str, seed: int, line: "Line") -> "Iterator[Link]":
-        """The rig on ``device``, or that of the simulated world; as `scissorcal.workday.rigs`."""
-        if self._world is None:
-            with open_rig(device, self._recipe.specimen, seed, line=line) as link:
-                yield link
-            return
-        with self._world.link as link:
-            set_line(link, line)
-            yield link
+    @property
+    def world_rig(self) -> "LockstepLink | None":
+        """The rig of the simulated world; None where the camera is real."""
+        return self._world.link if self._world else None
 
     @contextmanager
     def follow(
         self,
-        link: "Link",
+        session: "RigSession",
         writer: "RecordingWriter | None",
         *,
         taps_s: float = 0.0,
         held_N: float = 0.0,
-        say: "Say | None" = None,
     ) -> Iterator[TrackedPose]:
         """Start the camera, look until there is a pose, and yield the source of poses.
 
@@ -135,60 +126,45 @@ class PlateCamera:
         Raises DeviceError, nothing having moved, where the camera fails meanwhile, with its own
         sentence, and where no picture gave a pose within `PATIENCE_S`; later as `TrackedPose`.
         """
-        feeds.refuse_without_sledge(link)
+        feeds.refuse_without_sledge(session.link)
         virtual = self._world is not None
         base_ns, begun_s = (0, 0.0) if virtual else (time.time_ns(), time.monotonic())
         channels = TrackChannels(writer, base_ns) if writer is not None else None
-        session = self._session = self._new_session(link, channels, base_ns, 0.5 * held_N)
+        facts = inputs.track_facts(self._engine, self._about, session.link)
+        facts = replace(facts, least_N=0.5 * held_N)
+        track = TrackSession(self._engine.recipe, facts, recorder=channels, base_ns=base_ns)
+        self._track = track
         with ExitStack() as stack:
             due = self._pictures(stack, begun_s)
-            source = TrackedPose(session, due, begun_s, steady=self._cut)
-            with feeds.idle_rig(link, self._recipe) as motion:
-                if taps_s and say is not None:
-                    say(TAP.format(taps_s))
-                self._look(motion, source, session, taps_s)
-            session.follower.restart_rig()
-            session.follower.touching = not self._cut
+            source = TrackedPose(track, due, begun_s, steady=self._cut)
+            with feeds.idle_rig(session) as motion:
+                if taps_s:
+                    session.operator.say(TAP.format(taps_s))
+                self._look(motion, source, track, taps_s)
+            track.follower.restart_rig()
+            track.follower.touching = not self._cut
             yield source
-            session.finish()
+            track.finish()
 
     def tracked(self) -> TrackedRun:
         """What became of it; after `follow`."""
-        session = self._session
-        assert session is not None
-        figures = track_figures(session.follower, session.delay)
+        track = self._track
+        assert track is not None
+        figures = track_figures(track.follower, track.delay)
         sd_mm = sd_deg = math.nan
-        if session.started:
-            variances = session.follower.tracker.estimate().covariance.diagonal()
+        if track.started:
+            variances = track.follower.tracker.estimate().covariance.diagonal()
             sd_mm = 1e3 * math.sqrt(float(variances[3:].max()))
             sd_deg = math.degrees(math.sqrt(float(variances[:3].max())))
         return TrackedRun(
             source=f"camera {self._about.source}",
-            state=session.follower.state,
-            pictures=session.states.total(),
-            poses=session.states["seen"] + session.states["ambiguous"],
+            state=track.follower.state,
+            pictures=track.states.total(),
+            poses=track.states["seen"] + track.states["ambiguous"],
             sd_mm=sd_mm,
             sd_deg=sd_deg,
             figures=figures,
             verdicts=track_verdicts(figures),
-        )
-
-    def _new_session(
-        self, link: "Link", channels: TrackChannels | None, base_ns: int, least_N: float
-    ) -> TrackSession:
-        engine, recipe = self._engine, self._recipe
-        contacts, known = inputs.tip_contacts(engine, recipe)
-        return TrackSession(
-            recipe,
-            inputs.surface_of(engine, recipe),
-            self._about,
-            drive=inputs.rig_drive(engine, link.identity.handle_radius, link),
-            contacts=contacts,
-            friction_known=known,
-            least_N=least_N,
-            calibrated=self._eye.camera.covariance is not None,
-            recorder=channels,
-            base_ns=base_ns,
         )
 
     def _pictures(self, stack: ExitStack, begun_s: float) -> Due:
@@ -199,14 +175,14 @@ class PlateCamera:
         stack.enter_context(closing(thread))
 
         def due(now_s: float) -> Iterable[PlatePicture]:
-            for found in thread.due()[-MOST_AT_ONCE:]:
-                picture = eye.picture(found)
+            for located in thread.due()[-MOST_AT_ONCE:]:
+                picture = eye.picture(located)
                 yield replace(picture, arrived_s=picture.arrived_s - begun_s)
 
         return due
 
     def _look(
-        self, motion: "Motion", source: TrackedPose, session: TrackSession, taps_s: float
+        self, motion: "Motion", source: TrackedPose, track: TrackSession, taps_s: float
     ) -> None:
         """Feed the source with the motors off: through the taps, and until there is a pose."""
         world = self._world
@@ -214,19 +190,19 @@ class PlateCamera:
             world.begin(motion, taps=taps_s > 0.0)
             if not self._cut:
                 world.keep_plate()
-        session.follower.touching = taps_s > 0.0
+        track.follower.touching = taps_s > 0.0
         begun = motion.now_s
         _feed(motion, source, begun + taps_s)
-        session.follower.touching = False
+        track.follower.touching = False
         if world is not None and self._cut:
             world.take_out(motion)
             _feed(motion, source, motion.now_s + (CARRY_S if taps_s else 0.0))
-        while not session.started and motion.now_s - begun < taps_s + PATIENCE_S:
+        while not track.started and motion.now_s - begun < taps_s + PATIENCE_S:
             _ask(motion, source)
-        if not session.started:
+        if not track.started:
             raise DeviceError(
                 f"There is no pose of the plate after {PATIENCE_S:g} s, so nothing was moved. "
-                f"{session.why_waiting()} Check that the camera sees the plate's target."
+                f"{track.why_waiting()} Check that the camera sees the plate's target."
             )
         _feed(motion, source, motion.now_s + SETTLE_S)
 

@@ -55,29 +55,41 @@ class TrackMark:
 Tell = Callable[[TrackMark], None]
 
 
+@dataclass(frozen=True, eq=False)
+class TrackFacts:
+    """What a track builds on: the plate's surface, the camera, the rig and its contacts.
+
+    ``drive`` is None without a rig. Contacts below ``least_N`` are none, whatever the recipe says;
+    ``friction_known`` says whether friction of the opening was fitted, ``calibrated`` whether the
+    camera's fit has a covariance.
+    """
+
+    surface: Surface
+    about: TrackAbout
+    drive: RigDrive | None = None
+    contacts: ContactSource | None = None
+    friction_known: bool = True
+    calibrated: bool = True
+    least_N: float = 0.0
+
+
 class TrackSession:
     """Feeds a `PlateFollower` with pictures and samples, and keeps books of what came of them.
 
     ``about`` is completed by the first picture with a pose: what all pictures share is known from
-    then on. Contacts below ``least_N`` are none, whatever the recipe says. ``base_ns`` is the
-    computer's clock at 0 s of the times of pictures.
+    then on. ``base_ns`` is the computer's clock at 0 s of the times of pictures.
     """
 
     def __init__(
         self,
         recipe: Recipe,
-        surface: Surface,
-        about: TrackAbout,
+        facts: TrackFacts,
         *,
-        drive: RigDrive | None = None,
-        contacts: ContactSource | None = None,
-        friction_known: bool = True,
-        least_N: float = 0.0,
-        calibrated: bool = True,
         recorder: TrackChannels | None = None,
         base_ns: int = 0,
         tell: Tell | None = None,
     ) -> None:
+        about, drive = facts.about, facts.drive
         self.about = about
         self.states: Counter[State] = Counter()
         self.gaps: list[float] = []
@@ -90,20 +102,20 @@ class TrackSession:
         self._recorder = recorder
         self._base_ns = base_ns
         self._tell = tell
-        self._calibrated = calibrated
-        self._least_N = max(least_N, 0.0 if friction_known else UNKNOWN_FRICTION_N)
+        self._calibrated = facts.calibrated
+        self._least_N = max(facts.least_N, 0.0 if facts.friction_known else UNKNOWN_FRICTION_N)
         self._picture: State | None = None
         self._nis = math.nan
         self._begun_s = self._seen_s = math.nan
         self._first: Array | None = None
-        self._surface = surface
+        self._surface = facts.surface
         self._used = self._settings(None)
         self.follower = PlateFollower(
-            surface,
+            facts.surface,
             self._used,
             camera_delay_s=1e-3 * about.camera_delay_ms,
             rig=drive is not None,
-            contacts=contacts,
+            contacts=facts.contacts,
         )
 
     @property
@@ -190,19 +202,19 @@ class TrackSession:
         count = self.states.total()
         if not count:
             return "The camera gave no picture."
-        seen = {state: self.states[state] for state in STATES if self.states[state]}
-        causes = ", ".join(f"in {n} {STATES[state]}" for state, n in seen.items())
+        counts = {state: self.states[state] for state in STATES if self.states[state]}
+        causes = ", ".join(f"in {n} {STATES[state]}" for state, n in counts.items())
         return (
             f"None of {count} pictures gave a pose of the plate's target to start from ({causes})."
         )
 
     def _look(self, picture: PlatePicture) -> None:
         """Take from the first picture with a pose what all pictures share."""
-        seen = picture.seen
-        if seen is None or self.started or self.about.shared is not None:
+        sighting = picture.seen
+        if sighting is None or self.started or self.about.shared is not None:
             return
         # corners' errors that repeat from picture to picture are as large as their noise at most
-        shared = seen.shared + seen.noise
+        shared = sighting.shared + sighting.noise
         self.about = replace(self.about, shared=tuple(tuple(row) for row in shared.tolist()))
         self._used = self._settings(shared)
         self.follower.assume(self._used)
@@ -212,9 +224,9 @@ class TrackSession:
     def _settings(self, shared: Array | None) -> TrackingSettings:
         if shared is None and self.about.shared is not None:
             shared = np.array(self.about.shared)
-        found = settings_of(self._recipe, shared if self._calibrated else None)
-        least = max(found.contact.least_force_N, self._least_N)
-        return replace(found, contact=replace(found.contact, least_force_N=least))
+        settings = settings_of(self._recipe, shared if self._calibrated else None)
+        least = max(settings.contact.least_force_N, self._least_N)
+        return replace(settings, contact=replace(settings.contact, least_force_N=least))
 
     def _keep(self, row: FollowedRow, host_s: float) -> None:
         if row.outcome in (Outcome.USED, Outcome.REFUSED):
