@@ -19,9 +19,10 @@ from types import ModuleType
 from typing import Any
 
 from scissorcal.kernel import StopReason
-from scissorcal.verdicts import MEANINGS, TORQUE
+from scissorcal.verdicts import TORQUE, Check
 
 DOCS = Path(__file__).parent
+SOURCE = DOCS.parent / "src"
 ROOMS = (
     "scissorcal",
     "scissorcal.recording",
@@ -186,12 +187,29 @@ def _text(thing: Any) -> list[str]:
     return [*lines, *(["```"] if fenced else []), ""] if lines else []
 
 
+def checks() -> list[Check]:
+    """Every check that a module declares as a constant or in a dict of them, sorted by scope."""
+    found: dict[str, Check] = {}
+    for path in sorted(SOURCE.rglob("*.py")):
+        if "Check(" not in path.read_text(encoding="utf-8"):
+            continue
+        module = importlib.import_module(".".join(path.relative_to(SOURCE).with_suffix("").parts))
+        for thing in vars(module).values():
+            for check in thing.values() if isinstance(thing, dict) else (thing,):
+                if isinstance(check, Check) and found.setdefault(check.key, check) is not check:
+                    raise ValueError(f"{path} declares {check.key} a second time")
+    return sorted(found.values(), key=lambda check: check.key.partition(" ")[0])
+
+
 def _verdict_table() -> str:
     rows = [TABLE_HEAD, "|---|---|---|---|---|"]
-    for key, (limit, guards) in MEANINGS.items():
-        scope, _, check = key.partition(" ")
-        kind = "torque" if guards.startswith(TORQUE) else ""
-        rows.append(f"| {scope} | *{check}* | {limit} | {kind} | {guards.removeprefix(TORQUE)} |")
+    for check in checks():
+        scope, _, name = check.key.partition(" ")
+        kind, guards = "", check.guards
+        if guards.startswith(TORQUE):
+            kind, guards = "torque", guards.removeprefix(TORQUE)
+        limit = f"{check.limit} {check.threshold:g}".removesuffix("nan").strip()
+        rows.append(f"| {scope} | *{name}* | {limit} | {kind} | {guards} |")
     return "\n".join([*rows, ""])
 
 

@@ -79,7 +79,7 @@ def assemble(
     )
     if tolerance is not None:
         drive, unit = float(np.sqrt(np.mean(measured**2))), joint.effort_unit
-        trust += (structure_verdict(f"fit.{what}", critique, drive, unit, tolerance),)
+        trust += (structure_verdict(critique, drive, unit, tolerance).of(f"fit.{what}"),)
     for_people: dict[str, Any] = {}
     if not brief:
         for_people["replay"] = compare_with_replay(

@@ -20,7 +20,7 @@ from scissorcal.inference import Posterior, infer
 from scissorcal.inference.between import BROAD, between_groups, one_normal
 from scissorcal.model.transforms import LOG
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import TORQUE, Check, Verdict
 
 FEWEST_BINS = 100
 """Moving bins from which a recording is fitted by itself."""
@@ -38,6 +38,11 @@ NOT_KNOWN = (
     "There is one recording: how much the law's parameters vary from recording to recording is not "
     "known, and the intervals do not include it. Record the same sweeps again, after setting up "
     "anew or on another day."
+)
+RECORDINGS = Check(
+    "fit recordings",
+    f"{TORQUE}rms error on a recording by the others, share of the rms of all recordings",
+    at_most=HELD_OUT_LIMIT,
 )
 
 
@@ -162,16 +167,16 @@ class BetweenRecordings:
             f"{worst.recording}; fitted to all by {worst.pooled_rms / size:.1%}, to that one by "
             f"itself by {worst.own_rms / size:.1%}."
         )
-        scope, off = f"fit.{self.what}", worst.relative_rms
+        off = worst.relative_rms
         if off > HELD_OUT_LIMIT and worst.pooled_rms <= MISFIT * worst.own_rms:
             why += (
                 " One law fits them all, but the others do not determine it there: record each "
                 "load and speed twice to know how recordings differ."
             )
-            return not_evaluated(scope, "recordings", why, HELD_OUT_LIMIT, off)
+            return RECORDINGS.not_evaluated(why, off).of(f"fit.{self.what}")
         thing = "rig" if self.what == "friction" else "rig or the material"
         bad = f"{why} The {thing} changed between recordings: find out what did, or fit them apart."
-        return judge(scope, "recordings", off, HELD_OUT_LIMIT, why, bad)
+        return RECORDINGS.judge(off, why, bad).of(f"fit.{self.what}")
 
 
 def compare_recordings(

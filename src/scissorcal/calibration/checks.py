@@ -14,10 +14,8 @@ from scissorcal.inference import Posterior, SearchStatus
 from scissorcal.inference.importance import ADAPTED_LIMIT, K_HAT_LIMIT
 from scissorcal.inference.status import SamplingStatus
 from scissorcal.model.friction_terms import NEAR_REST
-from scissorcal.verdicts import Status, Verdict, judge, not_evaluated
+from scissorcal.verdicts import INTERVALS, STATED, TORQUE, Check, Status, Verdict
 
-FEWEST_INDEPENDENT = 10.0
-"""Independent observations wanted per parameter."""
 HELD_OUT_LIMIT = 0.2
 """Error on unseen strokes, as a share of what all strokes measured, that a law may have."""
 OTHER_SPEED = 1.5
@@ -25,8 +23,42 @@ OTHER_SPEED = 1.5
 OTHER_CONTACT_M = 2e-3
 LIMITS = (K_HAT_LIMIT, ADAPTED_LIMIT)
 """Limits of k-hat, of a proposal made without draws and of one that was adapted to them."""
-NEAR_EDGE = 0.98 * SEARCH_REACH
+
+SEARCH = "whether the estimate is an optimum at all"
+DATA = "whether the recording can tell the parameters"
+FINITE = Check("fit finite", "whether there are numbers at all: how many are missing", at_most=0.0)
+OPTIMUM = Check("fit optimum", f"{SEARCH}: starts that ended there", at_least=1.0)
+K_HAT = Check(
+    "fit k-hat", f"{INTERVALS}: tail index of the importance weights, enough draws", at_most=STATED
+)
+BOUNDS = Check(
+    "fit bounds", f"{SEARCH}: largest distance from a prior in its sds", at_most=0.98 * SEARCH_REACH
+)
 """Prior standard deviations from its centre at which a parameter is at the search's limit."""
+IDENTIFIABILITY = Check(
+    "fit identifiability", f"{DATA}: largest posterior sd over prior sd", at_most=PRIOR_ONLY
+)
+NULL_DIRECTIONS = Check(
+    "fit null-directions", f"{DATA}: directions that are left to the prior", at_most=0.0
+)
+STROKES = Check(
+    "fit strokes", f"{DATA}: ratio of the fastest to the slowest stroke", at_least=OTHER_SPEED
+)
+WHITENESS = Check(
+    "fit whiteness",
+    "nothing of the torque by itself; it tells how much data an interval rests on: "
+    "independent observations per parameter",
+    at_least=10.0,
+)
+"""Independent observations wanted per parameter."""
+R_SQUARED = Check(
+    "fit r-squared", f"{TORQUE}share of its variance that the law explains", at_least=0.0
+)
+HOLD_OUT = Check(
+    "fit hold-out",
+    f"{TORQUE}median rms error on unseen strokes, share of the rms of all strokes",
+    at_most=HELD_OUT_LIMIT,
+)
 
 
 def trust_verdicts(
@@ -41,24 +73,24 @@ def trust_verdicts(
     contact: Array,
 ) -> tuple[Verdict, ...]:
     """Judge a fit: its numbers, search, draws, bounds, data, strokes, unseen strokes."""
-    scope = f"fit.{what}"
     nuisance = (*nuisance, *(p.name for p in chosen.candidate.layout.parameters if p.believed))
-    return (
-        _finite(scope, chosen, posterior, diagnostics),
-        _search(scope, posterior, nuisance),
-        _importance(scope, effort, posterior),
-        _bounds(scope, chosen),
-        _identified(scope, chosen, posterior, (*nuisance, *NEAR_REST)),
-        _null(scope, posterior, nuisance),
-        _independent(scope, chosen, diagnostics, held_out),
-        _explained(scope, diagnostics),
-        _varied(scope, what, chosen, bins, contact),
-        _unseen(scope, held_out),
+    verdicts = (
+        _finite(chosen, posterior, diagnostics),
+        _search(posterior, nuisance),
+        _importance(effort, posterior),
+        _bounds(chosen),
+        _identified(chosen, posterior, (*nuisance, *NEAR_REST)),
+        _null(posterior, nuisance),
+        _independent(what, chosen, diagnostics, held_out),
+        _explained(diagnostics),
+        _varied(what, chosen, bins, contact),
+        _unseen(held_out),
     )
+    return tuple(verdict.of(f"fit.{what}") for verdict in verdicts)
 
 
 def _finite(
-    scope: str, chosen: FittedCandidate, posterior: Posterior, diagnostics: Mapping[str, Any]
+    chosen: FittedCandidate, posterior: Posterior, diagnostics: Mapping[str, Any]
 ) -> Verdict:
     wanted = ("residual_rms", "relative_error", "r_squared", "independent_share")
     broken = [name for name in wanted if not np.isfinite(diagnostics[name])]
@@ -68,10 +100,10 @@ def _finite(
         f"{', '.join(broken)} did not come out as a number: check the recording for gaps, constant "
         "channels and absurd values."
     )
-    return judge(scope, "finite", len(broken), 0.0, "Every number of the fit is finite.", bad)
+    return FINITE.judge(len(broken), "Every number of the fit is finite.", bad)
 
 
-def _search(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
+def _search(posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
     """Judge the search by the law's own parameters.
 
     A nuisance to which the data do not respond stays at its prior, whose width is then in the
@@ -84,39 +116,39 @@ def _search(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verd
             f"The search settled for every parameter that is reported. {', '.join(ended.concerns)} "
             "stayed where the prior is, and the intervals have the prior's width for it."
         )
-        return Verdict(scope, "optimum", "pass", float(ended.agreeing), 1.0, why)
+        return OPTIMUM.verdict("pass", float(ended.agreeing), why)
     status: Status = "pass" if ended.success else "fail"
-    return Verdict(scope, "optimum", status, float(ended.agreeing), 1.0, ended.sentence)
+    return OPTIMUM.verdict(status, float(ended.agreeing), ended.sentence)
 
 
-def _importance(scope: str, effort: str, posterior: Posterior) -> Verdict:
+def _importance(effort: str, posterior: Posterior) -> Verdict:
     k = posterior.k_hat if np.isfinite(posterior.k_hat) else None
     if effort == "draft":
         why = "Draft effort does not check the posterior's shape; use --effort standard."
-        return not_evaluated(scope, "k-hat", why, K_HAT_LIMIT)
+        return K_HAT.not_evaluated(why, threshold=K_HAT_LIMIT)
     status: Status = "pass" if posterior.status.trusted else "fail"
     if posterior.ensembles or posterior.status is SamplingStatus.TOO_FEW:
         # what decides then is in the sentence: k-hat is of a proposal that was not used, or passes
-        return Verdict(scope, "k-hat", status, None, None, posterior.sentence)
+        return K_HAT.verdict(status, None, posterior.sentence)
     exceeded = [limit for limit in LIMITS if status == "fail" and k is not None and k > limit]
     limit = exceeded[0] if exceeded else K_HAT_LIMIT
-    return Verdict(scope, "k-hat", status, k, limit, posterior.sentence)
+    return K_HAT.verdict(status, k, posterior.sentence, threshold=limit)
 
 
-def _bounds(scope: str, chosen: FittedCandidate) -> Verdict:
+def _bounds(chosen: FittedCandidate) -> Verdict:
     layout, point = chosen.candidate.layout, chosen.optimum.point
     reach = np.abs(point - layout.mean) / layout.sd
-    at = [name for name, r in zip(layout.names, reach, strict=True) if r > NEAR_EDGE]
+    at = [name for name, r in zip(layout.names, reach, strict=True) if r > BOUNDS.threshold]
     bad = (
         f"{', '.join(at)} ended at the limit of the search, so no value was found: check the units "
         "and signs of the recording."
     )
     good = "No parameter ended at the limit of the search."
-    return judge(scope, "bounds", float(reach.max()), NEAR_EDGE, good, bad)
+    return BOUNDS.judge(float(reach.max()), good, bad)
 
 
 def _identified(
-    scope: str, chosen: FittedCandidate, posterior: Posterior, nuisance: tuple[str, ...]
+    chosen: FittedCandidate, posterior: Posterior, nuisance: tuple[str, ...]
 ) -> Verdict:
     layout = chosen.candidate.layout
     widths = posterior.draws.std(axis=0, ddof=1) / layout.sd
@@ -135,10 +167,10 @@ def _identified(
             f" Not judged, because only friction below the slowest sweep or next to a turn depends "
             f"on it: {', '.join(unjudged)}, which the data leave to the prior."
         )
-    return judge(scope, "identifiability", ratios[worst], PRIOR_ONLY, good, bad)
+    return IDENTIFIABILITY.judge(ratios[worst], good, bad)
 
 
-def _null(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
+def _null(posterior: Posterior, nuisance: tuple[str, ...]) -> Verdict:
     """Directions that data leave to the prior; those with nuisance parameters in them may be.
 
     What is reported of a law's parameter then still has the width that the nuisance gives it. What
@@ -162,10 +194,10 @@ def _null(scope: str, posterior: Posterior, nuisance: tuple[str, ...]) -> Verdic
     good = "The data determine every direction of the model's parameters."
     if mixed:
         good = f"Only combinations with noise parameters are left open: {mixed[0]}."
-    return judge(scope, "null-directions", len(silent), 0.0, good, bad)
+    return NULL_DIRECTIONS.judge(len(silent), good, bad)
 
 
-def _varied(scope: str, what: str, chosen: FittedCandidate, bins: Bins, contact: Array) -> Verdict:
+def _varied(what: str, chosen: FittedCandidate, bins: Bins, contact: Array) -> Verdict:
     """Whether strokes differ in what the law is to be used over: speed, and where it is met."""
     strokes = by_label(chosen.strokes).values()
     if len(strokes) < 2:
@@ -173,7 +205,7 @@ def _varied(scope: str, what: str, chosen: FittedCandidate, bins: Bins, contact:
             "There is one stroke only, so nothing shows that another would agree: record several, "
             "in both directions and at several speeds."
         )
-        return Verdict(scope, "strokes", "fail", float(len(strokes)), 2.0, why)
+        return STROKES.verdict("fail", float(len(strokes)), why, threshold=2.0)
     medians = np.array([np.median(bins.rate[here]) for here in strokes])
     ratio, fast = _spread(-medians[medians < 0])
     if what == "friction":
@@ -191,7 +223,7 @@ def _varied(scope: str, what: str, chosen: FittedCandidate, bins: Bins, contact:
     )
     if not same:
         status, why = "pass", f"Speeds of strokes differ by a factor of {ratio:.3g}."
-    return Verdict(scope, "strokes", status, ratio, OTHER_SPEED, why)
+    return STROKES.verdict(status, ratio, why)
 
 
 def _spread(speeds: Array) -> tuple[float, float]:
@@ -202,7 +234,7 @@ def _spread(speeds: Array) -> tuple[float, float]:
 
 
 def _independent(
-    scope: str,
+    what: str,
     chosen: FittedCandidate,
     diagnostics: Mapping[str, Any],
     held_out: tuple[StrokeError, ...],
@@ -215,21 +247,21 @@ def _independent(
         f"{count:.0f} independent ones; intervals were widened by up to "
         f"{diagnostics['largest_inflation']:.1f} for it."
     )
-    if scope == "fit.cut":
+    if what == "cut":
         why = (
             f"{diagnostics['observations']} segments of the path leave residuals that are worth "
             f"{count:.0f} independent ones; the likelihood takes them as its noise has them."
         )
     unseen = _median_error(held_out)
-    if per < FEWEST_INDEPENDENT and unseen is not None and unseen < HELD_OUT_LIMIT:
+    if per < WHITENESS.threshold and unseen is not None and unseen < HELD_OUT_LIMIT:
         why += (
             f" That is few for this many parameters, yet unseen strokes are predicted to "
             f"{unseen:.1%}, so the fit may be used: longer or more varied motion would narrow its "
             "intervals."
         )
-        return not_evaluated(scope, "whiteness", why, FEWEST_INDEPENDENT, per)
+        return WHITENESS.not_evaluated(why, per)
     bad = f"{why} That is too few for this many parameters: record longer or more varied motion."
-    return judge(scope, "whiteness", per, FEWEST_INDEPENDENT, why, bad)
+    return WHITENESS.judge(per, why, bad)
 
 
 def _median_error(held_out: tuple[StrokeError, ...]) -> float | None:
@@ -239,22 +271,21 @@ def _median_error(held_out: tuple[StrokeError, ...]) -> float | None:
     return float(np.median([error.relative_rms for error in held_out]))
 
 
-def _explained(scope: str, diagnostics: Mapping[str, Any]) -> Verdict:
+def _explained(diagnostics: Mapping[str, Any]) -> Verdict:
     r2 = diagnostics["r_squared"]
-    if r2 > 0:
-        why = f"The model explains {r2:.1%} of the variance of what was measured."
-        return Verdict(scope, "r-squared", "pass", r2, 0.0, why)
-    why = "The model is no better than a constant: check signs, units and what was recorded."
-    return Verdict(scope, "r-squared", "fail", r2, 0.0, why)
+    good = f"The model explains {r2:.1%} of the variance of what was measured."
+    bad = "The model is no better than a constant: check signs, units and what was recorded."
+    return R_SQUARED.judge(r2, good, bad)
 
 
-def _unseen(scope: str, held_out: tuple[StrokeError, ...]) -> Verdict:
+def _unseen(held_out: tuple[StrokeError, ...]) -> Verdict:
     median = _median_error(held_out)
     if median is None:
         why = "Only one stroke was recorded, so none can be held out: record several."
-        return not_evaluated(scope, "hold-out", why, HELD_OUT_LIMIT)
+        return HOLD_OUT.not_evaluated(why)
     worst = worst_stroke(held_out)
     why = f"On hold-out strokes the error is {median:.1%} (median rms)."
     if worst is not None:
         why = f"{why[:-1]}; the worst is stroke {worst.stroke} with {worst.relative_rms:.1%}."
-    return judge(scope, "hold-out", median, HELD_OUT_LIMIT, why)
+    bad = f"{why} Record more strokes at the speeds of the worst ones, or try a richer candidate."
+    return HOLD_OUT.judge(median, why, bad)

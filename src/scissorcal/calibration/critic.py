@@ -21,7 +21,7 @@ from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.model.course_terms import LIBRARY
 from scissorcal.model.terms import Term
 from scissorcal.recording.recording import Joint
-from scissorcal.verdicts import Verdict, not_evaluated
+from scissorcal.verdicts import STATED, TORQUE, Check, Verdict
 
 FALSE_ALARM = 0.02
 """Chance that the critic proposes anything where nothing is missing."""
@@ -35,6 +35,12 @@ TWINS = 0.9
 """Correlation, the law taken out, from which two terms are one finding under two names."""
 MOST_TERMS = 3
 NOT_ASKED = "The critic was not asked."
+STRUCTURE_LEFT = Check(
+    "fit structure left",
+    f"{TORQUE}lower limit of twice the rms of what the law lacks in every stroke, share of the "
+    "drive (rms)",
+    at_most=STATED,
+)
 
 
 @dataclass(frozen=True)
@@ -125,9 +131,7 @@ def criticise(
     )
 
 
-def structure_verdict(
-    scope: str, critique: Critique, drive: float, unit: str, tolerance: float
-) -> Verdict:
+def structure_verdict(critique: Critique, drive: float, unit: str, tolerance: float) -> Verdict:
     """Judge what recurs and the law lacks by the share of torque that the scene tolerates.
 
     ``drive`` is the drive's rms. It fails where the structure's lower limit exceeds the tolerance,
@@ -137,7 +141,7 @@ def structure_verdict(
     if found is None:
         asked = critique.sentence != NOT_ASKED
         why = critique.sentence if asked else "The critic was not asked; --critic asks it."
-        return not_evaluated(scope, "structure left", why, tolerance)
+        return STRUCTURE_LEFT.not_evaluated(why, threshold=tolerance)
     low, size, high = (value / drive for value in (found.low, found.size, found.high))
     names = ", ".join(proposal.name for proposal in critique.proposals)
     most = f"{found.high:.2g} {unit} ({high:.1%} of the drive)"
@@ -153,14 +157,14 @@ def structure_verdict(
             "term if it is friction; if it is of the day or the rig, cure it (warm up, repair the "
             "encoder) and capture again."
         )
-        return Verdict(scope, "structure left", "fail", low, tolerance, why)
+        return STRUCTURE_LEFT.verdict("fail", low, why, threshold=tolerance)
     if high > tolerance:
         why = (
             f"{said} Whether that exceeds the scene's tolerance of {100 * tolerance:g}% is not "
             "determined: capture more strokes."
         )
-        return not_evaluated(scope, "structure left", why, tolerance, low)
-    return Verdict(scope, "structure left", "pass", low, tolerance, said)
+        return STRUCTURE_LEFT.not_evaluated(why, low, threshold=tolerance)
+    return STRUCTURE_LEFT.verdict("pass", low, said, threshold=tolerance)
 
 
 def _candidates(load: Array | None, joint: Joint) -> tuple[Term, ...]:

@@ -11,7 +11,7 @@ from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import RIG, Axis, Folder, Yes, options_of, positive
 from scissorcal.cli.output import Answer, command, note
 from scissorcal.errors import ScissorcalError
-from scissorcal.verdicts import Verdict
+from scissorcal.verdicts import STATED, TORQUE, Check, Status, Verdict
 from scissorcal.workday.options import CaptureOptions, RigOptions
 
 if TYPE_CHECKING:
@@ -36,6 +36,11 @@ _COMMANDS = {
     ),
     "plate": (f"{_PHOTOGRAPHS}:plate", "Photographs of the plate's target."),
 }
+UNTIL_TOLERANCE = Check(
+    "capture until tolerance",
+    f"{TORQUE}share of the felt places whose band is within the scene's tolerance, as it ended",
+    at_least=STATED,
+)
 
 
 @group(_COMMANDS)
@@ -175,14 +180,9 @@ def _answer(workspace: "Workspace", kind: str, captured: "Captured") -> Answer:
 
 def _verdict(kind: str, mark: "UntilMark") -> Verdict:
     """Whether the tolerance was reached; exit code 3 where it was not."""
-    return Verdict(
-        f"capture.{kind}",
-        "until tolerance",
-        "pass" if mark.reached else "fail",
-        mark.within,
-        mark.needed,
-        mark.sentence,
-    )
+    status: Status = "pass" if mark.reached else "fail"
+    verdict = UNTIL_TOLERANCE.verdict(status, mark.within, mark.sentence, threshold=mark.needed)
+    return verdict.of(f"capture.{kind}")
 
 
 def _text(workspace: "Workspace", captured: "Captured") -> str:

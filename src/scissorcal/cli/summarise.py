@@ -84,8 +84,7 @@ def summarise(
     )
     from scissorcal.files import replacing
     from scissorcal.identity import VERSION
-    from scissorcal.recording import Joint, import_table, read_recording
-    from scissorcal.recording.table import column_of
+    from scissorcal.recording import Joint, read_recording
     from scissorcal.recording.table_file import refuse_no_table
     from scissorcal.report.summary import Shown, summary_page, summary_panels
     from scissorcal.report.text import panels_text

@@ -15,14 +15,14 @@ from scissorcal.workday.options import VerifySettings
 if TYPE_CHECKING:
     from scissorcal.calibration.verify.result import (
         Calibration,
-        Check,
+        CheckKind,
         Halves,
         Sensitivity,
         VerifyResult,
     )
     from scissorcal.workday.workspace import FitKind
 
-_CHECKS: "tuple[Check, ...]" = ("sbc", "halves", "prior")
+_CHECKS: "tuple[CheckKind, ...]" = ("sbc", "halves", "prior")
 _ALL_CHECKS = ",".join(_CHECKS)
 
 
@@ -122,7 +122,7 @@ def verify(
     )
 
 
-def _checks(value: str) -> "tuple[Check, ...]":
+def _checks(value: str) -> "tuple[CheckKind, ...]":
     named = [word.strip() for word in value.split(",") if word.strip()]
     unknown = [word for word in named if word not in _CHECKS]
     if unknown or not named:

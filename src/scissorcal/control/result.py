@@ -11,15 +11,28 @@ from scissorcal.control.gains import HybridGains
 from scissorcal.device.loop_verdicts import loop_verdicts
 from scissorcal.device.motion import MotionReport
 from scissorcal.kernel import ControlConfig, ControlFlag, HybridFlag
-from scissorcal.verdicts import Verdict, judge
+from scissorcal.verdicts import STATED, Check, Verdict
 
-SCOPE = "control"
 FORCE_SHARE, LEAST_FORCE_N = 0.05, 0.12
 """Of the wanted force that its rms error may be, and what it may be in any case."""
-PATH_M = 1e-3
 SETTLED_S = 0.2
 PEAK_S = 0.1
 """After a touch, in which its force peaks; as in the benchmark."""
+FORCE = Check(
+    "control force", "force on a surface: rms error while the path goes on, N", at_most=STATED
+)
+PATH = Check(
+    "control path", "path on a surface: 95 % of its errors while it goes on, mm", at_most=1.0
+)
+TOUCH = Check("control touch", "what is pressed on: largest force of a touch, N", at_most=STATED)
+CONTACT = Check(
+    "control contact", "path on a surface: how often contact was lost or let go of", at_most=0.0
+)
+NO_FORCE = Check(
+    "control no force",
+    "force on a surface: what the balance made of none before, N",
+    at_most=STATED,
+)
 
 
 @dataclass(frozen=True)
@@ -136,17 +149,18 @@ def control_verdicts(
     lost = f"Contact was lost {figures.losses} times, and {figures.let_goes} times let go of."
     free = f"Before the touch the balance made {figures.free_N:.2f} N of no force."
     return (
-        judge(SCOPE, "force", figures.force_rms_N, allowed, force,
-              f"{force} Fit friction anew, or go slower."),
-        judge(SCOPE, "path", figures.path_95_mm, 1e3 * PATH_M, path,
-              f"{path} Go slower, or fit friction of the advance anew."),
-        judge(SCOPE, "touch", peak, peak_N, touch,
-              f"{touch} State the plate's stiffness as it is (plate.touch)."),
-        judge(SCOPE, "contact", figures.losses + figures.let_goes, 0, lost,
-              f"{lost} Check the pose and the surface, or press harder."),
-        judge(SCOPE, "no force", abs(figures.free_N), config.law.touch_force / 2.0, free,
-              f"{free} Fit friction anew: the force is wrong by as much."),
-        *loop_verdicts(SCOPE, report, report.latency, round(1e6 * config.tick_s)),
+        FORCE.judge(figures.force_rms_N, force,
+                    f"{force} Fit friction anew, or go slower.", allowed),
+        PATH.judge(figures.path_95_mm, path,
+                   f"{path} Go slower, or fit friction of the advance anew."),
+        TOUCH.judge(peak, touch,
+                    f"{touch} State the plate's stiffness as it is (plate.touch).", peak_N),
+        CONTACT.judge(figures.losses + figures.let_goes, lost,
+                      f"{lost} Check the pose and the surface, or press harder."),
+        NO_FORCE.judge(abs(figures.free_N), free,
+                       f"{free} Fit friction anew: the force is wrong by as much.",
+                       config.law.touch_force / 2.0),
+        *loop_verdicts("control", report, report.latency, round(1e6 * config.tick_s)),
     )  # fmt: skip
 
 

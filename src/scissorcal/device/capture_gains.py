@@ -27,7 +27,7 @@ from scissorcal.recipe.pace import (
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Kind
 from scissorcal.recording.probe import NORMAL_90, ProbeResult
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import STATED, Check, Verdict
 
 OPENING_ERROR_RAD = 0.3
 ADVANCE_ERROR_M = 0.02
@@ -50,6 +50,16 @@ TYPICAL_INERTIA_SD_kg_m2 = TYPICAL_INERTIA_kg_m2 * math.log(2.0) / NORMAL_90
 """Of scissors whose inertia no probe told: it may be double or half of that, at 90 %."""
 STRIBECK_FACTS = ("stribeck_Nm", "stribeck_rate_rad_per_s")
 """Facts of a probe that saw how friction falls with speed."""
+CONTROL_MARGIN = Check(
+    "device control margin",
+    "whether the rig follows a capture without swinging: phase margin of its controller, degrees",
+    at_least=PHASE_MARGIN_deg,
+)
+STEADY_SWEEPS = Check(
+    "device steady sweeps",
+    "friction at the slowest rates: rate in rad/s below which blades stick and slip",
+    at_most=STATED,
+)
 
 
 @dataclass(frozen=True)
@@ -141,11 +151,9 @@ TYPICAL = CaptureGains(
     rate_cutoff_Hz=120.0,
     still_rad=STILL_RAD,
     verdicts=(
-        not_evaluated(
-            "device",
-            "control margin",
+        CONTROL_MARGIN.not_evaluated(
             "The gains are those of a typical rig, which is answered within 1 ms: nothing was "
-            "measured. Run 'scissorcal device probe', and they follow from the rig.",
+            "measured. Run 'scissorcal device probe', and they follow from the rig."
         ),
     ),
 )
@@ -322,7 +330,7 @@ def _designed(
 
 def _undelayed(probed: Probed) -> Verdict:
     why = f"The gains are those of a typical rig, which is answered within 1 ms. {probed.lack}"
-    return not_evaluated("device", "control margin", why)
+    return CONTROL_MARGIN.not_evaluated(why)
 
 
 def _sliding(stribeck: StribeckFall, stood: float, slowest: float) -> Verdict:
@@ -330,12 +338,10 @@ def _sliding(stribeck: StribeckFall, stood: float, slowest: float) -> Verdict:
     steady = stribeck.steady_from(stood)
     told = f"The loop stands friction that falls by up to {stood:.2g} N m s/rad"
     if stribeck.rate is None and steady > slowest:
-        return not_evaluated(
-            "device",
-            "steady sweeps",
+        return STEADY_SWEEPS.not_evaluated(
             f"{told}: sweeps are steady from {steady:.2g} rad/s on, whatever the friction. The "
             "probe did not see how friction falls with speed, so slower ones are tried, and the "
-            "fit tells whether the blades stuck.",
+            "fit tells whether the blades stuck."
         )
     good = f"{told}, and sweeps at {slowest:.2g} rad/s are steady."
     bad = (
@@ -343,7 +349,7 @@ def _sliding(stribeck: StribeckFall, stood: float, slowest: float) -> Verdict:
         f"{steady:.2g} rad/s. Slower sweeps need a shorter delay: shorten the adapter's latency "
         "timer, raise the baud rate, or take a faster tick."
     )
-    return judge("device", "steady sweeps", steady, slowest, good, bad)
+    return STEADY_SWEEPS.judge(steady, good, bad, threshold=slowest)
 
 
 def _verdict(margins: list[Margins], delay_s: float, lack: str) -> Verdict:
@@ -353,4 +359,4 @@ def _verdict(margins: list[Margins], delay_s: float, lack: str) -> Verdict:
         f"of {worst.gain:.1f} at a delay of {1e3 * delay_s:.2g} ms. {lack}"
     ).rstrip()
     remedy = """ Lower the gains in rig.control, or set them to "auto"."""
-    return judge("device", "control margin", worst.phase_deg, PHASE_MARGIN_deg, said, said + remedy)
+    return CONTROL_MARGIN.judge(worst.phase_deg, said, said + remedy)

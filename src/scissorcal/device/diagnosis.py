@@ -4,18 +4,31 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from scissorcal.device.loop_verdicts import LOOP
 from scissorcal.device.timing import Percentiles
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import STATED, Check, Verdict
 
 ROUND_TRIP_LIMIT_TICKS = 4.0
 INTERVAL_LIMIT_TICKS = 3.0
-LOST_LIMIT_PERCENT = 0.1
-LATENESS_LIMIT_MS = 0.5
-DRIFT_LIMIT_PPM = 500.0
-TIMER_LIMIT_NS = 1000.0
-ADAPTER_LIMIT_MS = 1.0
-LEAST_PRIORITY = 1.0
 LEAST_BRAKE_MS, MOST_BRAKE_MS = 10.0, 1000.0
+ROUND_TRIP = Check("device.port round trip", f"{LOOP}: 99 % of the answers, ms", at_most=STATED)
+FRAME_INTERVALS = Check(
+    "device.port frame intervals", f"{LOOP}: 99 % of the intervals, ms", at_most=STATED
+)
+LOST_FRAMES = Check("device.port lost frames", f"{LOOP}: frames lost, %", at_most=0.1)
+LATENCY_TIMER = Check(
+    "device.port latency timer", f"{LOOP}: ms that the adapter holds data back", at_most=1.0
+)
+DRIFT = Check(
+    "device.clock drift",
+    "rates and accelerations: error of the device's clock beyond two standard errors, ppm",
+    at_most=500.0,
+)
+RESOLUTION = Check(
+    "host.timer resolution", f"{LOOP}: steps of this computer's clock, ns", at_most=1000.0
+)
+LATENESS = Check("host.scheduler wake-up lateness", f"{LOOP}: 99 % of the delays, ms", at_most=0.5)
+RIGHTS = Check("host.scheduler real-time rights", f"{LOOP}: priority that is granted", at_least=1.0)
 
 
 @dataclass(frozen=True)
@@ -85,8 +98,8 @@ def _round_trip(m: Measurements) -> Verdict:
         "load the processor."
     )
     if m.unanswered:
-        return Verdict("device.port", "round trip", "fail", m.round_trip.p99, limit, bad)
-    return judge("device.port", "round trip", m.round_trip.p99, limit, found, bad)
+        return ROUND_TRIP.verdict("fail", m.round_trip.p99, bad, threshold=limit)
+    return ROUND_TRIP.judge(m.round_trip.p99, found, bad, threshold=limit)
 
 
 def _timer_too(m: Measurements) -> str:
@@ -100,13 +113,11 @@ def _intervals(m: Measurements) -> Verdict:
         f"{m.interval.p99:.2f} ms, 99.9 % within {m.interval.p999:.2f} ms, longest "
         f"{m.interval.worst:.1f} ms."
     )
-    return judge(
-        "device.port",
-        "frame intervals",
+    return FRAME_INTERVALS.judge(
         m.interval.p99,
-        INTERVAL_LIMIT_TICKS * m.tick_ms,
         found,
         f"{found} Frames arrive in batches{_timer_too(m)}: close programs that load the processor.",
+        threshold=INTERVAL_LIMIT_TICKS * m.tick_ms,
     )
 
 
@@ -115,41 +126,38 @@ def _losses(m: Measurements, port: str) -> Verdict:
     found = f"{m.lost} frames lost ({share:.2g} %) and {m.garbled} garbled on {port}."
     bad = f"{found} Use a shorter, shielded cable, and the baud rate that the device is built for."
     if m.garbled:
-        return Verdict("device.port", "lost frames", "fail", share, LOST_LIMIT_PERCENT, bad)
-    return judge("device.port", "lost frames", share, LOST_LIMIT_PERCENT, found, bad)
+        return LOST_FRAMES.verdict("fail", share, bad)
+    return LOST_FRAMES.judge(share, found, bad)
 
 
 def _adapter(m: Measurements, port: str) -> Verdict:
     delay_ms = m.adapter_timer_ms
     if delay_ms is None:
         why = f"{port} has no USB adapter with a latency timer."
-        return not_evaluated("device.port", "latency timer", why, ADAPTER_LIMIT_MS)
+        return LATENCY_TIMER.not_evaluated(why)
     found = f"The adapter delays data by up to {delay_ms:g} ms."
     bad = f"{found} Run: echo 1 | sudo tee {adapter_timer_path(port)}"
-    return judge("device.port", "latency timer", delay_ms, ADAPTER_LIMIT_MS, found, bad)
+    return LATENCY_TIMER.judge(delay_ms, found, bad)
 
 
 def _drift(m: Measurements) -> Verdict:
     """Judge what of the drift two standard errors do not explain."""
     if not math.isfinite(m.drift_ppm):
         why = "Too few frames arrived to compare the clocks."
-        return not_evaluated("device.clock", "drift", why, DRIFT_LIMIT_PPM)
+        return DRIFT.not_evaluated(why)
     if m.simulated:
         why = (
             f"The clock of a virtual rig stops while this computer is busy "
             f"({m.drift_ppm:.0f} ppm now), so its drift is not judged."
         )
-        return not_evaluated("device.clock", "drift", why, DRIFT_LIMIT_PPM, m.drift_ppm)
+        return DRIFT.not_evaluated(why, m.drift_ppm)
     direction = "faster" if m.drift_ppm > 0 else "slower"
     found = (
         f"The device's clock runs {abs(m.drift_ppm):.0f} ppm {direction} than this computer's "
         f"(standard error {m.drift_se_ppm:.0f} ppm)."
     )
-    return judge(
-        "device.clock",
-        "drift",
+    return DRIFT.judge(
         max(abs(m.drift_ppm) - 2.0 * m.drift_se_ppm, 0.0),
-        DRIFT_LIMIT_PPM,
         found,
         f"{found} Check the device's oscillator, and that its microseconds are microseconds: "
         "rates and accelerations are computed from them.",
@@ -158,11 +166,8 @@ def _drift(m: Measurements) -> Verdict:
 
 def _timer(m: Measurements) -> Verdict:
     found = f"This computer's clock counts in steps of {m.timer_resolution_ns:g} ns."
-    return judge(
-        "host.timer",
-        "resolution",
+    return RESOLUTION.judge(
         m.timer_resolution_ns,
-        TIMER_LIMIT_NS,
         found,
         f"{found} Use a kernel with high-resolution timers (CONFIG_HIGH_RES_TIMERS).",
     )
@@ -173,11 +178,8 @@ def _scheduler(m: Measurements) -> Verdict:
         f"A wait of 1 ms ends {m.lateness.p50:.2f} ms late in the middle, 99 % within "
         f"{m.lateness.p99:.2f} ms, at worst {m.lateness.worst:.1f} ms."
     )
-    return judge(
-        "host.scheduler",
-        "wake-up lateness",
+    return LATENESS.judge(
         m.lateness.p99,
-        LATENESS_LIMIT_MS,
         found,
         f"{found} Close other programs, choose the processor's performance governor, and grant "
         "real-time priority (see there).",
@@ -187,10 +189,10 @@ def _scheduler(m: Measurements) -> Verdict:
 def _rights(m: Measurements) -> Verdict:
     if m.realtime_priority > 0:
         why = f"Real-time priority up to {m.realtime_priority} is granted."
-        return judge("host.scheduler", "real-time rights", m.realtime_priority, LEAST_PRIORITY, why)
+        return RIGHTS.judge(m.realtime_priority, why)
     why = (
         "Real-time priority is not granted; it is only needed where other programs load the "
         "processor. To grant it, put '@dialout - rtprio 50' into "
         "/etc/security/limits.d/scissorcal.conf and log in again."
     )
-    return not_evaluated("host.scheduler", "real-time rights", why, LEAST_PRIORITY, 0.0)
+    return RIGHTS.not_evaluated(why, 0.0)

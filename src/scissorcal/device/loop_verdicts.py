@@ -2,10 +2,22 @@
 
 from scissorcal.device.motion import MotionReport
 from scissorcal.device.timing import Percentiles
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import STATED, Check, Verdict
 
-MOST_MISSED = 0.01
 MOST_FAULTS_PER_S = 0.1
+LOOP = "whether commands reach the motors in time"
+DEADLINE, MISSES, FAULTS, SUPERVISION = (
+    {
+        scope: Check(f"{scope} {name}", f"{LOOP}: {what}", at_most=limit)
+        for scope in ("render", "control")
+    }
+    for name, what, limit in (
+        ("deadline", "99 % of the latencies, us", STATED),
+        ("misses", "share of lost frames", 0.01),
+        ("faults", "faults that the device latched", STATED),
+        ("supervision", "frames with damping only", 0.0),
+    )
+)
 
 
 def loop_verdicts(
@@ -23,10 +35,10 @@ def loop_verdicts(
 def _deadline(scope: str, latency: Percentiles | None, tick_us: int) -> Verdict:
     if latency is None:
         why = "Virtual time has no latency."
-        return not_evaluated(scope, "deadline", why, float(tick_us))
+        return DEADLINE[scope].not_evaluated(why, threshold=float(tick_us))
     why = f"99 % of the commands left within {latency.p99:.0f} us of their frame (tick {tick_us})."
     remedy = f"{why} Run 'scissorcal device doctor' to find what is slow."
-    return judge(scope, "deadline", latency.p99, tick_us, why, remedy)
+    return DEADLINE[scope].judge(latency.p99, why, remedy, threshold=tick_us)
 
 
 def _complete(scope: str, report: MotionReport, tick_us: int) -> Verdict:
@@ -43,7 +55,7 @@ def _complete(scope: str, report: MotionReport, tick_us: int) -> Verdict:
             f"{1e-3 * worst_us:.0f} ms: this computer was held up by other work, and what was sent "
             "meanwhile was lost, or the device paused. Close programs that load this computer."
         )
-    return judge(scope, "misses", share, MOST_MISSED, why, remedy)
+    return MISSES[scope].judge(share, why, remedy)
 
 
 def _faultless(scope: str, report: MotionReport, tick_us: int) -> Verdict:
@@ -56,7 +68,7 @@ def _faultless(scope: str, report: MotionReport, tick_us: int) -> Verdict:
             " After each the force was ramped up from zero. If nothing else caused them, commands "
             "were too late: run 'scissorcal device doctor'."
         )
-    return judge(scope, "faults", counters.faults, allowed, why)
+    return FAULTS[scope].judge(counters.faults, why, threshold=allowed)
 
 
 def _supervised(scope: str, report: MotionReport) -> Verdict:
@@ -66,4 +78,4 @@ def _supervised(scope: str, report: MotionReport) -> Verdict:
         f"{count} frames had damping only, because the supervising process missed its "
         "heartbeat: close programs that load the processor."
     )
-    return judge(scope, "supervision", count, 0.0, never, missed)
+    return SUPERVISION[scope].judge(count, never, missed)

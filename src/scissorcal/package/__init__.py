@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from scissorcal.package.archive import read_manifest
     from scissorcal.package.build import PackageSummary, build_package, put_review
-    from scissorcal.package.check import REVIEW_CHECK, check_package
+    from scissorcal.package.check import check_package
     from scissorcal.package.manifest import Manifest, manifest_schema_text
     from scissorcal.package.model_package import (
         FailedFitsWarning,
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from scissorcal.package.review import REVIEW_FORMAT, Review, stamp
 
 __all__ = [
-    "REVIEW_CHECK",
     "REVIEW_FORMAT",
     "FailedFitsWarning",
     "Manifest",
@@ -37,7 +36,7 @@ __all__ = [
 _HOMES = {
     "archive": ("read_manifest",),
     "build": ("PackageSummary", "build_package", "put_review"),
-    "check": ("REVIEW_CHECK", "check_package"),
+    "check": ("check_package",),
     "manifest": ("Manifest", "manifest_schema_text"),
     "model_package": (
         "FailedFitsWarning",

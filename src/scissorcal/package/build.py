@@ -398,9 +398,10 @@ def _refuse_failed_fits(
 
 
 def _refuse_failed(path: Path, verdicts: tuple[Verdict, ...]) -> None:
-    from scissorcal.package.check import FITS_CHECK
+    from scissorcal.package.check import FAILED_FITS, REVIEW
 
-    own = [verdict for verdict in failed(verdicts) if verdict.check not in (FITS_CHECK, "review")]
-    if own:
-        reasons = " ".join(verdict.why for verdict in own)
+    left_to_caller = (FAILED_FITS.name, REVIEW.name)
+    refused = [verdict for verdict in failed(verdicts) if verdict.check not in left_to_caller]
+    if refused:
+        reasons = " ".join(verdict.why for verdict in refused)
         raise VerdictError(f"{path} was not written: {reasons}")

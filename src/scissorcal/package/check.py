@@ -10,18 +10,28 @@ from scissorcal.package.grid import spread_points
 from scissorcal.package.model_package import ModelPackage, open_package
 from scissorcal.package.signature import against as review_refusal
 from scissorcal.package.signature import signature_refusal, signer_words, unasked_words
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import STATED, TORQUE, Check, Verdict
 
-SCOPE = "package"
-REVIEW_CHECK = "review"
-SIGNATURE_CHECK = "signature"
-FITS_CHECK = "failed fits"
 GRID_POINTS = 13_337
 """Differs from the count of the bound's points, so that the points differ."""
 
 CENTRE_POINTS = 300
-IN_BAND = 0.9
 EXTREME_STEPS = 4_000
+BOUND = Check("package bound", f"{TORQUE}error of the tables over the scene, N m", at_most=STATED)
+BOUND_SHARE = Check(
+    "package bound share", f"{TORQUE}error of the tables over the largest torque", at_most=STATED
+)
+EXTREMES = Check("package extremes", "the motors: steps that gave no number", at_most=0.0)
+CENTRE = Check(
+    "package centre", f"{TORQUE}share of the scene that lies in the posterior's band", at_least=0.9
+)
+FAILED_FITS = Check(
+    "package failed fits", "what the package is made from: checks that its fits failed", at_most=0.0
+)
+REVIEW = Check("package review", "whether the report was accepted: 1 if so", at_least=1.0)
+SIGNATURE = Check(
+    "package signature", "whether a trusted key signed what is rendered: 1 if so", at_least=1.0
+)
 
 
 def check_package(
@@ -65,13 +75,13 @@ def _bound(package: ModelPackage) -> tuple[Verdict, Verdict]:
         f"of the model (limit {stated.stated_Nm:.2g} N m; worst at opening "
         f"{np.degrees(opening):.1f} deg, rate {rate:.2g} rad/s, contact {contact * 1e3:.1f} mm)."
     )
-    kept = judge(SCOPE, "bound", found.largest, stated.stated_Nm, why)
+    kept = BOUND.judge(found.largest, why, threshold=stated.stated_Nm)
     why = (
         f"The stated bound is {stated.share:.3%} of the scene's largest torque "
         f"({stated.scene_torque_Nm:.3g} N m); the tables may use {stated.allowed_share:.2%}."
     )
     remedy = f"{why} Narrow the scene's ranges in the recipe, or raise its tolerance."
-    return kept, judge(SCOPE, "bound share", stated.share, stated.allowed_share, why, remedy)
+    return kept, BOUND_SHARE.judge(stated.share, why, remedy, threshold=stated.allowed_share)
 
 
 def _extremes(package: ModelPackage) -> Verdict:
@@ -85,7 +95,7 @@ def _extremes(package: ModelPackage) -> Verdict:
     out = kernel.step_many(*inputs)
     bad = int(np.sum(~np.isfinite(out["torque"]) | ~np.isfinite(out["force"])))
     why = f"{bad} of {EXTREME_STEPS} steps with extreme inputs gave an output that is not finite."
-    return judge(SCOPE, "extremes", bad, 0.0, why)
+    return EXTREMES.judge(bad, why)
 
 
 def _centre(package: ModelPackage) -> Verdict:
@@ -108,12 +118,12 @@ def _centre(package: ModelPackage) -> Verdict:
         f"{why} The fit's best point is not typical of its posterior: run 'scissorcal fit --effort "
         "thorough'."
     )
-    return judge(SCOPE, "centre", inside, IN_BAND, why, remedy)
+    return CENTRE.judge(inside, why, remedy)
 
 
 def _fits(package: ModelPackage) -> Verdict:
     passed, failed = "Every fit in the package passed its checks.", " ".join(package.fit_warnings)
-    return judge(SCOPE, FITS_CHECK, len(package.manifest.failed_checks), 0.0, passed, failed)
+    return FAILED_FITS.judge(len(package.manifest.failed_checks), passed, failed)
 
 
 def _review(package: ModelPackage, trusted: Sequence[str] | None) -> Verdict:
@@ -121,12 +131,12 @@ def _review(package: ModelPackage, trusted: Sequence[str] | None) -> Verdict:
     review, against = manifest.review, review_refusal(manifest.review, manifest.fit_hashes, trusted)
     sentence = f"The package {manifest.name} {against}." if against else ""
     if review is None and trusted is None:
-        return not_evaluated(SCOPE, REVIEW_CHECK, sentence)
+        return REVIEW.not_evaluated(sentence)
     why = ""
     if review is not None:
         whose = ", which you trust" if trusted is not None else ""
         why = f"The report of its fits was {review.words}; {review.identity_words}{whose}."
-    return judge(SCOPE, REVIEW_CHECK, 0.0 if against else 1.0, 1.0, why, sentence)
+    return REVIEW.judge(0.0 if against else 1.0, why, sentence)
 
 
 def _signature(package: ModelPackage, trusted: Sequence[str] | None) -> Verdict:
@@ -134,7 +144,7 @@ def _signature(package: ModelPackage, trusted: Sequence[str] | None) -> Verdict:
     manifest = package.manifest
     against = signature_refusal(manifest, trusted)
     if trusted is None and not against:
-        return not_evaluated(SCOPE, SIGNATURE_CHECK, unasked_words(manifest))
+        return SIGNATURE.not_evaluated(unasked_words(manifest))
     whose = f"Its content is {signer_words(manifest)}, which you trust."
     sentence = f"The package {manifest.name} {against}."
-    return judge(SCOPE, SIGNATURE_CHECK, 0.0 if against else 1.0, 1.0, whose, sentence)
+    return SIGNATURE.judge(0.0 if against else 1.0, whose, sentence)

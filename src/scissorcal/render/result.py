@@ -12,18 +12,33 @@ from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.kernel import EnergyLedger
 from scissorcal.render.admission import Admission
 from scissorcal.render.plate_estimate import PlateReport
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import STATED, TORQUE, Check, Verdict
 
-SCOPE = "render"
 ACCEPT = "--accept-derated"
 MOST_CREATED = 0.1
-MOST_OUT = 0.1
-"""Chosen: a person waits for a second in ten without asking what is wrong."""
 NEGLIGIBLE_J = 5e-3
 """Below, an energy error is that of torque sensors: 1 mN m over a few radians of strokes."""
 REMEDY = (
     "Check that torque and opening have the same sense ('scissorcal device probe'); a shorter "
     "delay or more damping lowers it."
+)
+ADMISSION = Check(
+    "render admission", "stability: rendered stiffness over the rig's limit in a hand", at_most=1.0
+)
+FELT_TORQUE = Check(
+    "render felt torque",
+    f"{TORQUE}its change by what the rig cannot render stably, rms over the scene's strokes",
+    at_most=STATED,
+)
+PLATE_POSE = Check(
+    "render plate pose", f"{TORQUE}share of time without full force for want of a pose", at_most=0.1
+)
+"""Chosen: a person waits for a second in ten without asking what is wrong."""
+PASSIVITY = Check(
+    "render passivity", "energy beyond the model's, which is felt as buzzing: J", at_most=STATED
+)
+MOTOR_SENSE = Check(
+    "render motor sense", "sense of motor and force sensor: energy from the rig, J", at_most=STATED
 )
 
 
@@ -119,7 +134,7 @@ def render_verdicts(
     return (
         _admitted(admission),
         felt_verdict(admission, accepted=accepted),
-        *loop_verdicts(SCOPE, report, latency, tick_us),
+        *loop_verdicts("render", report, latency, tick_us),
         _passive(report.ledger),
         _motor_sense(report.ledger),
         *((_plate_pose(plate),) if plate else ()),
@@ -130,10 +145,10 @@ def _admitted(admission: Admission) -> Verdict:
     """Whether what was rendered is within what the rig renders stably."""
     why = " ".join(admission.reasons)
     if not admission.evaluated:
-        return not_evaluated(SCOPE, "admission", f"{why} {' '.join(admission.cures)}")
+        return ADMISSION.not_evaluated(f"{why} {' '.join(admission.cures)}")
     allowed = admission.allowed_in_hand
     share = admission.rendered / allowed if allowed > 0.0 else math.inf
-    return judge(SCOPE, "admission", share, 1.0, why)
+    return ADMISSION.judge(share, why)
 
 
 def felt_verdict(admission: Admission, *, accepted: bool = False) -> Verdict:
@@ -144,21 +159,21 @@ def felt_verdict(admission: Admission, *, accepted: bool = False) -> Verdict:
     share, tolerance = admission.felt_share, admission.tolerance
     if not admission.evaluated:
         why = "What this rig changes of the felt torque is not known, as its friction is not."
-        return not_evaluated(SCOPE, "felt torque", f"{why} {' '.join(admission.cures)}")
+        return FELT_TORQUE.not_evaluated(f"{why} {' '.join(admission.cures)}")
     why = (
         f"Softer response, weaker damping and friction near rest change the felt torque by "
         f"{share:.1%} (rms over the scene's closing strokes), the scene's tolerance is "
         f"{tolerance * 100:.3g} %."
     )
     if admission.is_felt and accepted:
-        return not_evaluated(
-            SCOPE, "felt torque", f"Accepted by a person ({ACCEPT}): {why}", tolerance, share
+        return FELT_TORQUE.not_evaluated(
+            f"Accepted by a person ({ACCEPT}): {why}", share, threshold=tolerance
         )
     cures = "No encoder, delay or damping cures it alone: narrow the scene."
     if admission.felt_cures:
         cures = f"What would cure it, each by itself: {' '.join(admission.felt_cures)}"
     remedy = f"{why} {cures} Or accept it ({ACCEPT})."
-    return judge(SCOPE, "felt torque", share, tolerance, why, remedy)
+    return FELT_TORQUE.judge(share, why, remedy, threshold=tolerance)
 
 
 def _plate_pose(plate: PlateReport) -> Verdict:
@@ -168,7 +183,7 @@ def _plate_pose(plate: PlateReport) -> Verdict:
         f"For {share:.0%} of the time the plate's pose was not known well enough, and the force "
         f"fell ({plate.falls} times, {plate.estimates} estimates)."
     )
-    return judge(SCOPE, "plate pose", share, MOST_OUT, why, " ".join((why, *plate.sentences)))
+    return PLATE_POSE.judge(share, why, " ".join((why, *plate.sentences)))
 
 
 def _passive(ledger: EnergyLedger) -> Verdict:
@@ -186,7 +201,7 @@ def _passive(ledger: EnergyLedger) -> Verdict:
         why += f", and added damping took {-ledger.injected_J:.2g} J"
     why += "."
     remedy = f"{why} {REMEDY}"
-    return judge(SCOPE, "passivity", ledger.created_J, allowed, why, remedy)
+    return PASSIVITY.judge(ledger.created_J, why, remedy, threshold=allowed)
 
 
 def _motor_sense(ledger: EnergyLedger) -> Verdict:
@@ -196,7 +211,7 @@ def _motor_sense(ledger: EnergyLedger) -> Verdict:
     """
     if ledger.hand_J == 0.0:
         why = "No sensor measured the hand's work, so the motor's own sense was not checked."
-        return not_evaluated(SCOPE, "motor sense", why)
+        return MOTOR_SENSE.not_evaluated(why)
     exchanged = abs(ledger.hand_J) + abs(ledger.delivered_J)
     allowed = max(NEGLIGIBLE_J, MOST_CREATED * exchanged)
     why = (
@@ -207,4 +222,4 @@ def _motor_sense(ledger: EnergyLedger) -> Verdict:
         f"{why} A rig cannot give energy: the motor pushes against its stated sense, or the force "
         "sensor's sign or radius is wrong. Run 'scissorcal device probe'."
     )
-    return judge(SCOPE, "motor sense", -ledger.rig_J, allowed, why, remedy)
+    return MOTOR_SENSE.judge(-ledger.rig_J, why, remedy, threshold=allowed)

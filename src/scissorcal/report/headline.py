@@ -24,46 +24,6 @@ SAID: dict[Stance, str] = {
 }
 DRAFT_SKIPS = "k-hat"
 
-ADVICE: dict[str, str] = {
-    "k-hat": (
-        "The posterior is far from its approximation: record more varied strokes, or choose a "
-        "simpler candidate in the recipe's `[fit]` table."
-    ),
-    "optimum": (
-        "The search did not settle: check the recording's units and signs, then fit again, with "
-        "`--effort standard` if this was a draft."
-    ),
-    "bound": (
-        "A parameter ended at the edge of the search: check the recording's units and signs, then "
-        "its prior in the recipe."
-    ),
-    "whiteness": (
-        "The residuals are autocorrelated: look at the worst strokes, then record longer or more "
-        "varied motion, or try a richer candidate in the recipe's `[fit]` table."
-    ),
-    "hold-out": (
-        "New strokes are not predicted well: record more strokes at the speeds of the worst ones, "
-        "or try a richer candidate."
-    ),
-    "r-squared": (
-        "The law explains too little: check the recording's units and signs, and that what was "
-        "recorded is what the recipe says."
-    ),
-    "calibration|refits": (
-        "Intervals do not hold the truth as often as they claim on data simulated from the fit: "
-        "fit with more effort, or choose a simpler candidate in the recipe's `[fit]` table."
-    ),
-    "trust|halves": (
-        "Two halves of the data disagree by more than they claim: check that nothing moved or "
-        "warmed up during the capture, then capture again."
-    ),
-    "identifiability": (
-        "Some parameters repeat their prior: record the speeds or openings that inform them, or "
-        "choose a candidate without them."
-    ),
-}
-"""What to do about a check that failed, by words in its name, parted by bars."""
-
 
 @dataclass(frozen=True)
 class Headline:
@@ -84,12 +44,14 @@ def write_headline(fit: FitResult, checked: Sequence[Verdict] = ()) -> Headline:
     own checks is not verified, nor with one that counted no coverage.
     """
     verdicts = (*fit.verdicts, *checked)
-    failed = [verdict.check for verdict in verdicts if verdict.status == "fail"]
+    failed = [verdict for verdict in verdicts if verdict.status == "fail"]
     error = _error_words(fit)
     if failed:
-        brief = f"{_listed(failed)} failed"
+        again = f"Then run `scissorcal fit {fit.words}` and `scissorcal report` again."
+        brief = f"{_listed([verdict.check for verdict in failed])} failed"
         sentence = f"Do not use the {fit.what} fit: {brief}.{error}"
-        return Headline(fit.what, "reject", sentence, brief, _advice(fit, failed))
+        steps = (*dict.fromkeys(verdict.why for verdict in failed), again)
+        return Headline(fit.what, "reject", sentence, brief, steps)
     doubts, steps = _doubts(fit, verdicts)
     if doubts:
         brief = "; ".join(doubts)
@@ -154,7 +116,10 @@ def _doubts(fit: FitResult, verdicts: Sequence[Verdict]) -> tuple[list[str], tup
     if silent:
         named = _listed([f"`{name}`" for name in silent])
         doubts.append(f"{named} repeat{'s' if len(silent) == 1 else ''} the prior")
-        steps += _advice(fit, ["identifiability"])
+        steps.append(
+            "Some parameters repeat their prior: record the speeds or openings that inform them, "
+            f"or choose a candidate without them. Then run `scissorcal fit {fit.words}` again."
+        )
     if draft:
         doubts.append("its intervals are those of a draft")
         steps.append(f"Run `scissorcal fit {fit.words} --effort standard` for reliable intervals.")
@@ -166,16 +131,6 @@ def _error_words(fit: FitResult) -> str:
     if middle is None:
         return ""
     return f" Hold-out error by stroke: {percent(middle)} (median; worst {percent(worst)})."
-
-
-def _advice(fit: FitResult, checks: Sequence[str]) -> tuple[str, ...]:
-    steps: list[str] = []
-    for check in checks:
-        said = check.lower()
-        known = [step for keys, step in ADVICE.items() if any(k in said for k in keys.split("|"))]
-        steps += known[:1] or [f"Read why {check} failed, correct that, and fit again."]
-    again = f"Then run `scissorcal fit {fit.words}` and `scissorcal report` again."
-    return (*dict.fromkeys(steps), again)
 
 
 def _listed(names: Sequence[str]) -> str:

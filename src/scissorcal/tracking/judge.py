@@ -9,17 +9,30 @@ from scissorcal.tracking.clocks import DRIFT_LIMIT_PPM, ClockWatch
 from scissorcal.tracking.delay import DelayFit
 from scissorcal.tracking.follow import PlateFollower
 from scissorcal.tracking.tracker import Outcome
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import Check, Verdict
 
-SCOPE = "track"
-REFUSED_PICTURES = 0.1
-REFUSED_CONTACTS = 0.2
 NIS_RATIO = 2.0
 """Mean NIS over its degrees of freedom: above, errors are larger than they are said to be."""
 FEWEST = 20
 """Rows from which on shares and means are judged."""
 
 _FREEDOM = {"picture": 6, "contact": 1}
+TRACK = "the tracked pose and its stated uncertainty"
+CLOCK_JUMPS = Check(
+    "track clock jumps", f"{TRACK}: how often a clock of camera or rig jumped", at_most=0.0
+)
+REFUSED_PICTURES = Check(
+    "track refused pictures", f"{TRACK}: share of pictures beyond the gate", at_most=0.1
+)
+REFUSED_CONTACTS = Check(
+    "track refused contacts", f"{TRACK}: share of contacts beyond the gate", at_most=0.2
+)
+PICTURE_CONSISTENCY = Check(
+    "track picture consistency", f"{TRACK}: mean NIS of pictures over its 6", at_most=NIS_RATIO
+)
+CONTACT_CONSISTENCY = Check(
+    "track contact consistency", f"{TRACK}: mean NIS of contacts over its 1", at_most=NIS_RATIO
+)
 
 
 @dataclass(frozen=True)
@@ -89,40 +102,38 @@ def track_verdicts(figures: TrackFigures) -> tuple[Verdict, ...]:
         _judge_clocks(figures),
         _judge_pictures(figures.pictures),
         _judge_contacts(figures),
-        _judge_nis("picture consistency", figures.pictures, "plate.tracking's speeds and bias"),
-        _judge_nis("contact consistency", figures.contacts, "plate.tracking's contact errors"),
+        _judge_nis(PICTURE_CONSISTENCY, figures.pictures, "plate.tracking's speeds and bias"),
+        _judge_nis(CONTACT_CONSISTENCY, figures.contacts, "plate.tracking's contact errors"),
     )
 
 
 def _judge_clocks(figures: TrackFigures) -> Verdict:
     clocks = [clock for clock in (figures.camera, figures.rig) if clock is not None]
     if not clocks:
-        return not_evaluated(SCOPE, "clock jumps", "No clock was compared.", 0.0)
+        return CLOCK_JUMPS.not_evaluated("No clock was compared.")
     jumps = sum(clock.jumps for clock in clocks)
     said = " ".join(clock.sentence for clock in clocks)
-    return judge(
-        SCOPE, "clock jumps", jumps, 0.0, f"{said} {DRIFT_LIMIT_PPM:g} ppm are the limit.", said
-    )
+    return CLOCK_JUMPS.judge(jumps, f"{said} {DRIFT_LIMIT_PPM:g} ppm are the limit.", said)
 
 
 def _judge_pictures(counts: RowCounts) -> Verdict:
     if counts.used + counts.refused < FEWEST:
         why = f"{counts.used + counts.refused} pictures are too few to judge ({FEWEST})."
-        return not_evaluated(SCOPE, "refused pictures", why, REFUSED_PICTURES)
+        return REFUSED_PICTURES.not_evaluated(why)
     why = f"{100 * counts.refused_share:.1f} % of the pictures were refused."
     remedy = (
         " Either the plate moves faster than plate.tracking says (speed_mm_per_s, "
         "turn_deg_per_s), or pictures show its mirrored pose: tilt it more, or move closer."
     )
     value = counts.refused_share
-    return judge(SCOPE, "refused pictures", value, REFUSED_PICTURES, why, why + remedy)
+    return REFUSED_PICTURES.judge(value, why, why + remedy)
 
 
 def _judge_contacts(figures: TrackFigures) -> Verdict:
     counts = figures.contacts
     if counts.used + counts.refused < FEWEST:
         why = f"{counts.used + counts.refused} contacts are too few to judge ({FEWEST})."
-        return not_evaluated(SCOPE, "refused contacts", why, REFUSED_CONTACTS)
+        return REFUSED_CONTACTS.not_evaluated(why)
     why = f"{100 * counts.refused_share:.1f} % of the contacts were refused"
     where = "."
     if math.isfinite(figures.away_mm):
@@ -136,18 +147,16 @@ def _judge_contacts(figures: TrackFigures) -> Verdict:
         "the tip that touches."
     )
     value = counts.refused_share
-    return judge(
-        SCOPE, "refused contacts", value, REFUSED_CONTACTS, why + where, why + where + remedy
-    )
+    return REFUSED_CONTACTS.judge(value, why + where, why + where + remedy)
 
 
-def _judge_nis(check: str, counts: RowCounts, settings: str) -> Verdict:
+def _judge_nis(check: Check, counts: RowCounts, settings: str) -> Verdict:
     if counts.used + counts.refused < FEWEST:
-        return not_evaluated(SCOPE, check, f"Fewer than {FEWEST} rows were judged.", NIS_RATIO)
+        return check.not_evaluated(f"Fewer than {FEWEST} rows were judged.")
     ratio = counts.mean_nis / counts.freedom
     why = f"The mean NIS is {counts.mean_nis:.2g}, where {counts.freedom} are expected."
     remedy = f" The errors are larger than they are stated to be: widen {settings}."
-    return judge(SCOPE, check, ratio, NIS_RATIO, why, why + remedy)
+    return check.judge(ratio, why, why + remedy)
 
 
 def _counts(follower: PlateFollower, source: str) -> RowCounts:

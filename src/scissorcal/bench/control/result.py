@@ -15,19 +15,44 @@ from scissorcal.bench.control.study import CONTROL_CASES, POSE_CASES, Done
 from scissorcal.bench.control.traps import traps
 from scissorcal.bench.run import Run
 from scissorcal.tracking.consistency import mean_band, share_held
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import Check, Verdict
 
 ALARM = 0.05
 """False-alarm rate of the verdict on consistency over all rows together."""
-NORMAL_LIMITS = {"fixed": 0.35, "moving": 0.2, "1 s without pictures": 0.1}
-FORCE_LIMIT_N = 0.12
-STIFF_LIMIT = 2.5
-PATH_LIMIT = 4.0
-TOUCH_LIMIT = 1.5
 TRAP_SHARE = 0.999
 """Of mean NEES within the band of a trap's check: 8 filters fail it by chance once in 125 runs."""
 LEAST_RUNS = 10
 """Fewer runs than these judge nothing."""
+CONSISTENCY = Check(
+    "bench.control consistency",
+    "the pose's stated uncertainty: rows whose mean NEES no consistent filter has",
+    at_most=0.0,
+)
+NORMAL_ERROR = {
+    scenario: Check(
+        f"bench.control normal error, {scenario}",
+        "what contact adds to the camera: error along the normal over that of vision alone",
+        at_most=limit,
+    )
+    for scenario, limit in (("fixed", 0.35), ("moving", 0.2), ("1 s without pictures", 0.1))
+}
+TRAPS = Check(
+    "bench.control traps", "parts of the filter: crippled filters that stay consistent", at_most=0.0
+)
+FORCE = Check("bench.control hybrid force", "the pressing force: its rms error, N", at_most=0.12)
+STIFF = Check(
+    "bench.control stiff position",
+    "what contact adds to control by place: force error with vision over that with contact",
+    at_least=2.5,
+)
+PATH = Check(
+    "bench.control path on a disc",
+    "what contact adds to the path: its error with vision over that with contact",
+    at_least=4.0,
+)
+TOUCH = Check(
+    "bench.control touch", "first touch: peak over approach speed times sqrt(k m)", at_most=1.5
+)
 
 
 @dataclass(frozen=True)
@@ -132,7 +157,7 @@ def summarise(run: Run, done: Sequence[Done]) -> ControlBench:
         controls=controls,
         verdicts=(
             _consistent(poses),
-            *(_normal(poses, scenario, limit) for scenario, limit in NORMAL_LIMITS.items()),
+            *(_normal(poses, scenario) for scenario in NORMAL_ERROR),
             _traps(trapped),
             _force(controls),
             _stiff(controls),
@@ -248,7 +273,7 @@ def _spread(runs: Sequence[object], name: str, scale: float) -> Spread:
 def _consistent(rows: Sequence[PoseRow]) -> Verdict:
     """All rows together: the farthest mean NEES in a band that holds all with 95 %."""
     if not rows or min(row.runs for row in rows) < LEAST_RUNS:
-        return _too_few("consistency")
+        return _too_few(CONSISTENCY)
     share = (1.0 - ALARM) ** (1.0 / len(rows))
     outside = []
     for row in rows:
@@ -261,27 +286,27 @@ def _consistent(rows: Sequence[PoseRow]) -> Verdict:
         f"{len(outside)} are outside the band that holds all rows together with 95 %"
     )
     named = f": {'; '.join(outside)}." if outside else "."
-    return judge("bench.control", "consistency", len(outside), 0.0, said + named)
+    return CONSISTENCY.judge(len(outside), said + named)
 
 
-def _normal(rows: Sequence[PoseRow], scenario: str, limit: float) -> Verdict:
-    name = f"normal error, {scenario}"
+def _normal(rows: Sequence[PoseRow], scenario: str) -> Verdict:
+    check = NORMAL_ERROR[scenario]
     row = next(
         (r for r in rows if (r.plate, r.scenario, r.source) == ("plane", scenario, "contact")),
         None,
     )
     if row is None or row.runs < LEAST_RUNS:
-        return _too_few(name)
+        return _too_few(check)
     said = (
         f"With contact the median error along the normal is {row.normal_mm.median:.3g} mm, "
-        f"{row.normal_over_vision:.2g} of that of vision alone (limit {limit:g})."
+        f"{row.normal_over_vision:.2g} of that of vision alone (limit {check.threshold:g})."
     )
-    return judge("bench.control", name, row.normal_over_vision, limit, said)
+    return check.judge(row.normal_over_vision, said)
 
 
 def _traps(rows: Sequence[TrapRow]) -> Verdict:
     if not rows or min(row.runs for row in rows) < LEAST_RUNS:
-        return _too_few("traps")
+        return _too_few(TRAPS)
     missed, failed = [], []
     for row in rows:
         low, high = mean_band(row.runs, share=TRAP_SHARE)
@@ -295,25 +320,25 @@ def _traps(rows: Sequence[TrapRow]) -> Verdict:
     )
     named = f"; not without: {', '.join(missed)}" if missed else ""
     named += f"; the whole one fails beside: {', '.join(failed)}" if failed else ""
-    return judge("bench.control", "traps", len(missed) + len(failed), 0.0, f"{said}{named}.")
+    return TRAPS.judge(len(missed) + len(failed), f"{said}{named}.")
 
 
 def _force(rows: Sequence[ControlRow]) -> Verdict:
     chosen = [row for row in rows if row.law == "hybrid"]
     if not chosen or min(row.runs for row in chosen) < LEAST_RUNS:
-        return _too_few("hybrid force")
+        return _too_few(FORCE)
     worst = max(chosen, key=lambda row: row.force_N.median)
     said = (
         f"Hybrid control holds the force to {worst.force_N.median:.2g} N rms at worst "
-        f"({worst.plate}, {worst.scenario}, pose from {worst.pose}; limit {FORCE_LIMIT_N:g})."
+        f"({worst.plate}, {worst.scenario}, pose from {worst.pose}; limit {FORCE.threshold:g})."
     )
-    return judge("bench.control", "hybrid force", worst.force_N.median, FORCE_LIMIT_N, said)
+    return FORCE.judge(worst.force_N.median, said)
 
 
 def _stiff(rows: Sequence[ControlRow]) -> Verdict:
     said = "Stiff position control errs by {:.2g} N with vision, by {:.2g} N with contact as well"
     rows = _fixed(rows, "plane", "stiff position")
-    return _better("stiff position", rows, lambda row: row.force_N.median, STIFF_LIMIT, said)
+    return _better(STIFF, rows, lambda row: row.force_N.median, said)
 
 
 def _path(rows: Sequence[ControlRow]) -> Verdict:
@@ -322,25 +347,20 @@ def _path(rows: Sequence[ControlRow]) -> Verdict:
         "contact as well"
     )
     rows = _fixed(rows, "disc 20 mm", "hybrid")
-    return _better("path on a disc", rows, lambda row: row.path_mm.median, PATH_LIMIT, said)
+    return _better(PATH, rows, lambda row: row.path_mm.median, said)
 
 
 def _better(
-    check: str,
-    rows: Sequence[ControlRow],
-    error: Callable[[ControlRow], float],
-    limit: float,
-    said: str,
+    check: Check, rows: Sequence[ControlRow], error: Callable[[ControlRow], float], said: str
 ) -> Verdict:
     """Judge an error with vision over that with contact as well; ``said`` takes both."""
     found = {row.pose: row for row in rows if row.runs >= LEAST_RUNS}
     if not {"vision", "fused"} <= set(found):
         return _too_few(check)
     vision, contact = error(found["vision"]), error(found["fused"])
-    why = (
-        f"{said.format(vision, contact)}: {vision / contact:.2g} times better (at least {limit:g})."
-    )
-    return judge("bench.control", check, vision / contact, limit, why)
+    gain, least = vision / contact, check.threshold
+    why = f"{said.format(vision, contact)}: {gain:.2g} times better (at least {least:g})."
+    return check.judge(gain, why)
 
 
 def _fixed(rows: Sequence[ControlRow], plate: str, law: str) -> list[ControlRow]:
@@ -351,19 +371,19 @@ def _fixed(rows: Sequence[ControlRow], plate: str, law: str) -> list[ControlRow]
 def _touch(rows: Sequence[ControlRow]) -> Verdict:
     chosen = [row for row in rows if row.law == "hybrid" and row.scenario == "fixed"]
     if not chosen or min(row.runs for row in chosen) < LEAST_RUNS:
-        return _too_few("touch")
+        return _too_few(TOUCH)
     worst = max(chosen, key=lambda row: row.touch_ratio.median)
     ratio = worst.touch_ratio.median
     said = (
         f"The first touch peaks at {worst.touch_N.median:.2g} N, {ratio:.2g} of what the "
-        f"approach's speed times sqrt(k m) allows (limit {TOUCH_LIMIT:g})."
+        f"approach's speed times sqrt(k m) allows (limit {TOUCH.threshold:g})."
     )
-    return judge("bench.control", "touch", ratio, TOUCH_LIMIT, said)
+    return TOUCH.judge(ratio, said)
 
 
-def _too_few(name: str) -> Verdict:
+def _too_few(check: Check) -> Verdict:
     why = f"Fewer than {LEAST_RUNS} runs judge nothing: take a larger --size."
-    return not_evaluated("bench.control", name, why)
+    return check.not_evaluated(why)
 
 
 def _sentence(poses: Sequence[PoseRow], controls: Sequence[ControlRow]) -> str:

@@ -16,7 +16,7 @@ from scissorcal.bench.extremes.quantities import QUANTITIES, Quantity
 from scissorcal.bench.extremes.states import State
 from scissorcal.bench.extremes.study import PAIRS, Done, Tried, unit_of
 from scissorcal.bench.run import Run
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import Check, Verdict
 
 ExtremesFormat = Literal["scissorcal-extremes/1"]
 FORMAT: ExtremesFormat = "scissorcal-extremes/1"
@@ -27,6 +27,11 @@ OUTPUTS = ("torque", "force", "crack", "energy", "fracture", "arrest")
 OUTCOMES: tuple[Outcome, ...] = ("right", "refused", "flagged", "not compared", "wrong")
 MOST_WRONG = 50
 Number = float | None
+WRONG = Check(
+    "bench wrong",
+    "answers of model and kernel: how many are neither right nor refused",
+    at_most=0.0,
+)
 
 
 @dataclass(frozen=True)
@@ -175,7 +180,7 @@ class Extremes:
         """One verdict: nothing is wrong."""
         if not self.states and not self.cells:
             why = "No state was tried within the budget: allow more with --budget."
-            return (not_evaluated("bench", "wrong", why, 0.0),)
+            return (WRONG.not_evaluated(why),)
         cells = sum(cell.outcome == "wrong" for cell in self.cells)
         count = self.wrong_states + cells
         listed = "Each is listed in the page"
@@ -183,7 +188,7 @@ class Extremes:
             first = f"The first {len(self.wrong)} of {self.wrong_states} wrong answers of states"
             listed = f"{first} are listed in the page" + (", and each wrong cell" if cells else "")
         remedy = f"{self.sentence} {listed}: report them."
-        return (judge("bench", "wrong", count, 0.0, self.sentence, remedy),)
+        return (WRONG.judge(count, self.sentence, remedy),)
 
 
 def summarise(run: Run, done: Iterable[Done], cells: Sequence[Cell]) -> Extremes:

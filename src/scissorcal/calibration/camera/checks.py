@@ -8,14 +8,11 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.camera.bundle import Bundle, SeenBoard, first_pose
 from scissorcal.calibration.camera.result import CrossValidation, PixelMap, ViewError
 from scissorcal.errors import InputError, VerdictError
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import Check, Verdict
 from scissorcal.vision.geometry.camera import Camera
 
 FEWEST_VIEWS = 3
-FEWEST_CORNERS = 200
-MOST_FOCAL_SHARE = 0.005
 MOST_SD_PX = 0.5
-LEAST_P = 0.01
 
 OUTLYING = 2.5
 """A photograph whose rms is so many times the middle one's is named."""
@@ -24,7 +21,20 @@ _BORDER = 0.01
 """Share of the picture by which a refined corner may lie beyond its border."""
 _PARALLEL_DEG = 6.0
 _UNDETERMINED = 0.05
-_SCOPE = "fit.camera"
+CAMERA = "lengths measured in photographs"
+FOCAL_LENGTH = Check(
+    "fit.camera focal length", f"{CAMERA}: sd of the focal length, share of it", at_most=0.005
+)
+VIEWS = Check(
+    "fit.camera views", f"{CAMERA}: error of the worst photograph over the median", at_most=OUTLYING
+)
+CORNERS = Check("fit.camera corners", f"{CAMERA}: corners seen", at_least=200)
+PROJECTION = Check(
+    "fit.camera projection", f"{CAMERA}: sd of a projected point, px", at_most=MOST_SD_PX
+)
+TWO_HALVES = Check(
+    "fit.camera two halves", f"{CAMERA}: p-value of two halves' difference", at_least=0.01
+)
 
 
 def refuse_outside(views: Sequence[SeenBoard], width: int, height: int) -> None:
@@ -108,7 +118,7 @@ def _focal(camera: Camera) -> Verdict:
     sd = float(np.sqrt(camera.covariance[0, 0])) / camera.fx
     why = f"The focal length, {camera.fx:.1f} px, is known to {100 * sd:.2f} %."
     remedy = " Add photographs with the board tilted by 20 to 45 deg, every way."
-    return judge(_SCOPE, "focal length", sd, MOST_FOCAL_SHARE, why, why + remedy)
+    return FOCAL_LENGTH.judge(sd, why, why + remedy)
 
 
 def _outlying(views: Sequence[ViewError]) -> Verdict:
@@ -124,14 +134,14 @@ def _outlying(views: Sequence[ViewError]) -> Verdict:
         f" Look at the overlay of {', '.join(named)}: retake it, or remove it from its capture's "
         "folder."
     )
-    return judge(_SCOPE, "views", ratio, OUTLYING, why, why + remedy)
+    return VIEWS.judge(ratio, why, why + remedy)
 
 
 def _corners(views: Sequence[ViewError]) -> Verdict:
     count = sum(view.corners for view in views)
     why = f"{count} corners were seen in {len(views)} photographs"
-    remedy = f"{why}; {FEWEST_CORNERS} are wanted: add photographs."
-    return judge(_SCOPE, "corners", count, FEWEST_CORNERS, f"{why}.", remedy)
+    remedy = f"{why}; {CORNERS.threshold} are wanted: add photographs."
+    return CORNERS.judge(count, f"{why}.", remedy)
 
 
 def _projection(places: PixelMap) -> Verdict:
@@ -142,21 +152,20 @@ def _projection(places: PixelMap) -> Verdict:
         f"A projected point is known to {worst:.2f} px (sd) at worst where corners were seen, to "
         f"{outside:.2f} px at worst in the whole picture."
     )
-    return judge(_SCOPE, "projection", worst, MOST_SD_PX, why)
+    return PROJECTION.judge(worst, why)
 
 
 def _halves(cross: CrossValidation | None) -> Verdict:
-    check = "two halves"
     if cross is None:
         why = "Six photographs at least are needed to fit two halves apart."
-        return not_evaluated(_SCOPE, check, why)
+        return TWO_HALVES.not_evaluated(why)
     why = (
         f"Two halves of the photographs differ by {cross.rms_px:.2f} px (rms) where corners were "
         f"seen; {cross.claimed_px:.2f} px is expected from their covariances "
         f"(p = {cross.p_value:.3f})."
     )
     remedy = " The board may be bent, or the lens moved (focus, zoom) between photographs."
-    return judge(_SCOPE, check, cross.p_value, LEAST_P, why, why + remedy)
+    return TWO_HALVES.judge(cross.p_value, why, why + remedy)
 
 
 def _normals(poses: Array) -> Array:

@@ -6,8 +6,12 @@ import numpy as np
 
 from scissorcal.calibration.camera.result import CameraFit
 from scissorcal.identity import file_digest
-from scissorcal.verdicts import not_evaluated
+from scissorcal.verdicts import Check
 from scissorcal.vision.camera_files import CameraFile
+
+UNCERTAINTY = Check(
+    "fit.camera uncertainty", "lengths measured in photographs: whether their error is known"
+)
 
 
 def imported_camera(read: CameraFile, file: Path) -> CameraFit:
@@ -28,7 +32,7 @@ def imported_camera(read: CameraFile, file: Path) -> CameraFit:
         region_share=0.0,
         pixel_map=None,
         cross=None,
-        verdicts=(not_evaluated("fit.camera", "uncertainty", why),),
+        verdicts=(UNCERTAINTY.not_evaluated(why),),
         inputs_hash=file_digest(file),
         sources=(file.name,),
         notes=(f"Imported from {file.name} ({read.style}).", *read.notes),

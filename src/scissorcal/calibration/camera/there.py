@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.camera.checks import MOST_SD_PX
 from scissorcal.calibration.camera.result import PixelMap
-from scissorcal.verdicts import Verdict, judge
+from scissorcal.verdicts import Check, Verdict
 
 
 @dataclass(frozen=True)
@@ -28,12 +27,12 @@ class CameraThere:
         worst = places.worst_px(pixels)
         return cls(worst, worst / px_per_m)
 
-    def verdict(self, scope: str, why: str = "") -> Verdict:
-        """Judge by the limit that a camera's fit has where corners were seen."""
+    def verdict(self, check: Check, why: str = "") -> Verdict:
+        """Judge by a check whose limit a camera's fit has where corners were seen."""
         known = np.isfinite(self.worst_px)
         place = (
             f"The camera is known there to {self.worst_px:.2g} px at worst, "
-            f"{1e3 * self.worst_m:.2g} mm (limit {MOST_SD_PX:g} px)."
+            f"{1e3 * self.worst_m:.2g} mm (limit {check.threshold:g} px)."
             if known
             else "The camera is not known at all where a part of it lies in the picture."
         )
@@ -43,4 +42,4 @@ class CameraThere:
             "to the middle, or add photographs of the camera board there and run 'scissorcal fit "
             "camera'."
         )
-        return judge(scope, "camera", self.worst_px if known else 1e6, MOST_SD_PX, good, bad)
+        return check.judge(self.worst_px if known else 1e6, good, bad)

@@ -1,7 +1,6 @@
 """Verdicts and notes that only a cut's fit has."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,24 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.sensors import Sensors
 from scissorcal.recipe.priors import LogNormalPrior
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Verdict, failed, judge
+from scissorcal.verdicts import STATED, Check, Verdict, failed
 
 SCATTER_SDS = 3.0
 """Prior standard deviations of the noise's scale beyond which it is no noise that grew."""
-SUBHARMONIC = 0.3
+FOUNDATIONS = Check(
+    "fit.cut foundations", "what the fit builds on: failed verdicts there", at_most=0.0
+)
+SCATTER = Check(
+    "fit.cut scatter at rest",
+    "response: scatter of cracks at rest over what noise, encoder and friction explain",
+    at_most=STATED,
+)
+TEETH = Check(
+    "fit.cut teeth",
+    "kappa, which a harmonic puts off by tens of percent: power at a half or a third of the "
+    "line's frequency over its own",
+    at_most=0.3,
+)
 """Limit of the power at a half or a third of the line's frequency, relative to the line's."""
 
 
@@ -34,7 +46,7 @@ def cut_verdicts(
     """Judge what the fit builds on, its sensors, its sheets and its line."""
     return (
         _foundations(friction, edge_verdicts),
-        replace(sensors.verdict, scope="fit.cut"),
+        sensors.verdict.of("fit.cut"),
         stale_verdict(count_empty(scouted.segments.motions, scouted.materials, recordings)),
         *_line(scouted),
     )
@@ -55,7 +67,7 @@ def scatter_verdict(design: CutExperiment, point: Array, prior: LogNormalPrior) 
         f"{segments.steps:.3g} steps of a loading. Check rig.edge and the sheet's place, look at "
         "'near rest' of the friction fit, and use a finer encoder or faster strokes."
     )
-    return judge("fit.cut", "scatter at rest", scale, limit, f"{said}.", bad)
+    return SCATTER.judge(scale, f"{said}.", bad, threshold=limit)
 
 
 def cut_diagnostics(scouted: Scouted, design: CutExperiment) -> dict[str, Any]:
@@ -123,7 +135,7 @@ def _foundations(friction: FitResult, edge_verdicts: tuple[Verdict, ...]) -> Ver
     said = "; ".join(f"{verdict.scope}, {verdict.check}" for verdict in wrong)
     good = "The fits that this one uses passed their verdicts."
     bad = f"A fit that this one uses failed a verdict ({said}): correct that fit first."
-    return judge("fit.cut", "foundations", len(wrong), 0.0, good, bad)
+    return FOUNDATIONS.judge(len(wrong), good, bad)
 
 
 def _line(scouted: Scouted) -> tuple[Verdict, ...]:
@@ -134,11 +146,11 @@ def _line(scouted: Scouted) -> tuple[Verdict, ...]:
     worst = max(line.half, line.third)
     good = (
         f"{worst:.1%} of the line's power is at a half or a third of its frequency (limit "
-        f"{SUBHARMONIC:.0%}): the line is the teeth's fundamental."
+        f"{TEETH.threshold:.0%}): the line is the teeth's fundamental."
     )
     bad = (
         f"{worst:.0%} of the line's power is at a half or a third of its frequency (limit "
-        f"{SUBHARMONIC:.0%}): it may be a harmonic of the teeth, and kappa would be wrong. Capture "
-        "slower strokes."
+        f"{TEETH.threshold:.0%}): it may be a harmonic of the teeth, and kappa would be wrong. "
+        "Capture slower strokes."
     )
-    return (judge("fit.cut", "teeth", worst, SUBHARMONIC, good, bad),)
+    return (TEETH.judge(worst, good, bad),)

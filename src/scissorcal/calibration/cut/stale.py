@@ -8,13 +8,18 @@ import numpy as np
 from scissorcal.calibration.cut.path import Material, PathMotion
 from scissorcal.calibration.cut.path.runs import find_runs
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Verdict, judge
+from scissorcal.verdicts import Check, Verdict
 
 EMPTY = 0.1
 """A closing stroke cuts nothing where the material's mean torque is below this share of what
 strokes through material show (their 90 % quantile)."""
 THROUGH = 0.9
-MOST = 0.5
+STALE_SHEETS = Check(
+    "fit.cut stale sheets",
+    "response and fracture energy, which strokes through cut material pull down: largest "
+    "share of a sheet's closing strokes that cut nothing",
+    at_most=0.5,
+)
 """A sheet is stale where more than this share of its closing strokes cut nothing."""
 
 
@@ -69,9 +74,10 @@ def count_empty(
 
 def stale_verdict(rows: tuple[SheetStrokes, ...]) -> Verdict:
     """Judge whether every sheet was there, and fresh, for most of its strokes."""
-    stale = [row for row in rows if row.share > MOST]
+    most = STALE_SHEETS.threshold
+    stale = [row for row in rows if row.share > most]
     worst = max((row.share for row in rows), default=0.0)
-    good = f"At most {worst:.0%} of a sheet's closing strokes cut nothing (limit {MOST:.0%})."
+    good = f"At most {worst:.0%} of a sheet's closing strokes cut nothing (limit {most:.0%})."
     named = "; ".join(
         f"sheet {row.sheet} of {row.recording}: {row.empty} of {row.strokes}" for row in stale
     )
@@ -80,4 +86,4 @@ def stale_verdict(rows: tuple[SheetStrokes, ...]) -> Verdict:
         "the fit takes the gap for weak material. Insert fresh material with its near edge at "
         "advance 0, and capture again."
     )
-    return judge("fit.cut", "stale sheets", worst, MOST, good, bad)
+    return STALE_SHEETS.judge(worst, good, bad)

@@ -14,7 +14,7 @@ from scissorcal.model import Cutting, edge_height, settled_contact
 from scissorcal.model.cutting import torque_at, within_thickness
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import STATED, TORQUE, Check, Verdict
 
 BY_EYE_M = 0.5e-3
 """A blade's tip is rounded and worn: by eye or ruler its line is known to 0.5 mm
@@ -22,6 +22,12 @@ BY_EYE_M = 0.5e-3
 OPENINGS, CONTACTS = 9, 7
 SURE = 2.0
 """Standard deviations of a measured zero or a fitted share that a bound includes."""
+UNKNOWNS = {
+    name: Check(
+        f"fit.cut {name}", f"{TORQUE}error of its mean over the scene, share of it", at_most=STATED
+    )
+    for name in ("opening zero", "torque zero", "edge shape", "friction by load")
+}
 
 
 @dataclass(frozen=True)
@@ -149,8 +155,8 @@ def _verdict(one: Unknown, limit: float) -> Verdict:
         size = "No torque error"
     why = f"{size}: {one.spread} {one.removed_by}".rstrip()
     if one.share > limit:
-        return not_evaluated("fit.cut", one.name, why, limit, one.share)
-    return judge("fit.cut", one.name, one.share, limit, why)
+        return UNKNOWNS[one.name].not_evaluated(why, one.share, threshold=limit)
+    return UNKNOWNS[one.name].judge(one.share, why, threshold=limit)
 
 
 def _opening_zero(scene: SceneMean, recipe: Recipe) -> tuple[float, str, str]:

@@ -5,13 +5,12 @@ from itertools import combinations
 
 import numpy as np
 
+from scissorcal.calibration.camera.checks import MOST_SD_PX
 from scissorcal.calibration.edge.candidates import MOST_EVALUATIONS
 from scissorcal.calibration.edge.result import BladeFit, PhotographRow, RungRow, SeenPair
 from scissorcal.inference import Effort, SamplingStatus
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import INTERVALS, STATED, Check, Verdict
 
-SCOPE = "fit.blade"
-MOST_SPOILT = 0.15
 MOST_DISAGREEMENT = 3.5
 MOST_APART = 0.005
 """Shares of the blade's length by which photographs of one blade may differ."""
@@ -23,8 +22,6 @@ FALSE_ALARMS = 0.01
 STRETCHES = 8
 """Parts of the edge of which residuals are averaged: longer than the reach of its roughness."""
 
-LAMPS_APART_DEG = 45.0
-"""Least angle between lamps: a shadow that widens one side of a blade by w changes by 0.7 w."""
 
 UNTRUSTED = (
     SamplingStatus.HEAVY_WEIGHTS,
@@ -32,40 +29,62 @@ UNTRUSTED = (
     SamplingStatus.BUDGET_USED_UP,
     SamplingStatus.STUCK,
 )
+EDGE = "shape of the edge, which torque follows"
+CLEAR_EDGE = Check(
+    "fit.blade clear edge", f"{EDGE}: share of points that are neither edge nor nick", at_most=0.15
+)
+PHOTOGRAPHS_AGREE = Check(
+    "fit.blade photographs agree", f"{EDGE}: sds between them, or share of length", at_most=STATED
+)
+RESIDUAL = Check(
+    "fit.blade residual against claimed sd",
+    f"{INTERVALS} of the edge: mean residual of an eighth of the edge in sds that are claimed "
+    "there",
+    at_most=STATED,
+)
+CAMERA = Check(
+    "fit.blade camera", f"{EDGE}: camera's standard error at the blade, px", at_most=MOST_SD_PX
+)
+SIZES_OF_ERRORS = Check("fit.blade sizes of the errors", f"{INTERVALS} of the edge")
+BLADE_LENGTHS = Check(
+    "fit.blade blade lengths",
+    f"{EDGE}: difference of a pair's blades in length, in sds of equally long ones",
+    at_most=STATED,
+)
+LAMPS_APART = Check(
+    "fit.blade lamps apart",
+    f"{EDGE}: whether a shadow taken for metal would show: angle between lamps, deg",
+    at_least=45.0,
+)
+"""Least angle between lamps: a shadow that widens one side of a blade by w changes by 0.7 w."""
 
 
 def blade_verdicts(
     fit: BladeFit, best: RungRow, status: SamplingStatus, sentence: str, effort: Effort
 ) -> tuple[Verdict, ...]:
     """The verdicts on one blade's fit."""
-    scope = SCOPE if fit.name == "blade" else f"{SCOPE}.{fit.name}"
     spoilt = max(row.spoilt_share for row in fit.photographs)
     worst = max(fit.photographs, key=lambda row: row.spoilt_share).source
     checks = [
-        judge(
-            scope,
-            "clear edge",
+        CLEAR_EDGE.judge(
             spoilt,
-            MOST_SPOILT,
             f"In {worst} {100 * spoilt:.1f} % of the edge's points belong neither to a smooth edge "
-            f"nor to a nick; {100 * MOST_SPOILT:.0f} % are allowed.",
+            f"nor to a nick; {100 * CLEAR_EDGE.threshold:.0f} % are allowed.",
         ),
-        _agreement(fit, best, scope),
-        _residuals(fit, best, scope),
+        _agreement(fit, best),
+        _residuals(fit, best),
     ]
     if status in UNTRUSTED:
         checks.append(
-            Verdict(
-                scope,
-                "sizes of the errors",
+            SIZES_OF_ERRORS.verdict(
                 "fail",
-                None,
                 None,
                 f"{sentence} Sampling may take {MOST_EVALUATIONS[effort]} evaluations at "
                 f"{effort} effort, and {MOST_EVALUATIONS['thorough']} with --effort thorough.",
             )
         )
-    return tuple(checks)
+    scope = "fit.blade" if fit.name == "blade" else f"fit.blade.{fit.name}"
+    return tuple(verdict.of(scope) for verdict in checks)
 
 
 def pair_verdicts(pairs: Sequence[SeenPair]) -> tuple[Verdict, ...]:
@@ -76,37 +95,32 @@ def pair_verdicts(pairs: Sequence[SeenPair]) -> tuple[Verdict, ...]:
     return (_lengths(opened), _lamps(opened))
 
 
-def _agreement(fit: BladeFit, best: RungRow, scope: str) -> Verdict:
+def _agreement(fit: BladeFit, best: RungRow) -> Verdict:
     """Whether photographs show one blade: first by what the fit had to allow them, then by each."""
-    check = "photographs agree"
     if len(fit.photographs) < 2:
         why = "One photograph does not show how far others of the same blade would agree."
-        return not_evaluated(scope, check, why)
+        return PHOTOGRAPHS_AGREE.not_evaluated(why)
     apart = best.between_m / fit.belief.edge.length_m
     if apart > MOST_APART:
-        return judge(
-            scope,
-            check,
+        return PHOTOGRAPHS_AGREE.judge(
             apart,
-            MOST_APART,
             f"The photographs differ by {100 * apart:.1f} % of the blade's length; "
             f"{100 * MOST_APART:g} % are allowed. Photograph one blade only, and from straight "
             "above where there is no mat.",
+            threshold=MOST_APART,
         )
     spread = max(np.median([abs(row.away) for row in fit.photographs]) * 1.4826, 1e-12)
     scale = [max(row.away_sd, spread) for row in fit.photographs]
     value = max(abs(row.away) / s for row, s in zip(fit.photographs, scale, strict=True))
-    return judge(
-        scope,
-        check,
+    return PHOTOGRAPHS_AGREE.judge(
         float(value),
-        MOST_DISAGREEMENT,
         f"The photograph farthest from the joint edge is {value:.1f} standard deviations "
         f"away; {MOST_DISAGREEMENT:g} are allowed.",
+        threshold=MOST_DISAGREEMENT,
     )
 
 
-def _residuals(fit: BladeFit, best: RungRow, scope: str) -> Verdict:
+def _residuals(fit: BladeFit, best: RungRow) -> Verdict:
     """Whether the fitted edge follows the measured one as closely as its sd claims.
 
     The statistic is the largest mean residual of a stretch over its sd: that of the edge there, of
@@ -116,19 +130,15 @@ def _residuals(fit: BladeFit, best: RungRow, scope: str) -> Verdict:
     """
     from scipy.special import ndtri
 
-    check = "residual against claimed sd"
     rows = [row for row in fit.photographs if len(row.residual) > 2]
     if not rows:
-        return not_evaluated(scope, check, "The residuals of the points were not kept.")
+        return RESIDUAL.not_evaluated("The residuals of the points were not kept.")
     found = [(_worst_stretch(row, fit, best), row) for row in rows]
     (value, place, off, sd), row = max(found, key=lambda pair: pair[0][0])
     limit = float(-ndtri(0.5 * FALSE_ALARMS / (STRETCHES * len(rows))))
     size, unit = (1e3, "mm") if fit.metric else (100.0, "% of the length")
-    return judge(
-        scope,
-        check,
+    return RESIDUAL.judge(
         value,
-        limit,
         f"In {row.source} the measured edge is at most {value:.1f} standard deviations from the "
         f"fitted one over an eighth of its length: {size * off:.3f} {unit} at station "
         f"{size * place:.3g}, where {size * sd:.3f} are claimed. At most {100 * FALSE_ALARMS:g} % "
@@ -137,6 +147,7 @@ def _residuals(fit: BladeFit, best: RungRow, scope: str) -> Verdict:
         f"over an eighth of its length: {size * off:.3f} {unit} at station {size * place:.3g}, "
         f"where {size * sd:.3f} are claimed; {limit:.2f} are allowed. Photograph the blade again "
         "with the lamp elsewhere, and leave this photograph out if the others agree.",
+        threshold=limit,
     )
 
 
@@ -177,39 +188,32 @@ def _lengths(pairs: Sequence[SeenPair]) -> Verdict:
         if worst.tilt_deg > 0.0
         else ""
     )
-    return judge(
-        SCOPE,
-        "blade lengths",
+    return BLADE_LENGTHS.judge(
         value,
-        limit,
         f"{seen}; at most {100 * FALSE_ALARMS:g} % of sound pairs exceed {limit:.2f}.",
         f"{seen}; {limit:.2f} are allowed.{leaning} Or a tip was not found, or is broken: look at "
         "the picture.",
+        threshold=limit,
     )
 
 
 def _lamps(pairs: Sequence[SeenPair]) -> Verdict:
     """Whether photographs of one pair were lit from several sides of it."""
-    check = "lamps apart"
     if len(pairs) < 2:
         why = "One photograph has one lamp: a shadow taken for metal would not be noticed."
-        return not_evaluated(SCOPE, check, f"{why} Take another with the lamp elsewhere.")
+        return LAMPS_APART.not_evaluated(f"{why} Take another with the lamp elsewhere.")
     seen = [pair.lamp_deg for pair in pairs if pair.lamp_deg is not None]
     if len(seen) < len(pairs):
-        return not_evaluated(
-            SCOPE,
-            check,
+        return LAMPS_APART.not_evaluated(
             f"{len(pairs) - len(seen)} of {len(pairs)} photographs show no cast shadow that tells "
-            "where the lamp is.",
+            "where the lamp is."
         )
     apart = max(abs((a - b + 180.0) % 360.0 - 180.0) for a, b in combinations(seen, 2))
-    return judge(
-        SCOPE,
-        check,
+    return LAMPS_APART.judge(
         apart,
-        LAMPS_APART_DEG,
         f"The scissors were lit from directions up to {apart:.0f} deg apart.",
         f"All photographs have the lamp on one side of the scissors, within {apart:.0f} deg, so "
         "that their agreement is no evidence: a shadow taken for metal is the same in all. Turn "
-        f"the scissors or move the lamp by {LAMPS_APART_DEG:.0f} deg or more, and take another.",
+        f"the scissors or move the lamp by {LAMPS_APART.threshold:.0f} deg or more, and take "
+        "another.",
     )

@@ -137,8 +137,7 @@ def _with_noise(recording: Recording, share: float, number: int) -> Recording:
 
 
 def _scoped(verdict: Verdict) -> Verdict:
-    scope = verdict.scope.replace("fit.friction", "fit.friction-advance")
-    return replace(verdict, scope=scope, why=_renamed(verdict.why))
+    return replace(verdict.of("fit.friction-advance"), why=_renamed(verdict.why))
 
 
 def _adopted(proposal: Proposal) -> Proposal:

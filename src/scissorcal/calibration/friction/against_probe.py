@@ -11,12 +11,16 @@ from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.result import FitResult, FittedParameter
 from scissorcal.recording.probe import Estimate, newest_probe
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Verdict, judge
+from scissorcal.verdicts import Check, Verdict
 
-APART = 3.29
-"""Standard deviations by which two measurements of one inertia differ once in 1,000."""
 KG_MM2 = 1e6
 NAME = "inertia"
+INERTIA = Check(
+    "fit.friction inertia",
+    "that sweeps and the probe's pushes find one inertia: how far apart, in their sds",
+    at_most=3.29,
+)
+"""Standard deviations by which two measurements of one inertia differ once in 1,000."""
 
 
 def with_pushed_inertia(
@@ -75,7 +79,7 @@ def inertia_verdict(
     pushed = _pushed(law, recordings)
     if pushed is None or hidden_from_sweeps(law, recordings):
         return None
-    every = law.layout.natural(draws)[NAME]
+    every = law.layout.natural(draws)["inertia"]
     swept = Estimate(float(every.mean()), float(every.std(ddof=1)))
     off = math.hypot(swept.sd / swept.mean, pushed.sd / pushed.mean)
     apart = abs(math.log(swept.mean / pushed.mean)) / off
@@ -88,7 +92,7 @@ def inertia_verdict(
         "something on the blades has changed since the probe, or the swings are not theirs alone"
         f"{coarse if law.windows.lengthening > 1.0 else ''}. Probe again, and capture anew"
     )
-    return judge("fit.friction", NAME, apart, APART, f"{said}.", f"{said}; {cure}.")
+    return INERTIA.judge(apart, f"{said}.", f"{said}; {cure}.")
 
 
 def hidden_from_sweeps(

@@ -6,29 +6,41 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.aliases import Array
+from scissorcal.calibration.checks import SEARCH
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.parameters import Layout
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, side_of
 from scissorcal.model.transforms import LOG
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import INTERVALS, Check, Verdict
 
-SCOPE = "fit.friction"
-CERTAIN = 3.0
-"""Standard deviations by which a level must be negative to be called so."""
-MOVED_LIMIT = 4.0
-"""Posterior standard deviations by which a parameter may change with the cutoff."""
-UNMOVED = 1e-9
 MOST_STEPS = 30
 LOGS = (-60.0, 60.0)
-NEAR_REST = 0.05
-"""Half width of an interval, share of friction: with as much from the rest, a recipe's tolerance of
-7 % of the torque is kept."""
 SLOWER = 2.0
 """From twice the rate that the encoder can tell, a sweep at half the speed is worth while."""
 NOTHING = 0.02
 """Share of the drive's standard deviation below which friction counts as absent: a level, or what
 its sign changes."""
+PHYSICAL = Check(
+    "fit.friction physical", "signs of levels: sds by which one is below zero", at_most=3.0
+)
+"""Standard deviations by which a level must be negative to be called so."""
+START = Check(
+    "fit.friction start", f"{SEARCH}: least way from its start, in prior sds", at_least=1e-9
+)
+KNOWN_NEAR_REST = Check(
+    "fit.friction near rest",
+    "friction at half of the slowest swept rate: half width of its interval, share of it",
+    at_most=0.05,
+)
+"""Half width of an interval, share of friction: with as much from the rest, a recipe's tolerance of
+7 % of the torque is kept."""
+BANDWIDTH = Check(
+    "fit.friction bandwidth",
+    f"{INTERVALS}: sds that a parameter moves with the cutoff",
+    at_most=4.0,
+)
+"""Posterior standard deviations by which a parameter may change with the cutoff."""
 
 
 def physical_verdict(experiment: FrictionExperiment, point: Array, share: float) -> Verdict:
@@ -38,14 +50,14 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
     without a sign of trouble. One step of least squares from the optimum ``point`` (p,), without
     that constraint and without priors, suspects it. Far from the optimum such a step is none of
     the law any more, so two searches that settle decide, with free signs and without: a level is
-    negative where the first explains the data better by CERTAIN standard deviations, and asks for a
+    negative where the first explains the data better by 3 standard deviations, and asks for a
     torque that differs by NOTHING of the drive or more. Laws without viscous friction get it for
     both. ``share`` is the share of bins that are independent.
     """
     values = {name: float(value) for name, value in experiment.layout.natural(point).items()}
     rows = _rated(experiment, values)
     found = [level for row in rows for level in _freed(experiment, row, share)]
-    suspected = [level for level in found if level.sds_below > CERTAIN]
+    suspected = [level for level in found if level.sds_below > PHYSICAL.threshold]
     settled, felt = _settled(experiment, rows, share) if suspected else ([], 0.0)
     negative = sorted(settled) if felt >= NOTHING else []
     good = "No friction level is negative in an unconstrained fit, and the inertia is not."
@@ -59,7 +71,7 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
     remedies = "; ".join(dict.fromkeys(one.remedy for one in worst))
     bad = f"An unconstrained fit gives {listed}, and no joint has a negative level: {remedies}."
     value = max((one.sds_below for one in worst), default=0.0)
-    return judge(SCOPE, "physical", value, CERTAIN, good, bad)
+    return PHYSICAL.judge(value, good, bad)
 
 
 def start_verdict(experiment: FrictionExperiment, point: Array) -> Verdict:
@@ -72,14 +84,14 @@ def start_verdict(experiment: FrictionExperiment, point: Array) -> Verdict:
     judged = [not parameter.believed for parameter in layout.parameters]
     names = [name for name, own in zip(layout.names, judged, strict=True) if own]
     least = apart.min(axis=0)[judged]
-    stuck = [name for name, far in zip(names, least, strict=True) if far < UNMOVED]
+    stuck = [name for name, far in zip(names, least, strict=True) if far < START.threshold]
     value = float(least.min())
     bad = (
         f"The search did not move {', '.join(stuck)}, so the data hold no information on it: "
         "record motion that depends on it, or choose a law without it."
     )
     good = "Every parameter moved from where the search began."
-    return judge(SCOPE, "start", value, UNMOVED, good, bad)
+    return START.judge(value, good, bad)
 
 
 def near_rest_verdict(experiment: FrictionExperiment, draws: Array) -> Verdict:
@@ -100,8 +112,8 @@ def near_rest_verdict(experiment: FrictionExperiment, draws: Array) -> Verdict:
         f"Friction at {0.5 * slowest:.2g} {unit}, half of the slowest rate that was swept, is "
         f"known to {share:.1%} (90 %)"
     )
-    if share <= NEAR_REST:
-        return judge(SCOPE, "near rest", share, NEAR_REST, f"{said}.")
+    if share <= KNOWN_NEAR_REST.threshold:
+        return KNOWN_NEAR_REST.judge(share, f"{said}.")
     floor = experiment.bins.rate_floor
     cure = (
         f"sweep more slowly: the encoder tells the sense of motion from {floor:.2g} {unit} on"
@@ -109,7 +121,7 @@ def near_rest_verdict(experiment: FrictionExperiment, draws: Array) -> Verdict:
         else f"a finer encoder or a longer tick would show slower sweeps than {floor:.2g} {unit}"
     )
     why = f"{said}. Slower friction is extrapolated, and bands are as wide; to measure it, {cure}."
-    return not_evaluated(SCOPE, "near rest", why, NEAR_REST, share)
+    return KNOWN_NEAR_REST.not_evaluated(why, share)
 
 
 def bandwidth_verdict(
@@ -135,7 +147,7 @@ def bandwidth_verdict(
         "not resolve, or the law lacks a term there. Record steadier sweeps or use a finer "
         "encoder, and compare other cutoffs."
     )
-    return judge(SCOPE, "bandwidth", value, MOVED_LIMIT, why, why + remedy)
+    return BANDWIDTH.judge(value, why, why + remedy)
 
 
 @dataclass(frozen=True, order=True)
@@ -218,7 +230,7 @@ def _settled(
     # Twice the gain of a likelihood whose noise is known from what the better fit leaves.
     count = share * len(experiment.observed)
     away = float(np.sqrt(max(count * np.log(held[0] / max(free[0], 1e-300)), 0.0)))
-    if away <= CERTAIN:
+    if away <= PHYSICAL.threshold:
         return [], 0.0
     torques = [experiment.mean_at(_arrays(values)) for _, values in (held, free)]
     felt = float(np.std(torques[1] - torques[0])) / float(np.std(experiment.observed))

@@ -26,6 +26,7 @@ from scissorcal.calibration.friction.against_probe import (
     with_pushed_inertia,
 )
 from scissorcal.calibration.friction.checks import (
+    BANDWIDTH,
     bandwidth_verdict,
     near_rest_verdict,
     physical_verdict,
@@ -64,7 +65,7 @@ from scissorcal.model.friction_terms import NUISANCE, needs_load
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.probe import newest_probe
 from scissorcal.recording.recording import Joint, Recording
-from scissorcal.verdicts import Verdict, not_evaluated
+from scissorcal.verdicts import Verdict
 
 PRESLIDING = "presliding_fine_rad"
 """Fact of a probe: the shortest way over which friction builds up after a turn, which a fit of cuts
@@ -146,7 +147,7 @@ def fit_friction(
             sensors.verdict,
             *((broken.verdict("fit.friction"),) if broken.interrupted else ()),
             *((steady.verdict(),) if steady.rows else ()),
-            *zero_verdicts("fit.friction", zero, recordings, drive),
+            *(v.of("fit.friction") for v in zero_verdicts(zero, recordings, drive)),
             *((between.verdict(),) if between else ()),
         )
     fit = assemble(
@@ -286,7 +287,7 @@ def _bandwidth(
     """
     if effort == "draft":
         why = "Draft effort does not compare cutoffs; use --effort standard."
-        return not_evaluated("fit.friction", "bandwidth", why)
+        return BANDWIDTH.not_evaluated(why)
     other_Hz = next_cutoff(law.windows)
     if other_Hz is None:
         longer_Hz = HALF_AT / (2.0 * law.windows.tick_s)
@@ -294,12 +295,12 @@ def _bandwidth(
             "No window is shorter than those of this cutoff at this sampling rate: set "
             f"fit.friction.cutoff_Hz to {longer_Hz:.3g} or less, or log at a higher rate."
         )
-        return Verdict("fit.friction", "bandwidth", "fail", None, None, why)
+        return BANDWIDTH.verdict("fail", None, why)
     every = weighed(other_Hz)
     windows = every.where(every.bins.moving)
     if len(windows.first) < FEWEST_BINS:
         why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
-        return not_evaluated("fit.friction", "bandwidth", why)
+        return BANDWIDTH.not_evaluated(why)
     there = replace(
         law,
         windows=windows,

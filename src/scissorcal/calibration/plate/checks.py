@@ -4,21 +4,38 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from scissorcal.calibration.camera.checks import MOST_SD_PX
 from scissorcal.calibration.camera.there import CameraThere
 from scissorcal.calibration.plate.result import Halves, PlateView
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import STATED, Check, Verdict
 from scissorcal.vision.geometry.board_pose import ODDS, BoardPose
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.targets.detect import SMALL_PX
 
-SCOPE = "fit.plate"
 FALSE_ALARM = 0.001
 """False-alarm rate of the two splits into halves together."""
 LEFT_OVER_PX = 0.3
 """Limit of the residuals' standard deviation; corners are found to 0.02 to 0.2 px."""
-MOVED = 3.0
+POSE = "where the plate is drawn; no torque depends on it"
+AMBIGUITY = Check("fit.plate ambiguity", f"{POSE}: odds of the better of two poses", at_least=ODDS)
+AT_REST = Check(
+    "fit.plate at rest", f"{POSE}: error in the common pose over the photograph's own", at_most=3.0
+)
 """Limit of a photograph's rms residual under the common pose over that under its own pose."""
+RESIDUALS = Check("fit.plate residuals", f"{POSE}: sd of corners, px", at_most=LEFT_OVER_PX)
+HALVES = Check(
+    "fit.plate halves", f"{POSE}: squared difference of two halves, in covariances", at_most=STATED
+)
+SIZE = Check(
+    "fit.plate size", f"{POSE}: width of the smallest square or marker, px", at_least=SMALL_PX
+)
+CAMERA = Check(
+    "fit.plate camera", f"{POSE}: camera's standard error at the target, px", at_most=MOST_SD_PX
+)
+RIG_FRAME = Check(
+    "fit.plate rig frame", f"{POSE}: open directions, or sd of corners, px", at_most=LEFT_OVER_PX
+)
 
 
 def plate_verdicts(
@@ -52,13 +69,13 @@ def _one_pose(whole: BoardPose) -> Verdict:
         f"allows (limit {ODDS:g}). Photograph the plate at a larger tilt or from closer, or use "
         "the plate board, which is larger than a marker."
     )
-    return judge(SCOPE, "ambiguity", odds, ODDS, good, bad)
+    return AMBIGUITY.judge(odds, good, bad)
 
 
 def _at_rest(views: Sequence[PlateView]) -> Verdict:
     if len(views) < 2:
         why = "One photograph cannot show whether plate and camera were at rest: take several."
-        return not_evaluated(SCOPE, "at rest", why, MOVED)
+        return AT_REST.not_evaluated(why)
     ratios = [view.rms_px / max(view.rms_alone_px, 1e-9) for view in views]
     worst = int(np.argmax(ratios))
     good = f"All {len(views)} photographs show the plate at one pose."
@@ -67,7 +84,7 @@ def _at_rest(views: Sequence[PlateView]) -> Verdict:
         f"{views[worst].away_deg:.2g} deg from the common pose: camera or plate moved between "
         "photographs. Leave it out, or repeat all without touching either."
     )
-    return judge(SCOPE, "at rest", ratios[worst], MOVED, good, bad)
+    return AT_REST.judge(ratios[worst], good, bad)
 
 
 def _residuals(whole: BoardPose) -> Verdict:
@@ -76,7 +93,7 @@ def _residuals(whole: BoardPose) -> Verdict:
         f"{LEFT_OVER_PX:g})."
     )
     remedy = " The target may be bent, or the camera's fit may not apply (another focus or zoom?)."
-    return judge(SCOPE, "residuals", whole.sd_px, LEFT_OVER_PX, why, why + remedy)
+    return RESIDUALS.judge(whole.sd_px, why, why + remedy)
 
 
 def _halves(halves: Halves | None) -> Verdict:
@@ -85,20 +102,20 @@ def _halves(halves: Halves | None) -> Verdict:
     limit = float(chi2.isf(0.5 * FALSE_ALARM, 6))
     if halves is None:
         why = "Too few corners to compare two halves of them: show more of the target."
-        return not_evaluated(SCOPE, "halves", why, limit)
+        return HALVES.not_evaluated(why, threshold=limit)
     why = (
         f"Poses from two halves of the corners differ by {halves.rotation_deg:.2g} deg and "
         f"{halves.translation_mm:.2g} mm (chi-square {halves.square:.3g}, limit {limit:.3g})"
     )
     remedy = ": the target may be bent or printed out of scale, or the camera's fit may not apply."
-    return judge(SCOPE, "halves", halves.square, limit, why + ".", why + remedy)
+    return HALVES.judge(halves.square, why + ".", why + remedy, threshold=limit)
 
 
 def _size(views: Sequence[PlateView]) -> Verdict:
     least = min(view.side_px for view in views)
     why = f"The smallest squares or markers are {least:.0f} px wide (limit {SMALL_PX:g})."
     remedy = " Corners are found less accurately and less often: move closer, or print larger."
-    return judge(SCOPE, "size", least, SMALL_PX, why, why + remedy)
+    return SIZE.judge(least, why, why + remedy)
 
 
 def _camera(camera: Camera, there: CameraThere | None) -> Verdict:
@@ -107,11 +124,11 @@ def _camera(camera: Camera, there: CameraThere | None) -> Verdict:
             "The camera has no covariance, so the pose treats it as exact. Run 'scissorcal fit "
             "camera' on photographs of the camera board."
         )
-        return not_evaluated(SCOPE, "camera", why)
+        return CAMERA.not_evaluated(why)
     why = "The pose's covariance includes the camera's."
     if there is None:
-        return Verdict(SCOPE, "camera", "pass", None, None, why)
-    return there.verdict(SCOPE, why)
+        return CAMERA.verdict("pass", None, why)
+    return there.verdict(CAMERA, why)
 
 
 def _rig(rig: RigPose | None) -> Verdict:
@@ -120,13 +137,13 @@ def _rig(rig: RigPose | None) -> Verdict:
             "The rig's frame is unknown, so the pose is in the camera's frame. Photograph the rig "
             "markers at several advances and openings."
         )
-        return not_evaluated(SCOPE, "rig frame", why)
+        return RIG_FRAME.not_evaluated(why)
     if rig.untold:
         why = (
             f"The rig's motion does not determine: {', '.join(rig.untold)}. Photograph the rig "
             "markers at several advances and several openings."
         )
-        return judge(SCOPE, "rig frame", len(rig.untold), 0.0, why)
+        return RIG_FRAME.judge(len(rig.untold), why, threshold=0.0)
     off = rig.rms_px / np.sqrt(2.0)
     bad = (
         f"The card's corner residuals have a standard deviation of {off:.2g} px (limit "
@@ -134,4 +151,4 @@ def _rig(rig: RigPose | None) -> Verdict:
         "camera did not move, and that the card is fixed to the moving blade."
     )
     good = f"The rig's markers determine its frame (residuals {rig.rms_px:.2f} px rms)."
-    return judge(SCOPE, "rig frame", float(off), LEFT_OVER_PX, good, bad)
+    return RIG_FRAME.judge(float(off), good, bad)

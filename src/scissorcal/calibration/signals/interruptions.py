@@ -7,9 +7,13 @@ from numpy.typing import NDArray
 
 from scissorcal.kernel import StateFlag
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import Check, Verdict
 
-SOME_WHOLE = 0.999
+INTERRUPTED = Check(
+    "fit interrupted strokes",
+    "that strokes are as planned: share of those of one speed in which motors were let go",
+    at_most=0.999,
+)
 """Share of the strokes of one speed that may be interrupted: one whole stroke shows that speed, and
 no plan has a thousand of one."""
 
@@ -46,14 +50,13 @@ class Interruptions:
     @property
     def decide(self) -> bool:
         """Whether some speed was never recorded as planned."""
-        return self.worst > SOME_WHOLE
+        return self.worst > INTERRUPTED.threshold
 
     def verdict(self, scope: str) -> Verdict:
         """Fails where every stroke of some speed was interrupted; some are *not evaluated*."""
-        check = "interrupted strokes"
         if self.decide:
-            return judge(scope, check, self.worst, SOME_WHOLE, self.sentence)
-        return not_evaluated(scope, check, self.sentence, value=self.worst)
+            return INTERRUPTED.judge(self.worst, self.sentence).of(scope)
+        return INTERRUPTED.not_evaluated(self.sentence, self.worst).of(scope)
 
 
 def interruptions(recordings: tuple[Recording, ...]) -> Interruptions:

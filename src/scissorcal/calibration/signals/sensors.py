@@ -12,12 +12,10 @@ from scissorcal.calibration.signals.segments import still_clock, stretches
 from scissorcal.recording.marks import marks_in
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of
-from scissorcal.verdicts import Verdict, judge
+from scissorcal.verdicts import Check, Verdict
 
 Scope = Literal["fit.friction", "fit.cut"]
 
-INVALID_LIMIT = 0.05
-"""Share of invalid samples above which a fit fails."""
 LONG_RUN_S = 0.005
 FEWEST_IN_RUN = 4
 """Least duration and least samples of a run of equal values."""
@@ -51,6 +49,10 @@ WITHIN = 0.5
 """Least share of moving samples within the range, without which its ends are not judged."""
 HANDLE_FORCE_SATURATED, ENCODER_FAULT = 32, 64
 """Flags of a device's state frame (docs/protocol.md)."""
+SENSORS = Check(
+    "fit sensors", "what was measured: share of samples that a sensor spoilt", at_most=0.05
+)
+"""Share of invalid samples above which a fit fails."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ def inspect_sensors(recordings: tuple[Recording, ...], scope: Scope = "fit.frict
     repeat by chance. A channel without noise (quantised, or slow) repeats values: there a stretch
     at an end is saturation if it is flat, unlike a turn, and if no level within the range is held
     as long, unlike a plateau. Invalid samples are left out of the likelihood; where their share
-    exceeds ``INVALID_LIMIT`` the verdict, on the fit that ``scope`` names, fails.
+    exceeds that of ``SENSORS`` the verdict, on the fit that ``scope`` names, fails.
     """
     usable, notes = [], []
     worst, named = 0.0, ""
@@ -360,7 +362,8 @@ def _sentences(channel: Channel, recording: Recording) -> list[str]:
 def _verdict(scope: Scope, worst: float, named: str) -> Verdict:
     if worst == 0.0:
         why = "No sensor saturated, and none has a dead band around zero."
-        return judge(scope, "sensors", 0.0, INVALID_LIMIT, why)
-    why = f"{named} in {worst:.1%} of the samples (limit {INVALID_LIMIT:.0%}); they are left out."
+        return SENSORS.judge(0.0, why).of(scope)
+    limit = SENSORS.threshold
+    why = f"{named} in {worst:.1%} of the samples (limit {limit:.0%}); they are left out."
     remedy = " Record again with a sensor of larger range, or slower and with gentler turns."
-    return judge(scope, "sensors", worst, INVALID_LIMIT, why, why + remedy)
+    return SENSORS.judge(worst, why, why + remedy).of(scope)

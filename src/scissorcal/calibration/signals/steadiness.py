@@ -10,7 +10,7 @@ from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.recipe.pace import ADVANCE_ACCELERATION, TURN_ACCELERATION, ramp_time
 from scissorcal.recording.recording import Joint, Recording
 from scissorcal.recording.resolution import noise_of, resolution_of
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import Check, Verdict
 
 ENDS = 0.1
 """Share of a stroke's time at either end that is not judged, or the time of its ramp: there blades
@@ -25,6 +25,11 @@ LEAST_S = 0.005
 STUCK = 0.05
 """Share of rest from which a stroke counts as stuck. Below it the joint slides, on average, at the
 stroke's speed to within so much, and friction is measured there."""
+STEADY_SWEEPS = Check(
+    "fit.friction steady sweeps",
+    "friction at the slowest rates: share of time at rest in the sweeps that rested most",
+    at_most=STUCK,
+)
 
 
 @dataclass(frozen=True)
@@ -71,12 +76,11 @@ class Steadiness:
 
     def verdict(self) -> Verdict:
         """Whether friction was measured at every speed that was swept."""
-        scope, check = "fit.friction", "steady sweeps"
         worst = max((row.at_rest for row in self.rows), default=0.0)
         if not self.stuck:
             from_speed = min((row.speed for row in self.rows), default=float("nan"))
             good = f"The joint slid in every sweep, from {from_speed:.2g} {self._unit} on."
-            return judge(scope, check, worst, STUCK, good)
+            return STEADY_SWEEPS.judge(worst, good)
         told = "; ".join(
             f"{row.at_rest:.0%} at rest: friction at {row.speed:.2g} {self._unit} is not measured"
             for row in self.rows
@@ -88,9 +92,9 @@ class Steadiness:
         )
         if np.isinf(self.steady_from):
             why = f"{told}; no faster sweep was steady. {remedy}, and sweep faster."
-            return judge(scope, check, worst, STUCK, why)
+            return STEADY_SWEEPS.judge(worst, why)
         why = f"{told}; steady from {self.steady_from:.2g}. {remedy}."
-        return not_evaluated(scope, check, why)
+        return STEADY_SWEEPS.not_evaluated(why)
 
     @property
     def _unit(self) -> str:

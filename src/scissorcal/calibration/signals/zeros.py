@@ -8,12 +8,10 @@ import numpy as np
 from scissorcal.calibration.signals.idle import IDLE_S, IdlePeriod, idle_periods, is_driven
 from scissorcal.recording.probe import probe_of
 from scissorcal.recording.recording import Recording
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import TORQUE, Check, Verdict
 
 SURE = 2.0
 """Standard deviations of what is left of a zero that a verdict counts."""
-LARGEST = 1.0
-"""A zero beyond all that drives the joint (rms) is no zero: a sensor is loaded or damaged."""
 FELT = 0.07
 """Share of the drive that people can just notice: about 7 % of a force (docs/how-to-choose.md)."""
 BRIDGE = 1.0 / np.sqrt(12.0)
@@ -21,6 +19,13 @@ BRIDGE = 1.0 / np.sqrt(12.0)
 the straight line between them (variance of a Brownian bridge's mean)."""
 FINEST = 1e-3
 """Least sd of a zero, as a share of that of one that nobody measured."""
+SENSOR_ZEROS = Check(
+    "fit sensor zeros", f"{TORQUE}sensors' zero over the drive (rms); it is subtracted", at_most=1.0
+)
+"""A zero beyond all that drives the joint (rms) is no zero: a sensor is loaded or damaged."""
+ZERO_DRIFT = Check(
+    "fit zero drift", f"{TORQUE}two sds of what is left of zeros over the drive (rms)", at_most=FELT
+)
 
 
 @dataclass(frozen=True)
@@ -96,7 +101,7 @@ def without_zeros(
 
 
 def zero_verdicts(
-    scope: str, zero: DriveZero | None, recordings: tuple[Recording, ...], drive_rms: float
+    zero: DriveZero | None, recordings: tuple[Recording, ...], drive_rms: float
 ) -> tuple[Verdict, ...]:
     """Judge size and drift of the zeros against what drives the joint (rms)."""
     if zero is None:
@@ -104,7 +109,7 @@ def zero_verdicts(
             "No recording says when motors were off, so nothing shows the sensors' zeros; they are "
             "taken as 0."
         )
-        return (not_evaluated(scope, "sensor zeros", why, LARGEST),)
+        return (SENSOR_ZEROS.not_evaluated(why),)
     unit = recordings[0].joint.effort_unit
     rest = SURE * zero.sd / drive_rms if drive_rms > 0.0 else float("inf")
     if not zero.measured:
@@ -113,7 +118,7 @@ def zero_verdicts(
             f"with an sd of {zero.sd:.2g} {unit}, which is in the intervals of friction's levels. "
             "Record one second at idle, motors and hands off, at the beginning and at the end."
         )
-        return (not_evaluated(scope, "sensor zeros", why, FELT, rest),)
+        return (SENSOR_ZEROS.not_evaluated(why, rest, FELT),)
     share = abs(zero.drive) / drive_rms if drive_rms > 0.0 else float("inf")
     radius = recordings[0].handle_radius_m
     parts = {"the torque sensor": zero.torque, "the force sensor": -radius * zero.force_N}
@@ -133,8 +138,8 @@ def zero_verdicts(
     moved += f"; what is left of them has an sd of {zero.sd:.2g} {unit}, which is in the intervals."
     warm = f" Let {worst} warm up for half an hour, tare it and record again."
     return (
-        judge(scope, "sensor zeros", share, LARGEST, said, said + large),
-        judge(scope, "zero drift", rest, FELT, moved, moved + warm),
+        SENSOR_ZEROS.judge(share, said, said + large),
+        ZERO_DRIFT.judge(rest, moved, moved + warm),
     )
 
 

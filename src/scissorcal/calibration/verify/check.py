@@ -9,7 +9,7 @@ from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.generating import generating_prior
 from scissorcal.calibration.verify.halves import StrokeFacts, split_strokes
-from scissorcal.calibration.verify.result import FORMAT, Check, PriorKind, VerifyResult
+from scissorcal.calibration.verify.result import FORMAT, CheckKind, PriorKind, VerifyResult
 from scissorcal.calibration.verify.simulator import Simulator
 from scissorcal.calibration.verify.study import Record, Study, Task, unconstrained_draws
 from scissorcal.calibration.verify.summary import (
@@ -60,7 +60,7 @@ def make_study(
     )
 
 
-def tasks_of(study: Study, checks: Sequence[Check], fits: int) -> tuple[Task, ...]:
+def tasks_of(study: Study, checks: Sequence[CheckKind], fits: int) -> tuple[Task, ...]:
     """List the fits that ``checks`` need, the few decisive ones first."""
     tasks: list[Task] = []
     if "prior" in checks:
@@ -73,7 +73,7 @@ def tasks_of(study: Study, checks: Sequence[Check], fits: int) -> tuple[Task, ..
 
 
 def assess(
-    study: Study, fit: FitResult, checks: Sequence[Check], records: Sequence[Record]
+    study: Study, fit: FitResult, checks: Sequence[CheckKind], records: Sequence[Record]
 ) -> VerifyResult:
     """Judge a fit by the records of all tasks, in any order."""
     by_kind = {

@@ -8,7 +8,7 @@ from scissorcal.verdicts import Verdict
 
 FORMAT: Literal["scissorcal-verify/1"] = "scissorcal-verify/1"
 
-Check = Literal["sbc", "halves", "prior"]
+CheckKind = Literal["sbc", "halves", "prior"]
 Diagnosis = Literal["fine", "prior-data conflict", "weak likelihood"]
 PriorKind = Literal["local", "recipe"]
 

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from scissorcal.calibration.verify.halves import BY_RECORDING
 from scissorcal.calibration.verify.result import (
     Calibration,
-    Check,
+    CheckKind,
     Halves,
     RankedQuantity,
     Sensitivity,
 )
 from scissorcal.calibration.verify.study import EFFORT
-from scissorcal.verdicts import Status, Verdict, judge, not_evaluated
+from scissorcal.verdicts import INTERVALS, STATED, TORQUE, Check, Status, Verdict
 
 FALSE_ALARM = 0.01
 """Probability that any of the statistical verdicts fails for a correct fit."""
@@ -26,42 +26,57 @@ LEAST, MOST = 0.84, 0.96
 errors). A shift of 0.6 standard deviations alone reaches the lower one, widths off by a factor of
 1.17 or 0.8 either. Ranks of enough fits show smaller errors, too: encoder steps shift a cut's
 exponent by 0.3 standard deviations, and its intervals hold 88 %."""
-UNRELIABLE_LIMIT = 0.05
+CALIBRATION = Check(
+    "verify calibration",
+    f"{INTERVALS}: p-value of uniform ranks; below, 90 % intervals must hold 84 to 96 %",
+    at_least=RANKS_SHARE,
+)
+REFITS = Check(
+    "verify refits", f"{INTERVALS}: share of simulated fits that are unreliable", at_most=0.05
+)
 """Limit of the share of simulated fits that fail or do not pass their diagnostics."""
+HALVES = Check(
+    "verify halves", f"{INTERVALS}: p-value of two halves' difference", at_least=HALVES_SHARE
+)
+HALVES_EFFORT = Check(
+    "verify halves-effort",
+    f"{TORQUE}difference of two halves' predictions against what they claim, p-value",
+    at_least=HALVES_SHARE,
+)
+PRIOR = Check("verify prior", "what is the prior's: sensitivity to its power", at_most=STATED)
 
 
 def verify_verdicts(
     what: str,
-    checks: Sequence[Check],
+    checks: Sequence[CheckKind],
     calibration: Calibration | None,
     halves: Halves | None,
     sensitivity: Sensitivity | None,
     not_done: Sequence[str],
 ) -> tuple[Verdict, ...]:
     """Judge the requested checks; one that could not be done is not evaluated, with the reason."""
-    scope = f"verify.{what}"
     because = " ".join(not_done) or "The check could not be done."
     verdicts: list[Verdict] = []
     if "sbc" in checks:
-        verdicts += _calibration(scope, calibration, because)
+        verdicts += _calibration(calibration, because)
     if "halves" in checks:
-        verdicts += _halves(scope, halves, because)
+        verdicts += _halves(halves, because)
     if "prior" in checks:
-        verdicts.append(_prior(scope, sensitivity, because))
-    return tuple(verdicts)
+        verdicts.append(_prior(sensitivity, because))
+    return tuple(verdict.of(f"verify.{what}") for verdict in verdicts)
 
 
-def _calibration(scope: str, found: Calibration | None, because: str) -> list[Verdict]:
+def _calibration(found: Calibration | None, because: str) -> list[Verdict]:
     if found is None:
-        return [not_evaluated(scope, "calibration", because, RANKS_SHARE)]
-    return [_ranks(scope, found), _refits(scope, found)]
+        return [CALIBRATION.not_evaluated(because)]
+    return [_ranks(found), _refits(found)]
 
 
-def _ranks(scope: str, found: Calibration) -> Verdict:
-    check, limit = "calibration", found.band.alpha
+def _ranks(found: Calibration) -> Verdict:
+    limit = found.band.alpha
     if found.fits < FEWEST_FITS:
         why = f"{found.fits} simulated fits are too few: {FEWEST_FITS} are needed, 100 recommended."
-        return not_evaluated(scope, check, why, limit)
+        return CALIBRATION.not_evaluated(why, threshold=limit)
     worst = min(found.quantities, key=lambda quantity: quantity.ecdf_p)
     uneven = [quantity for quantity in found.quantities if quantity.ecdf_p < limit]
     good = (
@@ -87,9 +102,9 @@ def _ranks(scope: str, found: Calibration) -> Verdict:
     how = "; ".join(_how_wrong(quantity) for quantity in wrong)
     bad = f"In {found.fits} fits to simulated data {how}. {remedy}"
     if not wrong:
-        return Verdict(scope, check, "pass", worst.ecdf_p, limit, good)
+        return CALIBRATION.verdict("pass", worst.ecdf_p, good, threshold=limit)
     least = min(quantity.ecdf_p for quantity in wrong)
-    return Verdict(scope, check, "fail", least, limit, bad)
+    return CALIBRATION.verdict("fail", least, bad, threshold=limit)
 
 
 def held_by_90(quantity: RankedQuantity) -> float:
@@ -128,24 +143,24 @@ def _how_wrong(quantity: RankedQuantity) -> str:
     return f"intervals of {name} are too wide by a factor of about {1 / width:.2g} {held}"
 
 
-def _refits(scope: str, found: Calibration) -> Verdict:
+def _refits(found: Calibration) -> Verdict:
     every = found.fits + len(found.broken)
     share = (found.unreliable * found.fits + len(found.broken)) / every
     why = (
         f"{share:.1%} of {every} simulated fits failed or did not pass their diagnostics (limit "
-        f"{UNRELIABLE_LIMIT:.0%}); {found.escalated:.1%} used a higher effort, "
+        f"{REFITS.threshold:.0%}); {found.escalated:.1%} used a higher effort, "
         f"{found.other_law:.1%} chose another candidate."
     )
     if found.broken:
         why += f" Example: {found.broken[0]}"
-    return judge(scope, "refits", share, UNRELIABLE_LIMIT, why)
+    remedy = " Fit with more effort, or choose a simpler candidate in the recipe's [fit] table."
+    return REFITS.judge(share, why, why + remedy)
 
 
-def _halves(scope: str, found: Halves | None, because: str) -> list[Verdict]:
-    checks = ("halves", "halves-effort")
+def _halves(found: Halves | None, because: str) -> list[Verdict]:
     if found is None or found.p_value is None or found.effort_p_value is None:
         why = because if found is None else "Each half has too few data to be judged alone."
-        return [not_evaluated(scope, name, why, HALVES_SHARE) for name in checks]
+        return [check.not_evaluated(why) for check in (HALVES, HALVES_EFFORT)]
     largest = max((row for row in found.rows if row.z is not None), key=lambda r: abs(r.z or 0.0))
     size = f"{largest.name} differs most, by {abs(largest.z or 0.0):.1f} standard deviations"
     p, effort_p = found.p_value, found.effort_p_value
@@ -169,14 +184,14 @@ def _halves(scope: str, found: Halves | None, because: str) -> list[Verdict]:
         f"expected {found.effort_expected:.2%} (p = {effort_p:.2g}, limit {HALVES_SHARE:.2g})."
     )
     return [
-        judge(scope, checks[0], p, HALVES_SHARE, good, bad),
-        judge(scope, checks[1], effort_p, HALVES_SHARE, what),
+        HALVES.judge(p, good, bad),
+        HALVES_EFFORT.judge(effort_p, what),
     ]
 
 
-def _prior(scope: str, found: Sensitivity | None, because: str) -> Verdict:
+def _prior(found: Sensitivity | None, because: str) -> Verdict:
     if found is None:
-        return not_evaluated(scope, "prior", because)
+        return PRIOR.not_evaluated(because)
     worst = max(found.rows, key=lambda row: row.prior)
     effort = next(row for row in found.rows if row.name == EFFORT)
     conflict = [row.name for row in found.rows if row.diagnosis == "prior-data conflict"]
@@ -201,4 +216,4 @@ def _prior(scope: str, found: Sensitivity | None, because: str) -> Verdict:
     )
     if weak and status == "pass":
         why += " The predicted effort does not depend on it."
-    return Verdict(scope, "prior", status, worst.prior, found.threshold, why)
+    return PRIOR.verdict(status, worst.prior, why, threshold=found.threshold)

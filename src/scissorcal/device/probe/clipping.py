@@ -5,13 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.device.probe.result import Estimate
+from scissorcal.device.probe.result import MOTORS, Estimate
 from scissorcal.device.probe.talk import RELEASE, Answer, Stage, StalledError, Talk
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import ConfigKey, StateFlag
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import Check, Verdict
 
-CHECK = "clipping"
 ATTEMPTS = 3
 ABOVE = 1.02
 """Above the limit by so much: a device that does not clip gives no more than that either."""
@@ -24,6 +23,9 @@ LONGEST_REST_S = 1.0
 STILL_RAD, STILL_STEPS = 0.002, 5.0
 """Blades that stay within the larger of both are at rest, an encoder that jitters included."""
 SDS = 2.0
+CLIPPING = Check(
+    "probe.motors clipping", f"{MOTORS}: 1 if a torque above the limit is not clipped", at_most=0.0
+)
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Ver
     limit, bounds = talk.identity.torque_limit, talk.bounds
     if inertia is None or not inertia.mean > SDS * inertia.sd:
         why = "Clipping was not tried: the inertia is not known, so one tick might be too much."
-        return not_evaluated("probe.motors", CHECK, why)
+        return CLIPPING.not_evaluated(why)
     longest_s = SHORTEST_BRAKE_MS * 1e-3 + 3.0 * talk.tick_s
     fastest = ABOVE * limit * longest_s / (inertia.mean - SDS * inertia.sd)
     if fastest > bounds.rate_rad_per_s:
@@ -54,13 +56,13 @@ def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Ver
             f"Clipping was not tried: a tick at the limit ({limit:.3g} N m) could bring the blades "
             f"to {fastest:.2g} rad/s, and rig.probe allows {bounds.rate_rad_per_s:.2g}."
         )
-        return not_evaluated("probe.motors", CHECK, why)
+        return CLIPPING.not_evaluated(why)
     try:
         talk.link.configure(ConfigKey.BRAKE_AFTER_MS, SHORTEST_BRAKE_MS)
     except DeviceError as error:
         with suppress(DeviceError):  # it may have been set, and only its confirmation lost
             talk.link.configure(ConfigKey.BRAKE_AFTER_MS, brake_after_ms)
-        return not_evaluated("probe.motors", CHECK, f"Clipping was not tried: {error}")
+        return CLIPPING.not_evaluated(f"Clipping was not tried: {error}")
     try:
         with talk.allowing(ABOVE * limit):
             found = _strikes(talk, ABOVE * limit)
@@ -77,13 +79,13 @@ def _judged(found: Strike, limit: float) -> Verdict:
             "or the blades did not rest. Close other programs on this computer, let go of the "
             "handles, and probe again."
         )
-        return not_evaluated("probe.motors", CHECK, why)
+        return CLIPPING.not_evaluated(why)
     good = "A torque above the stated limit is clipped and flagged."
     bad = (
         f"A command of {ABOVE * limit:.3g} N m was not flagged TORQUE_SATURATED (largest measured "
         f"torque {found.largest_Nm:.3g} N m): the device must clip what exceeds its limit."
     )
-    return judge("probe.motors", CHECK, float(not found.flagged), 0.0, good, bad)
+    return CLIPPING.judge(float(not found.flagged), good, bad)
 
 
 def _strikes(talk: Talk, torque: float) -> Strike:

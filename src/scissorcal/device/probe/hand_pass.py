@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.device.loading import Confirm
+from scissorcal.device.probe.result import SENSORS
 from scissorcal.device.probe.talk import RELEASE, Stage, Talk
 from scissorcal.kernel import ConfigKey, Identity
-from scissorcal.verdicts import Verdict, not_evaluated
+from scissorcal.verdicts import Check, Verdict
 
 CLOSE = (
     "Take everything out from between the blades. The motors are off: close the blades by hand to "
@@ -24,20 +25,24 @@ STOOD = (
     "The blades stand at a stop. Leave them half open once more; where they fall back by "
     "themselves, let them lie there and keep clear. "
 )
-SENSORS, CHECK, ZERO = "probe.sensors", "count scale", "opening zero"
 LISTEN_S = 0.1
 DEAD_STEPS = 5.0
 """A hand that reached both stops moved the blades by a hundred steps of any encoder."""
-RANGE_SHARE = 0.10
-"""Stops of rubber give by a degree or two of 50; a wrong count or gear is 50 % and more."""
-ZERO_RAD = 0.05
-"""Both stops off by so much the same way: a zero that is wrong by more than a degree or two of
-give. At an edge of 60 mm it is 1.5 mm at the tip."""
 AGREE_SHARE = 0.05
 """Two passes of a person who pressed on both stops agree so closely."""
 FELL_RAD = 0.05
-"""As near to a stop as its place is known (ZERO_RAD)."""
+"""As near to a stop as its place is known (OPENING_ZERO)."""
 HAND_RATE, HAND_S = 0.5, 3.0
+LEFT_HALF_OPEN = Check("probe.sensors left half open", f"{SENSORS}: distance from a stop, rad")
+COUNT_SCALE = Check(
+    "probe.sensors count scale", f"{SENSORS}: range counted over range stated, less 1", at_most=0.10
+)
+"""Stops of rubber give by a degree or two of 50; a wrong count or gear is 50 % and more."""
+OPENING_ZERO = Check(
+    "probe.sensors opening zero", f"{SENSORS}: both stops by hand less stated, rad", at_most=0.05
+)
+"""Both stops off by so much the same way: a zero that is wrong by more than a degree or two of
+give. At an edge of 60 mm it is 1.5 mm at the tip."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +105,7 @@ def fallen(place: float, identity: Identity) -> Verdict | None:
         "somebody holds them, or nobody moved them. Balance them or leave them half open, let go, "
         "and probe again."
     )
-    return not_evaluated(SENSORS, "left half open", why, FELL_RAD, abs(place - stop))
+    return LEFT_HALF_OPEN.not_evaluated(why, abs(place - stop), FELL_RAD)
 
 
 def virtual_hand(talk: Talk) -> bool:
@@ -128,7 +133,7 @@ def judge_hand_pass(found: HandPass, identity: Identity) -> list[Verdict]:
             f"Not determined: two passes by hand from stop to stop gave {first:.3g} and "
             f"{second:.3g} rad. Probe again, and press on both stops."
         )
-        return [not_evaluated(SENSORS, CHECK, why, RANGE_SHARE)]
+        return [COUNT_SCALE.not_evaluated(why)]
     way = found.ranges[-1]
     ratio = way / stated
     off = abs(ratio - 1.0)
@@ -138,23 +143,21 @@ def judge_hand_pass(found: HandPass, identity: Identity) -> list[Verdict]:
             f"{said}: the encoder is reversed, its reading shrinks while the blades open. Swap the "
             "encoder's channels, or turn its sign round in the firmware."
         )
-        return [Verdict(SENSORS, CHECK, "fail", off, RANGE_SHARE, why)]
-    if off > RANGE_SHARE:
+        return [COUNT_SCALE.verdict("fail", off, why)]
+    if off > COUNT_SCALE.threshold:
         why = (
             f"{said}: its counts per turn or its gear are wrong by a factor {ratio:.2g}, or "
             "something keeps the blades from their stops. Clear them, or correct the firmware."
         )
-        return [Verdict(SENSORS, CHECK, "fail", off, RANGE_SHARE, why)]
+        return [COUNT_SCALE.verdict("fail", off, why)]
     zero = 0.5 * (found.closed[-1] - identity.opening_min + found.opened[-1] - identity.opening_max)
-    verdicts = [Verdict(SENSORS, CHECK, "pass", off, RANGE_SHARE, f"{said}.")]
+    verdicts = [COUNT_SCALE.verdict("pass", off, f"{said}.")]
     said = f"Both stops lie {zero:+.3g} rad from where the device states them"
-    if abs(zero) <= ZERO_RAD:
-        return [*verdicts, Verdict(SENSORS, ZERO, "pass", abs(zero), ZERO_RAD, f"{said}.")]
-    why = (
+    bad = (
         f"{said}: the zero of the encoder is wrong. Home it, or correct its zero in the firmware: "
         "an opening that is off by a constant looks like another edge and toughness."
     )
-    return [*verdicts, Verdict(SENSORS, ZERO, "fail", abs(zero), ZERO_RAD, why)]
+    return [*verdicts, OPENING_ZERO.judge(abs(zero), f"{said}.", bad)]
 
 
 def not_determined() -> Verdict:
@@ -165,7 +168,7 @@ def not_determined() -> Verdict:
         "scale, its sign and its zero are not checked. Probe again, and move the blades to both "
         "stops by hand when asked."
     )
-    return not_evaluated(SENSORS, CHECK, why, RANGE_SHARE)
+    return COUNT_SCALE.not_evaluated(why)
 
 
 def by_virtual_hand(alive: bool) -> Verdict:
@@ -175,13 +178,14 @@ def by_virtual_hand(alive: bool) -> Verdict:
         f"Not checked on a virtual rig: scale and zero of the encoder; its own hand {seen}. A "
         "person moves the blades of a real one to both stops."
     )
-    return not_evaluated(SENSORS, CHECK, why, RANGE_SHARE)
+    return COUNT_SCALE.not_evaluated(why)
 
 
 def _is_right(found: HandPass, identity: Identity) -> bool:
     stated = identity.opening_max - identity.opening_min
     zero = 0.5 * (found.closed[-1] - identity.opening_min + found.opened[-1] - identity.opening_max)
-    return abs(found.ranges[-1] / stated - 1.0) <= RANGE_SHARE and abs(zero) <= ZERO_RAD
+    off = abs(found.ranges[-1] / stated - 1.0)
+    return off <= COUNT_SCALE.threshold and abs(zero) <= OPENING_ZERO.threshold
 
 
 def _agree(found: HandPass) -> bool:
@@ -197,7 +201,7 @@ def _what(found: HandPass, identity: Identity) -> str:
     if way < 0.0:
         return "shrank from close to open"
     stated = identity.opening_max - identity.opening_min
-    if abs(way / stated - 1.0) > RANGE_SHARE:
+    if abs(way / stated - 1.0) > COUNT_SCALE.threshold:
         return f"changed by {math.degrees(way):.3g} degrees, {math.degrees(stated):.3g} are stated"
     return "is off at both stops"
 

@@ -10,18 +10,31 @@ from dataclasses import dataclass
 from scissorcal.device.probe.idle import REST_RAD, Idle
 from scissorcal.device.probe.joint_values import LATE_S
 from scissorcal.device.probe.pushes import Axis
+from scissorcal.device.probe.result import MOTORS, SENSORS
 from scissorcal.device.probe.search import LEAST_INERTIA, Search, Sense
 from scissorcal.device.probe.swings import Swung
 from scissorcal.recording.probe import NORMAL_90
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import Check, Verdict
 
-MOTORS, SENSORS = "probe.motors", "probe.sensors"
 MISFIT_LIMIT = 15.0
 """Mean square of the residuals over their errors. Joints of another friction law stay below it, a
 loose coupling or blades that touch something do not (figures in decision 175)."""
 MOST_LOG_SPREAD = math.log(1e3)
 """An inertia that is known to a factor of a thousand is not known; its sd may be anything."""
-WIDEST_SD = 0.3
+REST = Check("probe.sensors rest", f"{SENSORS}: motion with the motors off, rad", at_most=REST_RAD)
+MOVE = {
+    "blades": Check("probe.motors blades move", f"{MOTORS}: largest torque that was tried, mN m"),
+    "sledge": Check("probe.motors sledge move", f"{MOTORS}: largest force that was tried, N"),
+}
+DIRECTION = {
+    axis: Check(
+        f"probe.motors {axis} direction", f"{MOTORS}: 1 if pairs of pushes obey", at_least=1.0
+    )
+    for axis in MOVE
+}
+INERTIA = Check(
+    "probe.motors inertia", f"{MOTORS}: sd of its logarithm, from the pushes", at_most=0.3
+)
 """Of ln inertia: gains that hold at both ends of its interval of 90 % then lose half of their
 margin, which is what a gain margin of 2 allows."""
 
@@ -72,19 +85,19 @@ def judge_rest(found: Idle) -> Outcome:
     moved = max(found.moved_rad, 2.0 * found.jitter_rad if found.swings else 0.0)
     if moved <= REST_RAD:
         good = "The blades are at rest."
-        return Outcome((Verdict(SENSORS, "rest", "pass", moved, REST_RAD, good),))
+        return Outcome((REST.verdict("pass", moved, good),))
     why = (
         f"Not determined: the blades moved by {moved:.2g} rad in a second with the motors off. Let "
         "go of the handles, wait until they hang still, fix what pulls them, and probe again."
     )
-    return Outcome((not_evaluated(SENSORS, "rest", why, REST_RAD, moved),), why)
+    return Outcome((REST.not_evaluated(why, moved),), why)
 
 
 def judge_search(found: Search, axis: Axis, words: Words, *, hand: bool) -> Outcome:
     """Whether the axis moved both ways; ``hand``: a pass by hand has shown the encoder alive."""
     if found.stop or len(found.movers) == 2:
         return Outcome(())
-    check = f"{words.name} move"
+    check = MOVE[words.name]
     if found.bounded_at is not None:
         why = (
             f"Not determined: no push up to {words.scale * found.bounded_at:.3g} {words.unit} "
@@ -101,7 +114,7 @@ def judge_search(found: Search, axis: Axis, words: Words, *, hand: bool) -> Outc
         if not hand:
             cause = f"a stuck or unplugged encoder, {cause}"
         why = f"The {words.name} did not move either way, up to {most}: {cause}. {words.more}."
-        return Outcome((Verdict(MOTORS, check, "fail", words.scale * axis.effort, None, why),))
+        return Outcome((check.verdict("fail", words.scale * axis.effort, why),))
     sign = "positive" if moved.effort > 0.0 else "negative"
     why = (
         f"Not determined: the {words.name} moved only by {sign} efforts, up to {most}: they stand "
@@ -115,7 +128,7 @@ def judge_sense(
     found: Search, sensed: Sense, words: Words, motor_sign: int, *, hand: bool
 ) -> Outcome:
     """Which way the axis goes when it is pushed."""
-    check = f"{words.name} direction"
+    check = DIRECTION[words.name]
     share = 0.5 + 0.5 * sensed.votes / max(sensed.pairs, 1)
     if sensed.direction == "not determined":
         why = (
@@ -139,12 +152,12 @@ def judge_sense(
     bad = f"Positive {words.effort} {words.minus} the {words.name}: "
     bad += remedy.format(sign=-motor_sign) + "."
     right = float(sensed.direction == "right")
-    return Outcome((judge(MOTORS, check, right, 1.0, good, bad),))
+    return Outcome((check.judge(right, good, bad),))
 
 
 def judge_joint(swung: Swung, axis: Axis, tick_s: float, lag_ticks: float) -> Outcome:
     """Whether inertia and friction explain the pushes, and are known well enough."""
-    check, fit = "inertia", swung.fit
+    fit = swung.fit
     sd = fit.sd("log_inertia")
     spread = math.exp(min(NORMAL_90 * fit.inertia.sd / fit.inertia.mean, MOST_LOG_SPREAD))
     inertia = 1e6 * fit.inertia.mean
@@ -155,7 +168,7 @@ def judge_joint(swung: Swung, axis: Axis, tick_s: float, lag_ticks: float) -> Ou
             "encoder, or blades that touch something. Clear them, tighten the coupling, and probe "
             "again."
         )
-        return _open(check, why, sd)
+        return _open(INERTIA, why, sd)
     late, doubt = fit.delay.mean, 2.0 * fit.delay.sd
     least, most = (lag_ticks - 2.0) * tick_s - doubt, (lag_ticks + 1.0) * tick_s + LATE_S + doubt
     if fit.strange or not least <= late <= most:
@@ -165,18 +178,18 @@ def judge_joint(swung: Swung, axis: Axis, tick_s: float, lag_ticks: float) -> Ou
             "nothing touches the blades and that the motor's supply stands, balance blades that "
             "creep by their weight, and probe again."
         )
-        return _open(check, why, sd)
-    if not sd <= WIDEST_SD:
+        return _open(INERTIA, why, sd)
+    if not sd <= INERTIA.threshold:
         steps = max(abs(one.went) for one in swung.pushes) / max(axis.seen / 3.0, 1e-12)
         why = (
             f"Not determined: the inertia is known to a factor of {spread:.2g} only. At "
             f"{1e3 * tick_s:.3g} ms ticks the largest swing within rig.probe is {steps:.2g} "
             "encoder steps. Use a finer encoder, a shorter tick, or larger limits in rig.probe."
         )
-        return _open(check, why, sd)
+        return _open(INERTIA, why, sd)
     why = f"Inertia {inertia:.3g} kg mm^2, known to a factor of {spread:.3g} (90 %)."
-    return Outcome((Verdict(MOTORS, check, "pass", sd, WIDEST_SD, why),))
+    return Outcome((INERTIA.verdict("pass", sd, why),))
 
 
-def _open(check: str, why: str, value: float) -> Outcome:
-    return Outcome((not_evaluated(MOTORS, check, why, None, value),), why)
+def _open(check: Check, why: str, value: float) -> Outcome:
+    return Outcome((check.not_evaluated(why, value),), why)

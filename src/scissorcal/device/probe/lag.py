@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scissorcal.device.probe.result import LINE, MOTORS
 from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
 from scissorcal.kernel import StateFlag
-from scissorcal.verdicts import Verdict, judge, not_evaluated
+from scissorcal.verdicts import Check, Verdict
 
-MOTORS, LINE = "probe.motors", "probe.line"
 TOGGLES, ASKED = 12, 200
 LONGEST_TICKS_S = 0.1
 PAUSES = (7, 11, 5, 13, 9, 6)
@@ -18,14 +18,19 @@ WITHHELD_TICKS = 3
 """After the longest lag: how long commands are withheld before the device may brake."""
 NEVER_S = 0.05
 """A command that has not shown by then will not: a busy computer is away for 20 ms now and then."""
-LAG_LIMIT_MS = 25.0
-"""A loop that is so late holds a bandwidth of pi / 4 / 25 ms = 31 rad/s at a phase margin of 45
-degrees: blades then stay behind by 30 mrad at 1 rad/s, and no sweep is steady."""
-LOST_LIMIT = 0.005
-"""Share of commands. One in 200 lost lets two in a row go missing once a minute at 1 kHz."""
 FEWEST_LOST = 4
 """Of ASKED: below it the interval of 95 % (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404)
-reaches below LOST_LIMIT; of 5 % of commands lost fewer are seen in 1 of 100 probes."""
+reaches below the limit; of 5 % of commands lost fewer are seen in 1 of 100 probes."""
+ENABLE = Check("probe.motors enable", f"{MOTORS}: whether they follow ENABLE")
+LAG = Check(
+    "probe.motors lag", f"{MOTORS}: from a state to the effect of its answer, ms", at_most=25.0
+)
+"""A loop that is so late holds a bandwidth of pi / 4 / 25 ms = 31 rad/s at a phase margin of 45
+degrees: blades then stay behind by 30 mrad at 1 rad/s, and no sweep is steady."""
+LOST_COMMANDS = Check(
+    "probe.line lost commands", f"{LINE}: share of single commands", at_most=0.005
+)
+"""Share of commands. One in 200 lost lets two in a row go missing once a minute at 1 kHz."""
 
 
 @dataclass(frozen=True)
@@ -62,14 +67,14 @@ def judge_lag(found: Lag, tick_ms: float) -> list[Verdict]:
             "MOTOR_ENABLED did not show within 0.1 s of ENABLE: the device does not take commands. "
             "Check its receive line, its emergency stop and its firmware."
         )
-        return [Verdict(MOTORS, "enable", "fail", None, None, why)]
+        return [ENABLE.verdict("fail", None, why)]
     late = found.median * tick_ms
     said = f"Commands take effect after {late:.3g} ms (median)"
     bad = (
         f"{said}: no loop through it follows a sweep. Shorten the way (no hub or network adapter; "
         "'scissorcal device doctor' measures the port)."
     )
-    verdicts = [judge(MOTORS, "lag", late, LAG_LIMIT_MS, f"{said}.", bad)]
+    verdicts = [LAG.judge(late, f"{said}.", bad)]
     share = found.lost / found.asked
     said = f"{found.lost} of {found.asked} single commands did not arrive"
     if found.lost >= FEWEST_LOST:
@@ -77,12 +82,12 @@ def judge_lag(found: Lag, tick_ms: float) -> list[Verdict]:
             f"{said}: what the host sends is lost on its way. Check the host's transmit line, its "
             "ground and the device's receive buffer; 'scissorcal device doctor' measures the port."
         )
-        verdicts.append(Verdict(LINE, "lost commands", "fail", share, LOST_LIMIT, why))
+        verdicts.append(LOST_COMMANDS.verdict("fail", share, why))
     elif found.lost:
         why = f"{said}, too few to tell how many are lost in general."
-        verdicts.append(not_evaluated(LINE, "lost commands", why, LOST_LIMIT, share))
+        verdicts.append(LOST_COMMANDS.not_evaluated(why, share))
     else:
-        verdicts.append(Verdict(LINE, "lost commands", "pass", share, LOST_LIMIT, f"{said}."))
+        verdicts.append(LOST_COMMANDS.verdict("pass", share, f"{said}."))
     return verdicts
 
 

@@ -119,7 +119,7 @@ def _camera_verdicts(engine: "Engine", seen: Sequence["BladePhoto"]) -> tuple[Ve
     import numpy as np
 
     from scissorcal.calibration.camera.there import CameraThere
-    from scissorcal.calibration.edge.checks import SCOPE
+    from scissorcal.calibration.edge.checks import CAMERA
 
     fitted = _camera_fit(engine)
     edges = [(one.photo, own) for one in seen for own in one.measured if own.metric]
@@ -131,7 +131,7 @@ def _camera_verdicts(engine: "Engine", seen: Sequence["BladePhoto"]) -> tuple[Ve
         float(np.linalg.norm(np.ptp(photo.whole(own.edge.pixels), axis=0)) / np.ptp(own.station))
         for photo, own in edges
     )
-    return (CameraThere.of(fitted.pixel_map, pixels, scale).verdict(SCOPE),)
+    return (CameraThere.of(fitted.pixel_map, pixels, scale).verdict(CAMERA),)
 
 
 def _refuse_other_setup(before: Sequence[PhotoCapture], setup: BladeSetup) -> None:
