@@ -253,7 +253,9 @@ def plate(
 
     with _pictures(photographs, made) as pictures:
         taken = capture_plate(workspace, pictures, note, stances=known)
-    name = taken.capture.index.board.name
+    board = taken.capture.index.board
+    assert board is not None, "every photograph that is kept shows a target"
+    name = board.name
     return _answer(workspace, taken, f"the {name}", {"target": name})
 
 

@@ -96,10 +96,6 @@ Output = Annotated[Path | None, typer.Option(help="Write here, without a workspa
 Files = Annotated[
     list[Path], typer.Argument(dir_okay=False, help="Logs of one layout, or a camera's file.")
 ]
-JointRecordedKind = Annotated[
-    Literal["friction", "cut"], typer.Option("--kind", help="What was recorded.")
-]
-Output = Annotated[Path | None, typer.Option(help="Write here, without a workspace.")]
 
 
 @command

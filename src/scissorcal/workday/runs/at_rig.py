@@ -34,6 +34,7 @@ class RigRun(Generic[Result]):
     tracked: "TrackedRun | None" = None
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RigTask(ABC, Generic[Result]):
     """What is done in a run, and the plate's pose: by ``camera``, else by ``source`` if given.
 

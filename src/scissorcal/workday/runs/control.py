@@ -1,6 +1,7 @@
 """Follow a path on a plate with a workspace's rig, and record it."""
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,27 +68,35 @@ def control_workspace(
         raise InputError(
             "The plate's pose comes from a source, a stated pose or a camera: give one."
         )
-    task = _ControlTask(engine, options, points)
-    task.tracked = source is not None or options.camera != NONE
-    task.camera = _camera(engine, rig, options)
-    task.source = source if task.tracked else _pose_source(engine, options.pose)
-    task.held_N = float(points.force.min())
+    tracked = source is not None or options.camera != NONE
+    camera = _camera(engine, rig, options)
+    task = _ControlTask(
+        engine=engine,
+        options=options,
+        points=points,
+        tracked=tracked,
+        camera=camera,
+        source=source if tracked else _pose_source(engine, options.pose),
+        held_N=float(points.force.min()),
+        fits=_fits(engine),
+        edge=blade_edge(engine, engine.recipe),
+    )
     if options.pose is not None and operator is not None:
         operator.say(f"The plate stands {task.told}.")
-    task.fits, task.edge = _fits(engine), blade_edge(engine, engine.recipe)
     return run_at_rig(workspace, task, rig, operator, record=not options.no_record)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _ControlTask(RigTask["ControlResult"]):
     """Following ``points``; a plate is ``tracked`` where it stands before the blades move."""
 
     kind = "control"
+    engine: Engine
+    options: ControlOptions
+    points: "SurfacePoints"
     tracked: bool
     fits: "tuple[FitResult, FitResult]"
     edge: "Edge"
-
-    def __init__(self, engine: Engine, options: ControlOptions, points: "SurfacePoints") -> None:
-        self._engine, self._options, self._points = engine, options, points
 
     def prepare(self, session: "RigSession") -> None:
         from scissorcal.control.plate_request import ask_for_plate
@@ -108,7 +117,7 @@ class _ControlTask(RigTask["ControlResult"]):
             rig_facts(identity, sign, session.probe),
             identity.handle_radius,
         )
-        writer.attach("path.csv", read_foreign(self._options.path_file, PATH), "text/csv")
+        writer.attach("path.csv", read_foreign(self.options.path_file, PATH), "text/csv")
         return writer
 
     def do(
@@ -125,8 +134,8 @@ class _ControlTask(RigTask["ControlResult"]):
         recipe = session.recipe
         touch = recipe.plate.touch
         job = Job(
-            self._points,
-            plate_surface(recipe.plate.surface, self._engine.workspace.root),
+            self.points,
+            plate_surface(recipe.plate.surface, self.engine.workspace.root),
             source,
             Material(1e3 * touch.stiffness_N_per_mm, touch.friction, touch.peak_N),
             1e-3 * recipe.material.sheet_length_mm,
@@ -140,9 +149,9 @@ class _ControlTask(RigTask["ControlResult"]):
     @property
     def told(self) -> str:
         """Where the plate's pose was from, as an end of a sentence."""
-        if self._options.pose is None:
+        if self.options.pose is None:
             return "where it was tracked" if self.tracked else "as it was fitted"
-        stated = stated_pose(self._options.pose)
+        stated = stated_pose(self.options.pose)
         place = ", ".join(f"{1e3 * value:.2f}" for value in stated.translation_m)
         turn = f"{stated.euler_angles.words}; {quaternion_words(stated.quaternion)}"
         return f"as it was stated, ({place}) mm, {turn}"

@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,38 +56,43 @@ def render_workspace(
         if stale:
             raise MissingError(f"{stale} To render it all the same: --allow-mismatch.")
         _refuse_other_blades(recipe, package)
-    task = _RenderTask(workspace, package, options, stale)
-    task.camera = _camera(workspace, package, rig, options)
-    task.source, task.taps_s = source, options.taps_s
+    task = _RenderTask(
+        workspace=workspace,
+        package=package,
+        options=options,
+        stale=stale,
+        camera=_camera(workspace, package, rig, options),
+        source=source,
+        taps_s=options.taps_s,
+    )
     run = run_at_rig(workspace, task, rig, operator, record=not options.no_record)
     if of_workspace:
         _write_admission(workspace.package_path(recipe), run.result, run.rig)
     return run
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _RenderTask(RigTask["RenderResult"]):
     """Rendering a package; a recording notes that it is stale."""
 
     kind = "render"
-
-    def __init__(
-        self, workspace: Workspace, package: "ModelPackage", options: RenderOptions, stale: str
-    ) -> None:
-        self._workspace, self._package = workspace, package
-        self._options, self._stale = options, stale
+    workspace: Workspace
+    package: "ModelPackage"
+    options: RenderOptions
+    stale: str
 
     def check(self, session: "RigSession") -> None:
         from scissorcal.render.mismatch import refuse_other_rig
 
-        if not self._options.allow_mismatch:
-            refuse_other_rig(self._package, session.identity)
+        if not self.options.allow_mismatch:
+            refuse_other_rig(self.package, session.identity)
 
     def open_writer(self, session: "RigSession", path: Path) -> "RecordingWriter":
         from scissorcal.render import open_writer
 
-        writer = open_writer(session, self._package, path)
-        if self._stale:
-            writer.note(self._stale)
+        writer = open_writer(session, self.package, path)
+        if self.stale:
+            writer.note(self.stale)
         return writer
 
     def do(
@@ -99,15 +104,15 @@ class _RenderTask(RigTask["RenderResult"]):
         from scissorcal.render import Rendering, VirtualStrokes, render
         from scissorcal.render.rig_facts import with_probe
 
-        options = self._options
+        options = self.options
         how = Rendering(
             options.seconds,
             VirtualStrokes(options.strokes, options.rate_rad_per_s),
             options.accept_derated,
             options.allow_mismatch,
         )
-        facts = with_probe(_known_rig(self._workspace, self._package), session.probe)
-        return render(session, self._package, how, writer=writer, rig=facts, plate=source)
+        facts = with_probe(_known_rig(self.workspace, self.package), session.probe)
+        return render(session, self.package, how, writer=writer, rig=facts, plate=source)
 
 
 def _stale(engine: Engine) -> str:
