@@ -190,7 +190,7 @@ def test_a_fresh_sheet_is_cut_from_its_edge_and_air_gives_no_force():
     uneven = Unevenness(0.05, 1e-3, 0.01)
     made = [
         material_torque(
-            cutting(), uneven, opening, advance, sheets, TICK_S, np.random.default_rng(seed)
+            cutting(), uneven, (opening, advance, sheets), TICK_S, np.random.default_rng(seed)
         )
         for seed in (1, 1, 2)
     ]

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.aliases import Array, Integers, Mask
+from scissorcal.aliases import Array, Mask
 from scissorcal.calibration.caveats import NEXT_RECORDING
 from scissorcal.calibration.checks import HELD_OUT_LIMIT
-from scissorcal.calibration.fit_model import Experiment
+from scissorcal.calibration.fit_model import Design, Experiment
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.calibration.friction.search import search, search_from
@@ -205,14 +205,11 @@ def compare_recordings(
         left = law.without(np.unique(design.strokes[here]))
         return np.asarray(search_from(replace(problem, reduced=left), point).point)
 
-    return gather_recordings(
-        design, design.bins.recording, point, recordings, FitsApart(own, others), usual, rng
-    )
+    return gather_recordings(design, point, recordings, FitsApart(own, others), usual, rng)
 
 
 def gather_recordings(
-    design: Experiment,
-    index: Integers,
+    design: Design,
     point: Array,
     recordings: tuple[Recording, ...],
     fits: FitsApart,
@@ -221,9 +218,10 @@ def gather_recordings(
 ) -> BetweenRecordings | None:
     """Compare a law's fits to single recordings; None where fewer than two can be fitted.
 
-    ``index`` (n,) is the recording of each bin, ``point`` (p,) the optimum over all of them,
-    ``usual`` the share by which recordings usually differ.
+    ``point`` (p,) is the optimum over all of them, ``usual`` the share by which recordings usually
+    differ.
     """
+    index = design.bins.recording
     labels = [
         int(label) for label in np.unique(index) if np.count_nonzero(index == label) >= FEWEST_BINS
     ]

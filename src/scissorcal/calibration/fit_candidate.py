@@ -221,8 +221,7 @@ class FittedCandidate:
         return leave_strokes_out(
             self.candidate.problem(self.series),
             self.optimum.point,
-            self.information,
-            self.candidate.prior_precision,
+            self.share * self.information + self.candidate.prior_precision,
             labelled,
             self.share,
             self.candidate.reduced.by_stroke if self.candidate.reduced else None,

@@ -48,8 +48,7 @@ class LeftOut:
 def leave_strokes_out(
     problem: Problem,
     point: Array,
-    information: Array,
-    prior_precision: Array,
+    precision: Array,
     labelled: tuple[NDArray[np.int64], ...],
     share: float,
     by_stroke: Callable[[Array], Array] | None = None,
@@ -63,16 +62,16 @@ def leave_strokes_out(
     lattice, mapped to a Student-t about ``point`` with the curvature of the tempered posterior;
     weights correct for both the approximation and the stroke that is missing, and their k-hat
     judges both. Where the curvature describes the posterior badly, draws are taken again from the
-    moments that they find. ``information`` and ``prior_precision`` have shape (p, p); ``labelled``
-    are the bins (k,) of each stroke. ``by_stroke`` gives the log-likelihood (k, strokes) of each
-    stroke at draws (k, p), where that is cheaper than by bins.
+    moments that they find. ``precision`` (p, p) is that of the tempered posterior at
+    ``point``; ``labelled`` are the bins (k,) of each stroke. ``by_stroke`` gives the log-likelihood
+    (k, strokes) of each stroke at draws (k, p), where that is cheaper than by bins.
     """
     from scipy.special import logsumexp
 
     counter = Counter()
     problem = counter.over(problem)
     tried: list[tuple[float, Array, Array, Array]] = []
-    centre, covariance = point, _inverse(share * information + prior_precision)
+    centre, covariance = point, _inverse(precision)
     for _ in range(ROUNDS):
         draws, log_density = _around(centre, covariance)
         densities, log_prior = _densities(problem, draws, labelled, by_stroke)

@@ -7,7 +7,7 @@ from scissorcal.inference.curvature import gradient, hessian
 from scissorcal.inference.infer import infer
 from scissorcal.inference.optimise import Cluster, Optimum, find_optimum
 from scissorcal.inference.pareto import smooth_weights
-from scissorcal.inference.posterior import Effort, Posterior
+from scissorcal.inference.posterior import Effort, InferOptions, Posterior
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus
 from scissorcal.inference.tails import log_density, tails_of
@@ -17,6 +17,7 @@ __all__ = [
     "Cluster",
     "Counter",
     "Effort",
+    "InferOptions",
     "NotFiniteError",
     "Optimum",
     "Posterior",

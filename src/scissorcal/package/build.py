@@ -69,21 +69,39 @@ class PackageSummary:
     simplified: "Simplified"
 
 
+@dataclass(frozen=True)
+class PackageOptions:
+    """What goes into a package beside recipe and fits.
+
+    ``tolerance``, each table's as a share of its value, overrides what recipe and scene ask for.
+    ``review`` is the signature under the fits' report; it changes nothing else in the package.
+    ``plate`` is where the plate stands, stored as a pose with its covariance. ``drawn`` are the
+    pieces of the recipe's drawn plate on the line of the cut, none for a uniform sheet. ``rig`` is
+    that of the recordings: a rendering on another one is refused. ``inputs_hash`` is the identity
+    that a workspace gives to recipe, fits and algorithm (`workday.engine`); where it has another
+    one now, the package is stale. With ``allow_failed`` a fit may have failed checks; the manifest
+    then lists them, and whatever uses the package reports it
+    (docs/decisions/109-packages-from-failed-fits.md). ``sign`` signs content hash and review
+    (`signature.signed_text`), such as `keys.signer` of a private key.
+    """
+
+    tolerance: float | None = None
+    review: Review | None = None
+    plate: PlateFit | None = None
+    drawn: Sequence["LayerPiece"] = ()
+    rig: RigRecord | None = None
+    inputs_hash: str = NO_IDENTITY
+    allow_failed: bool = False
+    sign: Sign | None = None
+
+
 def build_package(
     recipe: Recipe,
     friction: FitResult | None,
     cut: FitResult | None,
     path: Path,
     rng: np.random.Generator,
-    *,
-    tolerance: float | None = None,
-    review: Review | None = None,
-    plate: PlateFit | None = None,
-    drawn: Sequence["LayerPiece"] = (),
-    rig: RigRecord | None = None,
-    inputs_hash: str = NO_IDENTITY,
-    allow_failed: bool = False,
-    sign: Sign | None = None,
+    options: PackageOptions = PackageOptions(),
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
@@ -94,20 +112,11 @@ def build_package(
     simplest laws that are enough for the scene
     (:func:`~scissorcal.package.simplest.model.simplest_model`), the manifest says what was left
     out, and the tables are the smallest whose bound fits; else they are those of a fixed fine
-    tolerance. ``tolerance``, each table's as a share of its value, overrides both. ``review`` is
-    the signature under the fits' report; it changes nothing else in the package. ``plate`` is
-    where the plate stands, stored as a pose with its covariance. ``drawn`` are the pieces of the
-    recipe's drawn plate on the line of the cut, none for a uniform sheet. ``rig`` is that of the
-    recordings: a rendering on another one is refused. ``inputs_hash`` is the
-    identity that a workspace gives to recipe, fits and algorithm (`workday.engine`); where it has
-    another one now, the package is stale. ``sign`` signs its content hash and review
-    (`signature.signed_text`), such as `keys.signer` of a private key.
+    tolerance.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
     belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where a fit
-    failed a check or the tables are further from the model than the scene allows. With
-    ``allow_failed`` a fit may have failed checks; the manifest then lists them, and whatever uses
-    the package reports it (docs/decisions/109-packages-from-failed-fits.md).
+    failed a check or the tables are further from the model than the scene allows.
     """
     # the report imports this module to read packages; only a build needs what follows
     from scissorcal.package.by_load import rendered_fits
@@ -116,17 +125,18 @@ def build_package(
     from scissorcal.package.simplest.model import simplest_model
     from scissorcal.package.stated_bound import stated_bound
 
+    plate, sign = options.plate, options.sign
     cut, friction = _wanted(recipe, friction, cut)
-    if not allow_failed:
+    if not options.allow_failed:
         _refuse_failed_fits(path, cut, friction, plate)
     cut, friction = rendered_fits(cut, friction)
     picked = pick_draws(cut, friction, rng)
-    simplified = simplest_model(recipe, cut, friction, picked, tolerance=tolerance)
+    simplified = simplest_model(recipe, cut, friction, picked, tolerance=options.tolerance)
     compiled = simplified.tables[-1]
     ranges = scene_ranges(recipe)
     bound = stated_bound(simplified.central, compiled, recipe)
     arrays: dict[str, NDArray[Any]] = {**compiled.arrays, **simplified.draws}
-    record = _provenance(recipe, simplified.cut, simplified.friction, inputs_hash)
+    record = _provenance(recipe, simplified.cut, simplified.friction, options.inputs_hash)
     record = _with_left_out(record, cut, friction, bound)
     manifest = _hashed(
         Manifest(
@@ -145,11 +155,11 @@ def build_package(
             ),
             plate_pose=recipe.scene.plate_pose,
             plate=_plate_record(plate) if plate else None,
-            pieces=piece_records(recipe, drawn, _energy(compiled.mechanics.fracture)),
+            pieces=piece_records(recipe, options.drawn, _energy(compiled.mechanics.fracture)),
             simplification=simplified.record,
-            rig=rig,
+            rig=options.rig,
             reach=data_reach(recipe, cut),
-            review=review,
+            review=options.review,
             content_hash=UNHASHED,
         )
     )

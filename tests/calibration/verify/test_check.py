@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult
-from scissorcal.calibration.verify.check import assess, make_study, tasks_of
+from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
 from scissorcal.calibration.verify.generating import Generating, generating_prior, refit_prior
 from scissorcal.calibration.verify.result import RankedQuantity, VerifyResult
 from scissorcal.calibration.verify.study import Study, Task, run
@@ -40,7 +40,9 @@ def study_of(experiment: Linear, rho: float = 0.8, seed: int = 0, fit: Any = Non
     """A study whose simulated noise is that of :func:`made`."""
     noise = ArNoise(1, (rho,), 0.3 * np.sqrt(1 - rho**2))
     simulator = LinearSimulator(experiment, noise, float(TRUTH[3]))
-    return make_study(experiment, fit or fit_of(experiment), simulator, seed=seed)
+    return make_study(
+        experiment, fit or fit_of(experiment), simulator, settings=StudySettings(seed=seed)
+    )
 
 
 def checked(experiment: Linear, checks: Any, fits: int = 0) -> tuple[Study, VerifyResult]:

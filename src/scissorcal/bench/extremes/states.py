@@ -13,7 +13,7 @@ from scissorcal.bench.extremes.exact_laws import mp
 from scissorcal.bench.extremes.quantities import QUANTITIES
 from scissorcal.kernel import ModelTables, Table
 from scissorcal.model import Cutting, Edge, Response
-from scissorcal.package.tables import fit_table
+from scissorcal.package.tables import TableLaw, fit_table
 
 REFERENCE_m = 3e-4
 """Indentation at which the quantity ``force`` holds: that of the recipes for paper."""
@@ -174,12 +174,15 @@ class State:
         length, response = self.values["blade_length"], cutting.response
         strongest = float(response.indentation_at(STRONGEST_N))
         edge = fit_table(
-            cutting.edge.offset_at, cutting.edge.slope_at, 0.0, 1.05 * length,
+            TableLaw(cutting.edge.offset_at, cutting.edge.slope_at, 0.0, 1.05 * length),
             tolerance=TABLE_TOLERANCE, largest=size,
         )  # fmt: skip
         force = fit_table(
-            response.force_at, response.stiffness_at, 0.0, min(1.05 * deepest, strongest),
-            tolerance=TABLE_TOLERANCE, monotone=True, largest=size,
+            TableLaw(
+                response.force_at, response.stiffness_at, 0.0, min(1.05 * deepest, strongest),
+                monotone=True,
+            ),
+            tolerance=TABLE_TOLERANCE, largest=size,
         )  # fmt: skip
         nothing = Table(*np.array([[0, 1], [0, 0], [0, 0]], dtype=np.float32))
         tables = ModelTables(

@@ -41,9 +41,7 @@ def compare_cuts(
     def others(here: Mask) -> Array:
         return find_optimum(rung.problem(design.series, ~here)).point
 
-    return gather_recordings(
-        design, design.bins.recording, point, recordings, FitsApart(own, others), usual, rng
-    )
+    return gather_recordings(design, point, recordings, FitsApart(own, others), usual, rng)
 
 
 def between_notes(between: BetweenRecordings | None, nuisance: tuple[str, ...]) -> tuple[str, ...]:

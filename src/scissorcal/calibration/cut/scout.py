@@ -15,18 +15,17 @@ from scissorcal.calibration.cut.guess import (
     NoUnloadingError,
     first_guess,
 )
-from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.known import CutBasis
 from scissorcal.calibration.cut.laws import CutLaw, cut_layout
 from scissorcal.calibration.cut.likelihood import CutLikelihood
 from scissorcal.calibration.cut.model import CutExperiment, starting_point
 from scissorcal.calibration.cut.path import Material, PathMotion
-from scissorcal.calibration.cut.path.runs import FEWEST_SEGMENTS, find_runs
+from scissorcal.calibration.cut.path.runs import FEWEST_SEGMENTS
 from scissorcal.calibration.cut.segments import Segments, cut_into_segments
 from scissorcal.calibration.cut.structure import edge_layout, geometry_of, response_from
 from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
 from scissorcal.inference import Counter, Optimum, find_optimum
-from scissorcal.model import EdgeBelief, Response
-from scissorcal.recipe.schema import Recipe
+from scissorcal.model import Response
 
 ROUNDS = 2
 KAPPAS = np.linspace(0.05, 0.985, 188)
@@ -71,23 +70,18 @@ class Scouted:
         return self.line if self.accepted else None
 
 
-def scout(
-    motions: tuple[PathMotion, ...],
-    known: KnownFriction,
-    recipe: Recipe,
-    geometry: Geometry,
-    fracture: str,
-) -> Scouted:
+def scout(motions: tuple[PathMotion, ...], basis: CutBasis, fracture: str) -> Scouted:
     """Fit a power law twice, segment the recordings by its result, and look for the teeth.
 
     Raises NoUnloadingError where none was seen, CoarseEncoderError where the encoder shows too
     little of it, MisfitError where the law is nowhere near the data.
     """
-    materials = tuple(known.material(motion) for motion in motions)
+    recipe, geometry, data = basis.recipe, basis.geometry, basis.data(motions)
+    cuts, exponent = recipe.scene.cut, recipe.fit.cut.response_exponent
     rounds = [(False, False), (True, recipe.fit.cut.load_share != "none")]
-    known_point = _known_point(known, recipe, geometry, fracture)
+    known_point = _known_point(basis, fracture)
     if known_point is None:
-        guess = _guessed(motions, materials, recipe, geometry)
+        guess = first_guess(data, geometry, cuts=cuts, exponent=exponent)
         values = _values_of(guess, fracture)
     else:
         (values, guess), rounds = known_point, rounds[1:]
@@ -95,52 +89,33 @@ def scout(
     for unseen, loaded in rounds:
         law = CutLaw("power", fracture, loaded=loaded)
         for _ in range(ROUNDS if loaded else 1):
-            at = (motions, materials, geometry.at(values), guess, known.noise, known.stroke_sd)
-            segments = cut_into_segments(*at, recipe.scene.cut, unseen=unseen)
+            at = geometry.at(values)
+            segments = cut_into_segments(data, at, guess, cuts, unseen=unseen)
             if not segments.pieces and not unseen:
-                segments = cut_into_segments(*at, recipe.scene.cut)
+                segments = cut_into_segments(data, at, guess, cuts)
             if not segments.pieces:
                 refuse_coarse(segments)
                 raise NoUnloadingError("no stroke shows unloading")
-            design = make_experiment(segments, geometry, recipe, law, known, values)
+            design = make_experiment(segments, basis, law, values)
             optimum = _found(design)
             evaluations += optimum.evaluations
             values = _natural(design, optimum.point)
             guess = guess_at(design.key, values)
-    found = Scouted(segments, materials, values, None, False, float("nan"), "", evaluations)
+    found = Scouted(segments, data.materials, values, None, False, float("nan"), "", evaluations)
     if fracture != "rippled" or not segments.stretches:
         return found
-    return _with_line(found, design, optimum, recipe, known, geometry)
+    return _with_line(found, design, optimum, basis)
 
 
-def _guessed(
-    motions: tuple[PathMotion, ...],
-    materials: tuple[Material, ...],
-    recipe: Recipe,
-    geometry: Geometry,
-) -> Guess:
-    exponent = recipe.fit.cut.response_exponent
-    return first_guess(
-        motions,
-        materials,
-        find_runs(motions),
-        geometry,
-        cuts=recipe.scene.cut,
-        median_exponent=exponent.median,
-        log_sd_exponent=exponent.log_sd,
-    )
-
-
-def _known_point(
-    known: KnownFriction, recipe: Recipe, geometry: Geometry, fracture: str
-) -> tuple[dict[str, float], Guess] | None:
+def _known_point(basis: CutBasis, fracture: str) -> tuple[dict[str, float], Guess] | None:
     """Where a study of simulated data begins: at the mean of its truths, if that is a power law."""
+    recipe, known = basis.recipe, basis.friction
     if known.prior is None or known.prior.response != "power":
         return None
     law = CutLaw("power", fracture)
     layout = known.prior.layout(cut_layout(recipe, law, (known.closing_sd, known.opening_sd)))
     values = {name: float(value) for name, value in layout.natural(layout.mean).items()}
-    return values, guess_at({**law.key, **geometry_of(recipe, geometry.belief.edge)}, values)
+    return values, guess_at({**law.key, **geometry_of(recipe, basis.geometry.belief.edge)}, values)
 
 
 def refuse_coarse(segments: Segments) -> None:
@@ -161,14 +136,13 @@ def refuse_coarse(segments: Segments) -> None:
 
 def make_experiment(
     segments: Segments,
-    geometry: Geometry,
-    recipe: Recipe,
+    basis: CutBasis,
     law: CutLaw,
-    known: KnownFriction,
     values: Mapping[str, float],
     line: Line | None = None,
 ) -> CutExperiment:
     """One law over segments, with priors from the recipe; a search begins at ``values``."""
+    recipe, geometry, known = basis.recipe, basis.geometry, basis.friction
     layout = cut_layout(recipe, law, (known.closing_sd, known.opening_sd))
     edge = edge_layout(geometry.belief)
     whole = type(layout)((*layout.parameters, *edge.parameters))
@@ -221,15 +195,9 @@ def tooth_periods(
     return np.log(np.maximum(period, 1e-12)), torque
 
 
-def _with_line(
-    found: Scouted,
-    design: CutExperiment,
-    optimum: Optimum,
-    recipe: Recipe,
-    known: KnownFriction,
-    geometry: Geometry,
-) -> Scouted:
+def _with_line(found: Scouted, design: CutExperiment, optimum: Optimum, basis: CutBasis) -> Scouted:
     """Look for the teeth, test whether they agree with the rest, and fit again with them."""
+    geometry = basis.geometry
     first = _line(found, geometry, design)
     found = replace(found, without=found.values["kappa"])
     if first is None:
@@ -246,7 +214,7 @@ def _with_line(
     values, line, evaluations = dict(found.values), first, found.evaluations
     for _ in range(ROUNDS):
         values |= _kappa_at(values, geometry, found, line.log_period, line.stretches)
-        design = make_experiment(found.segments, geometry, recipe, design.law, known, values, line)
+        design = make_experiment(found.segments, basis, design.law, values, line)
         with_line = _found(design)
         evaluations += with_line.evaluations
         values = _natural(design, with_line.point)
@@ -343,14 +311,3 @@ def guess_at(structure: Mapping[str, Any], values: Mapping[str, float]) -> Guess
 
 def _natural(design: CutExperiment, point: Array) -> dict[str, float]:
     return {name: float(value) for name, value in design.layout.natural(point).items()}
-
-
-def belief_geometry(recipe: Recipe, belief: EdgeBelief) -> Geometry:
-    """The geometry of a recipe and an edge with its uncertainty."""
-    return Geometry(
-        belief,
-        recipe.upper_face_m,
-        recipe.rig.moving_blades,
-        recipe.fit.cut.reference_indentation_mm * 1e-3,
-        recipe.scene.closure,
-    )

@@ -1,20 +1,19 @@
 """What a design starts from: finished fits with their recordings, or the recipe's priors."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.fit import cut_experiment, cut_optimum
-from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.geometry import Geometry, belief_geometry
 from scissorcal.calibration.cut.known import USUAL_RATE, KnownFriction
 from scissorcal.calibration.cut.lack_of_fit import error_shares
 from scissorcal.calibration.cut.laws import CutLaw, allowed_laws, cut_layout
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.path import torque_noise_of
-from scissorcal.calibration.cut.scout import belief_geometry
 from scissorcal.calibration.cut.structure import edge_layout, edge_of, geometry_of
 from scissorcal.calibration.design.band import Sharing
 from scissorcal.calibration.design.information import (
@@ -25,7 +24,7 @@ from scissorcal.calibration.design.information import (
 )
 from scissorcal.calibration.design.knowledge import Knowledge
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.calibration.friction.layout import Drive, friction_layout, friction_precision
+from scissorcal.calibration.friction.layout import LawChoice, friction_layout, friction_precision
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
@@ -127,21 +126,20 @@ def expected_friction(recipe: Recipe) -> FrictionState:
     """
     settings = recipe.fit.friction
     law = EXPECTED_LAW if settings.rung == "auto" else settings.rung
-    symmetric, adopt = settings.symmetry == "symmetric", settings.adopt
+    choice = LawChoice(law, settings.symmetry == "symmetric", settings.adopt)
     centre = float(np.round(np.mean(recipe.scene.opening_rad), 3))
     structure = {
         "law": law,
-        "symmetric": symmetric,
+        "symmetric": choice.symmetric,
         "angle_center": centre,
-        "adopt": list(adopt),
+        "adopt": list(choice.adopt),
     }
     joint, priors = Joint("rotary"), settings.priors.of("rotary")
-    free = friction_layout(law, symmetric, joint, priors, adopt, Drive(False, TICK_S))
+    free = friction_layout(choice, joint, priors, TICK_S)
     size = float(free.natural(free.mean)["noise"])
     noise = TorqueNoise(size, size, EXPECTED_SLOW_S)
     zero_sd = float(np.sqrt(noise.variance_of_mean(round(2.0 * ZERO_S / TICK_S), TICK_S)))
-    drive = Drive(False, TICK_S, zero_sd)
-    layout = friction_layout(law, symmetric, joint, priors, adopt, drive)
+    layout = friction_layout(replace(choice, zero_sd=zero_sd), joint, priors, TICK_S)
     values = {name: float(value) for name, value in layout.natural(layout.mean).items()}
     floor = recipe.fit.cut.priors.friction_sd_floor_Nm
     known = KnownFriction(

@@ -7,7 +7,6 @@ import numpy as np
 
 from scissorcal.aliases import Array, Progress
 from scissorcal.calibration.candidates import Account, compare
-from scissorcal.calibration.edge.cells import EdgeCells
 from scissorcal.calibration.edge.model import (
     FAMILIES,
     CellData,
@@ -18,6 +17,7 @@ from scissorcal.calibration.edge.model import (
     search,
 )
 from scissorcal.calibration.edge.result import RungRow
+from scissorcal.inference import InferOptions
 from scissorcal.inference.infer import infer
 from scissorcal.inference.posterior import Effort
 from scissorcal.inference.status import SamplingStatus
@@ -55,8 +55,7 @@ class EdgeComparison:
 
 
 def compare_edges(
-    photographs: tuple[EdgeCells, ...],
-    length_m: float,
+    data: CellData,
     effort: Effort,
     rng: np.random.Generator,
     families: tuple[Family, ...] = FAMILIES,
@@ -74,7 +73,6 @@ def compare_edges(
     (`MOST_EVALUATIONS`, `SEARCH_EVALUATIONS`), and ``sentence`` says what came of it.
     """
     tell = progress or (lambda done, sentence: None)
-    data = CellData(photographs, length_m)
     found, evidences = [], []
     for number, family in enumerate(families):
         tell(0.4 * number / len(families), f"comparing edges: {family}")
@@ -93,8 +91,10 @@ def compare_edges(
         rng,
         count=_COUNT[effort],
         optimum=found[chosen].optimum,
-        progress=lambda done, sentence: tell(0.4 + 0.5 * done, sentence),
-        budget=MOST_EVALUATIONS[effort] or None,
+        options=InferOptions(
+            budget=MOST_EVALUATIONS[effort] or None,
+            progress=lambda done, sentence: tell(0.4 + 0.5 * done, sentence),
+        ),
     )
     draws = np.stack([_draw(evidence, u, rng) for u in posterior.draws])
     residual = data.offset - evidence.basis.columns @ draws.mean(axis=0)

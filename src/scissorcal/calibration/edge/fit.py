@@ -1,7 +1,7 @@
 """A blade's edge from photographs: a posterior of e(s), alpha(s) and the height over the scene."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from scissorcal.aliases import Array, Progress
 from scissorcal.calibration.edge.candidates import EdgeComparison, compare_edges
 from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
 from scissorcal.calibration.edge.checks import blade_verdicts
+from scissorcal.calibration.edge.model import CellData
 from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow
 from scissorcal.errors import InputError
 from scissorcal.inference import Effort
@@ -22,24 +23,31 @@ PLACES = 41
 HEIGHT_DRAWS = 400
 
 
+@dataclass(frozen=True)
+class Blade:
+    """Which blade is fitted; its length, where known, gives shapes without a scale their size."""
+
+    name: str = "blade"
+    length_m: float | None = None
+
+
 def fit_blade(
     measured: Sequence[BladeMeasurement],
     recipe: Recipe | None,
     *,
     effort: Effort = "standard",
     rng: np.random.Generator,
-    name: str = "blade",
-    length_m: float | None = None,
+    blade: Blade = Blade(),
     progress: Progress | None = None,
 ) -> BladeFit:
     """Fit one blade's edge to its measurements, one for each photograph.
 
-    ``length_m`` is the blade's known length, which gives shapes without a scale their size. Raises
-    InputError without any measurement, or where photographs with and without a scale are mixed.
+    Raises InputError without any measurement, or where photographs with and without a scale are
+    mixed.
     """
     if not measured:
         raise InputError("No photograph of a blade could be measured, so there is nothing to fit.")
-    sized = tuple(_sized(one, length_m) for one in measured)
+    sized = tuple(_sized(one, blade.length_m) for one in measured)
     if len({one.metric for one in sized}) > 1:
         raise InputError(
             "Photographs with and without a scale cannot be fitted together: give --length-mm, or "
@@ -50,7 +58,7 @@ def fit_blade(
     lengths = np.array([one.length for one in sized])
     length = float(np.median(lengths))
     cells = tuple(edge_cells(one, cells_each(len(sized))) for one in sized)
-    best = compare_edges(cells, length, effort, rng, priors=priors, progress=progress)
+    best = compare_edges(CellData(cells, length), effort, rng, priors=priors, progress=progress)
     first = min(float(c.station[0]) for c in cells)
     last = max(float(c.station[-1]) for c in cells)
     station = np.linspace(first, last, PLACES)
@@ -62,7 +70,7 @@ def fit_blade(
         for one in sized
     ]
     fit = BladeFit(
-        name,
+        blade.name,
         best.belief,
         best.draws,
         best.rows,

@@ -1,13 +1,12 @@
 """Fit mass and friction of the sledge to empty motion along the cut."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scissorcal.aliases import Integers
+from scissorcal.calibration.fit_run import FrictionRun
 from scissorcal.calibration.friction.commanded import (
     Actuation,
     as_sliding_joint,
@@ -16,9 +15,7 @@ from scissorcal.calibration.friction.commanded import (
 )
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.result import Effort, FitResult, Proposal
-from scissorcal.calibration.signals.zeros import FELT
 from scissorcal.errors import InputError
-from scissorcal.inference import Stop
 from scissorcal.recipe.friction import AdvanceSettings
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict
@@ -33,12 +30,7 @@ def fit_friction_advance(
     *,
     effort: Effort,
     rng: np.random.Generator,
-    progress: Callable[[float, str], None] | None = None,
-    checkpoint: Path | None = None,
-    last_chosen: str | None = None,
-    stop: Stop | None = None,
-    critic: bool = False,
-    tolerance: float = FELT,
+    run: FrictionRun = FrictionRun(),
 ) -> FitResult:
     """Identify mass, friction and offset of the sledge from empty motion of it.
 
@@ -55,18 +47,7 @@ def fit_friction_advance(
     try:
         actuation = find_actuation(recordings, settings.cutoff_Hz)
         sliding = sliding_joints(recordings, actuation, settings.lack_of_fit)
-        fit = fit_friction(
-            sliding,
-            settings,
-            effort=effort,
-            rng=rng,
-            progress=progress,
-            checkpoint=checkpoint,
-            last_chosen=last_chosen,
-            stop=stop,
-            critic=critic,
-            tolerance=tolerance,
-        )
+        fit = fit_friction(sliding, settings, effort=effort, rng=rng, run=run)
     except InputError as error:
         raise InputError(_renamed(str(error))) from error
     return _of_advance(fit, recordings, actuation)

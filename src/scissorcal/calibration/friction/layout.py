@@ -1,6 +1,8 @@
 """The parameters of a friction fit: rows of the table of terms, with the recipe's priors."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,53 +17,62 @@ SIDES = {"": "", "_pos": ", positive rate", "_neg": ", negative rate"}
 
 
 @dataclass(frozen=True)
-class Drive:
-    """What of the drive is fitted with friction.
+class LawChoice:
+    """The discrete choices of a friction law: its terms, symmetry and adopted terms.
 
-    ``cogging`` adds the two parameters of a torque that repeats over the opening. ``held_tick_s``
-    is the sampling interval where the drive is held by commands, so that it is measured late; None
-    where it is not. ``zero_sd`` is how well the sensors' zeros are known that were subtracted, None
+    ``cogging`` is the number of periods a turn of a torque that repeats over the opening, 0 where
+    there is none. ``zero_sd`` is how well the sensors' zeros are known that were subtracted, None
     where nothing shows them.
     """
 
-    cogging: bool = False
-    held_tick_s: float | None = None
+    name: str
+    symmetric: bool
+    adopt: tuple[str, ...] = ()
+    cogging: float = 0.0
     zero_sd: float | None = None
+
+    @classmethod
+    def of(cls, structure: Mapping[str, Any], zero_sd: float | None = None) -> "LawChoice":
+        """The choices of a finished fit, from its structure."""
+        return cls(
+            str(structure["law"]),
+            bool(structure["symmetric"]),
+            tuple(structure.get("adopt", ())),
+            float(structure.get("cogging_periods_per_turn", 0.0)),
+            zero_sd,
+        )
 
 
 def friction_layout(
-    law: str,
-    symmetric: bool,
-    joint: Joint,
-    priors: FrictionPriors,
-    adopt: tuple[str, ...] = (),
-    drive: Drive | None = None,
+    choice: LawChoice, joint: Joint, priors: FrictionPriors, held_tick_s: float | None = None
 ) -> Layout:
     """Lay out the parameters of a law and of the terms that it adopts; ``noise`` stands last.
 
+    ``held_tick_s`` is the sampling interval where the drive is held by commands, so that it is
+    measured late; None where it is not.
     The offset of a symmetric law is free. Unequal Coulomb levels contain one: that of an asymmetric
     law is what is left of the sensors' zeros, and has their standard deviation as its prior.
     """
-    drive = drive or Drive()
+    symmetric, adopt = choice.symmetric, choice.adopt
     left_out = {
-        "offset": not symmetric and drive.zero_sd is None,
-        "cogging_cos": not drive.cogging,
-        "cogging_sin": not drive.cogging,
-        "delay": drive.held_tick_s is None,
+        "offset": not symmetric and choice.zero_sd is None,
+        "cogging_cos": not choice.cogging,
+        "cogging_sin": not choice.cogging,
+        "delay": held_tick_s is None,
     }
-    own = terms_of(law)
+    terms = terms_of(choice.name)
     rows: list[Parameter] = []
     for term in PARAMETERS.values():
-        if left_out.get(term.name, bool(term.part) and term not in own):
+        if left_out.get(term.name, bool(term.part) and term not in terms):
             continue
         if term.nuisance and adopt:
             rows += _adopted(adopt, joint, priors)
             adopt = ()
         if term.name == "offset" and not symmetric:
-            assert drive.zero_sd is not None
-            rows.append(_zero(term, joint, drive.zero_sd))
+            assert choice.zero_sd is not None
+            rows.append(_zero(term, joint, choice.zero_sd))
             continue
-        rows += _rows(term, symmetric, joint, priors, drive.held_tick_s or 1.0)
+        rows += _rows(term, symmetric, joint, priors, held_tick_s or 1.0)
     return Layout(tuple(rows))
 
 

@@ -43,7 +43,6 @@ def fit_plate(
     plate_target: Pose = UNMOVED,
     rig: RigPose | None = None,
     places: PixelMap | None = None,
-    inputs_hash: str = "",
 ) -> PlateFit:
     """Fit one pose of the plate to all photographs of it, corners and photographs together.
 
@@ -94,7 +93,7 @@ def fit_plate(
         rms_px=whole.rms_px,
         noise_px=whole.sd_px,
         verdicts=plate_verdicts(whole, views, halves, camera, _there(photos, places), rig),
-        inputs_hash=inputs_hash,
+        inputs_hash="",
         sources=tuple(photo.name for photo in photos),
     )
 

@@ -1,6 +1,7 @@
 """The trust check as a whole: the fits that it needs, and their assessment."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,14 +30,20 @@ fit under test."""
 _HALVES_STREAM = 11
 
 
+@dataclass(frozen=True)
+class StudySettings:
+    """The seed of a study, and the prior that its truths are drawn from: see `generating_prior`."""
+
+    seed: int = 0
+    prior: PriorKind = "local"
+    spread: float = 3.0
+
+
 def make_study(
     experiment: Experiment,
     fit: FitResult,
     simulator: Simulator,
-    *,
-    seed: int,
-    prior: PriorKind = "local",
-    spread: float = 3.0,
+    settings: StudySettings,
     sheets: Mapping[int, int] | None = None,
 ) -> Study:
     """Define the simulations and the two halves for a finished fit.
@@ -46,12 +53,12 @@ def make_study(
     where the fit does not hold the draws it takes.
     """
     draws = unconstrained_draws(experiment, fit)
-    generating = generating_prior(experiment, draws, prior, spread)
+    generating = generating_prior(experiment, draws, settings.prior, settings.spread)
     return Study(
         experiment=experiment,
         simulator=simulator,
         effort=fit.effort,
-        seed=seed,
+        seed=settings.seed,
         generating=generating,
         start=draws.mean(axis=0),
         draws=FEWEST_DRAWS if _even(fit) else max(FEWEST_DRAWS, len(fit.draws)),

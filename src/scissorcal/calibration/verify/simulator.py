@@ -11,6 +11,7 @@ from scissorcal.calibration.comparison import names_of_contenders
 from scissorcal.calibration.cut import fit_cut
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path import torque_noise_of
+from scissorcal.calibration.fit_run import CutRun, FrictionRun
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.result import Effort, FitResult
@@ -97,8 +98,7 @@ class FrictionSimulator:
             self.settings,
             effort=effort,
             rng=rng,
-            last_chosen=self.rung,
-            prior=replace(prior, laws=self.contenders),
+            run=FrictionRun(last_chosen=self.rung, prior=replace(prior, laws=self.contenders)),
         )
 
     @property
@@ -157,9 +157,9 @@ class CutSimulator:
             self.friction,
             effort=effort,
             rng=rng,
-            edge=self.edge,
-            last_chosen=self.rung,
-            prior=replace(prior, laws=self.contenders),
+            run=CutRun(
+                edge=self.edge, last_chosen=self.rung, prior=replace(prior, laws=self.contenders)
+            ),
         )
 
 

@@ -169,7 +169,7 @@ def _fits(
 ) -> tuple["BladeFit", ...]:
     import numpy as np
 
-    from scissorcal.calibration.edge.fit import fit_blade
+    from scissorcal.calibration.edge.fit import Blade, fit_blade
     from scissorcal.vision.blade.photo import by_blade
 
     lengths = [c.index.blade.length_mm for c in captures if c.index.blade]
@@ -192,8 +192,7 @@ def _fits(
                 engine.recipe,
                 effort=request.effort,
                 rng=np.random.default_rng([request.seed, STREAM, index]),
-                name=name,
-                length_m=known,
+                blade=Blade(name=name, length_m=known),
                 progress=part,
             )
         )

@@ -90,17 +90,16 @@ def crack_law(cutting: Cutting, tick_s: float, sheet: Sheet | None = None) -> Cr
 def material_torque(
     cutting: Cutting,
     uneven: Unevenness,
-    opening: Array,
-    advance: Array,
-    sheets: NDArray[np.int64],
+    motion: tuple[Array, Array, NDArray[np.int64]],
     tick_s: float,
     rng: np.random.Generator,
 ) -> tuple[Array, tuple[CrackPath, ...]]:
     """Mean torque (n - 1,) of the material over each tick, and the walk through each sheet.
 
-    ``opening``, ``advance`` and ``sheets`` (n,) are by sample; a sheet that is put in (a change of
+    ``motion`` is opening, advance and sheet (n,) by sample; a sheet that is put in (a change of
     its number, -1 for none) is cut from its near edge on. Torque in N m, positive as it opens.
     """
+    opening, advance, sheets = motion
     torque = np.zeros(len(opening) - 1)
     bounds = np.concatenate([[0], np.flatnonzero(np.diff(sheets)) + 1, [len(sheets)]])
     paths = []

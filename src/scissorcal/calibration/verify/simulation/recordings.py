@@ -122,7 +122,7 @@ def _cut_drives(motion: Motion, truth: CutTruth, rng: np.random.Generator) -> li
         for name in ("opening", "advance", "sheet")
     )
     tick_s = motion.pieces[0].tick_s
-    torque, _ = material_torque(truth.cutting, truth.uneven, opening, advance, sheet, tick_s, rng)
+    torque, _ = material_torque(truth.cutting, truth.uneven, (opening, advance, sheet), tick_s, rng)
     first = np.concatenate([[0], np.cumsum(lengths)[:-1]])
     return [
         measured_drive(piece, truth.drive, torque[low : low + length - 1], rng)

@@ -1,9 +1,61 @@
-"""Which candidate models an effort fits: draft one, the others all of them."""
+"""How a fit is run, and which candidate models its effort fits: draft one, the others all."""
 
 from collections.abc import Callable, Container, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol, TypeVar
 
+from scissorcal.aliases import Progress
 from scissorcal.calibration.result import Effort
+from scissorcal.calibration.signals.zeros import FELT
+from scissorcal.calibration.stated_prior import StatedPrior
+from scissorcal.inference import Stop
+from scissorcal.model import EdgeBelief
+from scissorcal.verdicts import Verdict
+
+
+@dataclass(frozen=True)
+class FitRun:
+    """How a fit is run, beside its data, recipe, effort and random numbers.
+
+    ``checkpoint`` is a file from which an interrupted thorough fit continues, ``last_chosen`` the
+    law that draft effort fits where the recipe allows several. ``stop`` says whether the time
+    allowed is used up. ``prior`` replaces the recipe's in a study of simulated data, which goes
+    without the verdicts and diagnostics of a fit alone.
+    """
+
+    progress: Progress | None = None
+    checkpoint: Path | None = None
+    last_chosen: str | None = None
+    stop: Stop | None = None
+    prior: StatedPrior | None = None
+
+    def tell(self, done: float, sentence: str) -> None:
+        """Report progress to who follows the fit, if anyone."""
+        if self.progress:
+            self.progress(done, sentence)
+
+
+@dataclass(frozen=True)
+class FrictionRun(FitRun):
+    """How a fit of friction is run: ``critic`` asks for the critic at draft effort too.
+
+    ``tolerance`` is the share of torque by which what the critic finds is judged.
+    """
+
+    critic: bool = False
+    tolerance: float = FELT
+
+
+@dataclass(frozen=True)
+class CutRun(FitRun):
+    """How a fit of a cut is run, with the edge that photographs gave in the place of the recipe's.
+
+    Where one of ``edge_verdicts``, those on that edge, failed, the fit fails too.
+    """
+
+    edge: EdgeBelief | None = None
+    edge_verdicts: tuple[Verdict, ...] = ()
 
 
 class Named(Protocol):
