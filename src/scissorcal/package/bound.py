@@ -86,16 +86,7 @@ class ExactTorque:
         other = np.where(self.clear, np.clip(torque, -self.limit, self.limit), 0.0)
         return np.asarray(np.abs(other - self.torque) * self.weight)
 
-    @dataclass(frozen=True)
-class SearchGrid:
-    """Where tables are compared with the model: ranges, number of places, slowest rate (rad/s)."""
-
-    scene: Ranges
-    count: int
-    slowest: float
-
-
-def deviation(self, average: AverageTorque) -> Array:
+    def deviation(self, average: AverageTorque) -> Array:
         """How far a package's tables are from the exact model at each place, in N m."""
         points = self.points
         return self.away(average.torque(points.opening, points.opening_rate, points.contact))
