@@ -10,6 +10,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.candidates import (
     POSITIVE_EVIDENCE,
+    RELIABLE,
     RELIABLE_UNITS,
     Account,
     CandidateRow,
@@ -18,7 +19,6 @@ from scissorcal.calibration.candidates import (
     standard_error,
 )
 from scissorcal.calibration.fit_candidate import FittedCandidate
-from scissorcal.calibration.psis_loo import RELIABLE
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.recording.recording import Joint
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Protocol, TypeVar
 
 from scissorcal.aliases import Progress
+from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import Effort
 from scissorcal.calibration.signals.zeros import FELT
-from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import Stop
 from scissorcal.model import EdgeBelief
 from scissorcal.verdicts import Verdict

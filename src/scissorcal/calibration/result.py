@@ -334,7 +334,7 @@ class Predictive:
     parameters), columns in the order of ``parameters``, in SI, are the draws of the chosen
     candidate at which they hold, row by row: equally weighted draws of the posterior whose
     likelihood is taken to such a power
-    (:func:`scissorcal.calibration.psis_loo.leave_strokes_out`). The draws of the result are of
+    (:func:`scissorcal.calibration.candidates.leave_strokes_out`). The draws of the result are of
     another, which is wider by what recordings differ in and by what the law lacks.
     """
 

@@ -2,13 +2,12 @@
 
 from scissorcal.inference.ar_noise import ArNoise, fit_ar
 from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
-from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.curvature import gradient, hessian
+from scissorcal.inference.importance import smooth_weights
 from scissorcal.inference.infer import infer
 from scissorcal.inference.optimise import Cluster, Optimum, find_optimum
-from scissorcal.inference.pareto import smooth_weights
 from scissorcal.inference.posterior import Effort, InferOptions, Posterior
-from scissorcal.inference.problem import Problem
+from scissorcal.inference.problem import Counter, Problem, Stop
 from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus
 from scissorcal.inference.tails import log_density, tails_of
 

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.inference.counting import Stop
-from scissorcal.inference.problem import Problem
+from scissorcal.inference.problem import Problem, Stop
 from scissorcal.inference.squares import Descent
 
 STEP = 0.02

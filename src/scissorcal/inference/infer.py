@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.inference.counting import Counter, TimeUsedUpError
+from scissorcal.inference.autocorrelation import long_run_covariance
 from scissorcal.inference.importance import (
     DEFENSIVE,
     GOOD_K,
@@ -17,12 +17,11 @@ from scissorcal.inference.importance import (
     sample_by_proposal,
 )
 from scissorcal.inference.laplace import Laplace, Shape, laplace, local_covariance, polish
-from scissorcal.inference.long_run import long_run_covariance
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.nested import nested_mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, InferOptions, Posterior
-from scissorcal.inference.problem import Problem
+from scissorcal.inference.problem import Counter, Problem, TimeUsedUpError
 from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus, about, picked
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 from scissorcal.aliases import Array, Progress
-from scissorcal.inference.counting import Stop
 from scissorcal.inference.optimise import Cluster, Optimum
+from scissorcal.inference.problem import Stop
 from scissorcal.inference.status import SamplingStatus
 
 Effort = Literal["draft", "standard", "thorough"]

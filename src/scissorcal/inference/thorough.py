@@ -8,9 +8,9 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.inference.checkpoint import RandomState, Walk, load_walks, save_walks
-from scissorcal.inference.counting import TimeUsedUpError
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.posterior import InferOptions
+from scissorcal.inference.problem import TimeUsedUpError
 from scissorcal.inference.status import NotFiniteError, SamplingStatus
 
 ENSEMBLES = 4

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_cut
-from scissorcal.calibration.cut.between import NOT_KNOWN
 from scissorcal.calibration.cut.known import MaterialData
 from scissorcal.calibration.cut.usage import FREE, STARTING, usage_of_segments, usage_sentence
+from scissorcal.calibration.cut.widening import NOT_KNOWN
 from scissorcal.calibration.signals.usage import INVALID
 from scissorcal.recording.recording import Stroke
 from tests.calibration.cut.made_cuts import GEOMETRY, GUESS, HIGH, LOW, NOISE, cut, way

@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.edge import fit as edge_fit
-from scissorcal.calibration.edge.candidates import MOST_EVALUATIONS, compare_edges
 from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
-from scissorcal.calibration.edge.fit import Blade, fit_blade, merged_nicks
+from scissorcal.calibration.edge.fit import (
+    Blade,
+    compare_edges,
+    fit_blade,
+    merged_nicks,
+)
 from scissorcal.calibration.edge.model import (
+    MOST_EVALUATIONS,
     SEARCH_EVALUATIONS,
     CellData,
     EdgeEvidence,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.friction.cogging import FALSE_ALARM, find_cogging
 from scissorcal.calibration.friction.layout import LawChoice
 from scissorcal.calibration.friction.model import design
+from scissorcal.calibration.friction.noise import FALSE_ALARM, find_cogging
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.model import FrictionLaw
 from scissorcal.recipe.priors import JointPriors

@@ -10,9 +10,15 @@ import pytest
 
 from scissorcal.calibration import FitResult
 from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
-from scissorcal.calibration.verify.generating import Generating, generating_prior, refit_prior
 from scissorcal.calibration.verify.result import RankedQuantity, VerifyResult
-from scissorcal.calibration.verify.study import Study, Task, run
+from scissorcal.calibration.verify.study import (
+    Generating,
+    Study,
+    Task,
+    generating_prior,
+    refit_prior,
+    run,
+)
 from scissorcal.calibration.verify.verdicts import held_by_90
 from scissorcal.errors import InputError, MissingError
 from scissorcal.inference import ArNoise, infer

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.fit_candidate import Candidate, Likelihood
-from scissorcal.calibration.parameters import Layout, Parameter
+from scissorcal.calibration.parameters import Layout, Parameter, StatedPrior
 from scissorcal.calibration.result import Effort, FitResult, StrokeError
-from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import ArNoise, Posterior, Problem, infer
 from scissorcal.model.transforms import IDENTITY, LOG
 

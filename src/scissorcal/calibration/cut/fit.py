@@ -9,14 +9,6 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.assemble import CriticRequest, Particulars, assemble
 from scissorcal.calibration.between import BetweenRecordings, widened
 from scissorcal.calibration.comparison import choose
-from scissorcal.calibration.cut.averaging import (
-    AveragedLaw,
-    Inferred,
-    average,
-    by_load,
-    load_note,
-)
-from scissorcal.calibration.cut.between import between_notes, compare_cuts
 from scissorcal.calibration.cut.checks import (
     cut_diagnostics,
     cut_verdicts,
@@ -26,7 +18,6 @@ from scissorcal.calibration.cut.checks import (
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import CoarseEncoderError, NoUnloadingError
 from scissorcal.calibration.cut.known import CutBasis, KnownFriction
-from scissorcal.calibration.cut.lack_of_fit import budget_of
 from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws, usual_law
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.path import PathMotion, path_motion
@@ -36,18 +27,31 @@ from scissorcal.calibration.cut.scout import (
     make_experiment,
     scout,
 )
-from scissorcal.calibration.cut.toughness import with_toughness
-from scissorcal.calibration.cut.unknowns import with_unknowns
+from scissorcal.calibration.cut.unknowns import with_toughness, with_unknowns
 from scissorcal.calibration.cut.usage import counted, usage_of_segments, usage_sentence
+from scissorcal.calibration.cut.widening import (
+    AveragedLaw,
+    Inferred,
+    average,
+    between_notes,
+    budget_of,
+    by_load,
+    compare_cuts,
+    load_note,
+)
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.fit_model import Outcome
 from scissorcal.calibration.fit_run import CutRun, candidates_for, draft_note
+from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.calibration.signals.interruptions import Interruptions, interruptions
 from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
-from scissorcal.calibration.signals.soundness import farthest_torque, refuse_unsound
+from scissorcal.calibration.signals.soundness import (
+    Interruptions,
+    farthest_torque,
+    interruptions,
+    refuse_unsound,
+)
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros
-from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.errors import InputError
 from scissorcal.inference import InferOptions, infer
 from scissorcal.model import EdgeBelief

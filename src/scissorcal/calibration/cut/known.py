@@ -14,11 +14,11 @@ from scissorcal.calibration.cut.path import (
     torque_noise_of,
 )
 from scissorcal.calibration.cut.structure import edge_of
-from scissorcal.calibration.friction.typical import friction_and_offset, typical_values
+from scissorcal.calibration.friction.layout import friction_and_offset, typical_values
+from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.zeros import DriveZero
-from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.model import EdgeBelief, FrictionLaw
 from scissorcal.recipe.priors import CutPriors
 from scissorcal.recipe.schema import Recipe

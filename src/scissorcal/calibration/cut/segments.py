@@ -21,7 +21,7 @@ from scissorcal.calibration.cut.path import (
     sums_between,
     torque_covariance,
 )
-from scissorcal.calibration.cut.path.runs import FEWEST_SEGMENTS, Run, find_runs, split
+from scissorcal.calibration.cut.path.motion import FEWEST_SEGMENTS, Run, find_runs, split
 from scissorcal.calibration.cut.rests import (
     ELASTIC_SEGMENTS,
     LEAST_RANGE_RAD,

@@ -1,4 +1,4 @@
-"""Bounds on the scene's torque from quantities that were not measured: zeros, edge, load."""
+"""What a fit of cuts leaves unknown or does not state: toughness, and what a scene takes."""
 
 from dataclasses import dataclass, replace
 
@@ -7,11 +7,12 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.laws import LOADED
 from scissorcal.calibration.cut.structure import cutting_from
+from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.signals.idle import idle_zero
-from scissorcal.calibration.signals.zeros import DriveZero
+from scissorcal.calibration.signals.zeros import DriveZero, idle_zero
 from scissorcal.model import Cutting, edge_height, settled_contact
 from scissorcal.model.cutting import torque_at, within_thickness
+from scissorcal.model.transforms import LOG
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import STATED, TORQUE, Check, Verdict
@@ -245,3 +246,29 @@ def _load(
     usual = recipe.fit.cut.priors.load_share.sd
     said = f"jaw tools lose up to {usual:.0%} of the load to friction, and none was fitted."
     return usual * mean, said, f'{cure} Or set fit.cut.load_share = "auto".'
+
+
+MEANING = "fracture energy over thickness: energy per area of cut"
+
+
+def with_toughness(fit: FitResult, recipe: Recipe, rng: np.random.Generator) -> FitResult:
+    """Give a cut's fit its toughness, if the recipe says how well the thickness is known.
+
+    Torque determines the product J_c h alone, so each draw of it is divided by its own draw of the
+    thickness: log-normal, independent, with the recipe's mean and standard deviation. Its share of
+    1 goes into the toughness as it is. The fit is returned as it came where nothing is cut or
+    ``material.thickness_sd_mm`` is not given.
+    """
+    material, prior = recipe.material, recipe.fit.cut.toughness_J_per_m2
+    if material.thickness_sd_mm is None or prior is None:
+        return fit
+    names = [parameter.name for parameter in fit.parameters]
+    if "fracture_energy" not in names:
+        return fit
+    variance = float(np.log1p((material.thickness_sd_mm / material.thickness_mm) ** 2))
+    centre = float(np.log(material.thickness_mm * 1e-3)) - 0.5 * variance
+    thickness = centre + np.sqrt(variance) * rng.standard_normal(len(fit.draws))
+    u = np.log(fit.column("fracture_energy")) - thickness
+    row = Layout((Parameter("toughness", "J/m^2", LOG, *prior.normal(), MEANING),))
+    draws = u[:, None]
+    return replace(fit, derived=row.fitted(draws), derived_draws=row.columns(draws))

@@ -15,8 +15,7 @@ from scissorcal.calibration.design.choice import (
     Capture,
     Stock,
 )
-from scissorcal.calibration.design.information import Information
-from scissorcal.calibration.design.knowledge import Knowledge
+from scissorcal.calibration.design.information import Information, Knowledge
 
 Judge = Callable[[TorqueKnowledge], Band]
 

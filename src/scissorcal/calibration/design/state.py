@@ -10,19 +10,19 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.cut.fit import cut_experiment, cut_optimum
 from scissorcal.calibration.cut.geometry import Geometry, belief_geometry
 from scissorcal.calibration.cut.known import USUAL_RATE, KnownFriction
-from scissorcal.calibration.cut.lack_of_fit import error_shares
 from scissorcal.calibration.cut.laws import CutLaw, allowed_laws, cut_layout
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.path import torque_noise_of
 from scissorcal.calibration.cut.structure import edge_layout, edge_of, geometry_of
+from scissorcal.calibration.cut.widening import error_shares
 from scissorcal.calibration.design.band import Sharing
 from scissorcal.calibration.design.information import (
     Information,
+    Knowledge,
     cut_information,
     friction_information,
     line_information,
 )
-from scissorcal.calibration.design.knowledge import Knowledge
 from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.calibration.friction.layout import LawChoice, friction_layout, friction_precision
 from scissorcal.calibration.parameters import Layout

@@ -18,11 +18,6 @@ from scissorcal.calibration.between import (
 from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.calibration.fit_model import Outcome
 from scissorcal.calibration.fit_run import FrictionRun, candidates_for, draft_note
-from scissorcal.calibration.friction.against_probe import (
-    hidden_from_sweeps,
-    inertia_verdict,
-    with_pushed_inertia,
-)
 from scissorcal.calibration.friction.checks import (
     BANDWIDTH,
     bandwidth_verdict,
@@ -30,35 +25,37 @@ from scissorcal.calibration.friction.checks import (
     physical_verdict,
     start_verdict,
 )
-from scissorcal.calibration.friction.choice import choose_law, usual_law
-from scissorcal.calibration.friction.cogging import NO_COGGING, Cogging, find_cogging
-from scissorcal.calibration.friction.lack_of_fit import with_lack_of_fit
+from scissorcal.calibration.friction.choice import choose_law, usual_law, with_lack_of_fit
 from scissorcal.calibration.friction.layout import LawChoice
 from scissorcal.calibration.friction.model import FrictionExperiment, design
 from scissorcal.calibration.friction.noise import (
+    NO_COGGING,
+    Cogging,
     cogging_notes,
+    find_cogging,
     noise_diagnostics,
     sample_noise,
     stroke_offsets,
 )
-from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
-from scissorcal.calibration.friction.slow_friction import (
+from scissorcal.calibration.friction.probed import (
     SlowFriction,
+    hidden_from_sweeps,
+    inertia_verdict,
     opened,
     with_probed,
+    with_pushed_inertia,
 )
+from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
+from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import Effort, FitResult, FittedParameter, in_words
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.calibration.signals.idle import idle_noise
-from scissorcal.calibration.signals.interruptions import interruptions
 from scissorcal.calibration.signals.sensors import inspect_sensors
-from scissorcal.calibration.signals.soundness import refuse_unsound
+from scissorcal.calibration.signals.soundness import interruptions, refuse_unsound
 from scissorcal.calibration.signals.steadiness import Steadiness, steadiness
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.calibration.signals.window_length import HALF_AT
-from scissorcal.calibration.signals.zeros import DriveZero, without_zeros, zero_verdicts
-from scissorcal.calibration.stated_prior import StatedPrior
+from scissorcal.calibration.signals.zeros import DriveZero, idle_noise, without_zeros, zero_verdicts
 from scissorcal.inference import InferOptions, Posterior, infer
 from scissorcal.model.friction_terms import NUISANCE, needs_load
 from scissorcal.recipe.schema import FitFriction

@@ -13,10 +13,9 @@ from scissorcal.calibration.friction.columns import SCALES, FrictionBasis
 from scissorcal.calibration.friction.layout import LawChoice, friction_layout, friction_precision
 from scissorcal.calibration.friction.moments import ReducedLaw, StrokeMoments
 from scissorcal.calibration.friction.search import search
-from scissorcal.calibration.parameters import Layout
+from scissorcal.calibration.parameters import Layout, StatedPrior
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.weak_form import Windows
-from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, side_of, terms_of
 from scissorcal.model.terms import Role, Term
 from scissorcal.model.transforms import LOG

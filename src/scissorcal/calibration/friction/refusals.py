@@ -4,9 +4,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from scissorcal.calibration.signals.filtering import Bins, position_error
-from scissorcal.calibration.signals.interruptions import interruptions
 from scissorcal.calibration.signals.segments import gaps_in_words
 from scissorcal.calibration.signals.sensors import Sensors
+from scissorcal.calibration.signals.soundness import interruptions
 from scissorcal.calibration.signals.usage import EDGE, GAP, INVALID, SLOW, Usage
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.errors import InputError

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.camera.checks import CameraThere
 from scissorcal.calibration.camera.result import PixelMap
-from scissorcal.calibration.camera.there import CameraThere
 from scissorcal.calibration.plate.checks import plate_verdicts
 from scissorcal.calibration.plate.result import Halves, PlateFit, PlateView
 from scissorcal.errors import InputError, MissingError, VerdictError

@@ -13,10 +13,9 @@ from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path import torque_noise_of
 from scissorcal.calibration.fit_run import CutRun, FrictionRun
 from scissorcal.calibration.friction.fit import fit_friction
-from scissorcal.calibration.parameters import Layout
+from scissorcal.calibration.parameters import Layout, StatedPrior
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
-from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.calibration.verify.simulation import (
     Motion,
     cut_truth,

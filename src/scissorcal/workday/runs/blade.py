@@ -118,7 +118,7 @@ def _camera_verdicts(engine: "Engine", seen: Sequence["BladePhoto"]) -> tuple[Ve
     """How well the camera is known where the edges were; none where no fitted camera was used."""
     import numpy as np
 
-    from scissorcal.calibration.camera.there import CameraThere
+    from scissorcal.calibration.camera.checks import CameraThere
     from scissorcal.calibration.edge.checks import CAMERA
 
     fitted = _camera_fit(engine)
@@ -200,7 +200,7 @@ def _fits(
 
 
 def _draw(seen: Sequence["BladePhoto"], fits: Sequence["BladeFit"], folder: Path) -> None:
-    from scissorcal.calibration.edge.pictures import edge_picture
+    from scissorcal.calibration.fit_pictures import edge_picture
     from scissorcal.vision.overlay import write_picture
 
     by_name = {found.name: found for found in fits}

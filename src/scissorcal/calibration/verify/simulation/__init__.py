@@ -1,17 +1,21 @@
 """Simulated raw recordings of known parameters, with the motion of existing recordings."""
 
-from scissorcal.calibration.verify.simulation.crack import (
+from scissorcal.calibration.verify.simulation.motion import (
+    DriveTruth,
+    Motion,
+    SmoothPiece,
+    drawn_noise,
+    measured_drive,
+    motion_of,
+)
+from scissorcal.calibration.verify.simulation.recordings import (
+    CutTruth,
     Sheet,
     Unevenness,
     crack_law,
-    material_torque,
-)
-from scissorcal.calibration.verify.simulation.drive import DriveTruth, drawn_noise, measured_drive
-from scissorcal.calibration.verify.simulation.motion import Motion, SmoothPiece, motion_of
-from scissorcal.calibration.verify.simulation.recordings import (
-    CutTruth,
     cut_truth,
     friction_truth,
+    material_torque,
     simulate_cut,
     simulate_friction,
 )
