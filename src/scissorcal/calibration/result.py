@@ -418,6 +418,20 @@ class FitResult(Result):
                 return parameter
         raise KeyError(name)
 
+    @property
+    def best(self) -> dict[str, float]:
+        """Values by name: the most probable point, with nuisance parameters at their means."""
+        values = {p.name: float(v) for p, v in zip(self.parameters, self.map_point, strict=True)}
+        return values | {p.name: p.mean for p in self.nuisance}
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """Posterior draws (draws,) by name, those of nuisance parameters among them."""
+        columns = {p.name: self.draws[:, i] for i, p in enumerate(self.parameters)}
+        if self.nuisance_draws is None:
+            return columns
+        return columns | {p.name: self.nuisance_draws[:, i] for i, p in enumerate(self.nuisance)}
+
     def column(self, name: str) -> NDArray[np.float64]:
         """Return the posterior draws of one parameter, shape (draws,)."""
         names = [parameter.name for parameter in self.parameters]

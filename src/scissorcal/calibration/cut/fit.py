@@ -199,9 +199,7 @@ def cut_experiment(
     data = _Data.of(recordings, recipe, friction, edge)
     law = CutLaw.of(fit.structure)
     scouted = _scouted(data, [law])
-    ended = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
-    ended |= {p.name: p.mean for p in fit.nuisance}
-    return make_experiment(scouted.segments, data.basis, law, ended, scouted.accepted_line)
+    return make_experiment(scouted.segments, data.basis, law, fit.best, scouted.accepted_line)
 
 
 def cut_optimum(

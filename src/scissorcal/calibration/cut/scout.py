@@ -24,6 +24,7 @@ from scissorcal.calibration.cut.path.motion import FEWEST_SEGMENTS
 from scissorcal.calibration.cut.segments import Segments, cut_into_segments
 from scissorcal.calibration.cut.structure import edge_layout, geometry_of, response_from
 from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
+from scissorcal.calibration.parameters import Layout
 from scissorcal.inference import Counter, Optimum, find_optimum
 from scissorcal.model import Response
 
@@ -134,6 +135,22 @@ def refuse_coarse(segments: Segments) -> None:
     )
 
 
+def cut_prior(basis: CutBasis, law: CutLaw) -> tuple[Layout, Array]:
+    """The parameters of a law and of the edge, and the precision (p, p) of their prior."""
+    known, belief = basis.friction, basis.geometry.belief
+    layout = cut_layout(basis.recipe, law, (known.closing_sd, known.opening_sd))
+    edge = edge_layout(belief)
+    whole = type(layout)((*layout.parameters, *edge.parameters))
+    precision = np.diag(1.0 / whole.sd**2)
+    count = len(edge.parameters)
+    if count:
+        precision[-count:, -count:] = np.linalg.inv(belief.covariance)
+    if known.prior is not None:
+        stated = known.prior.of_response(law.response)
+        precision, whole = stated.precision(whole, precision), stated.layout(whole)
+    return whole, precision
+
+
 def make_experiment(
     segments: Segments,
     basis: CutBasis,
@@ -142,17 +159,8 @@ def make_experiment(
     line: Line | None = None,
 ) -> CutExperiment:
     """One law over segments, with priors from the recipe; a search begins at ``values``."""
-    recipe, geometry, known = basis.recipe, basis.geometry, basis.friction
-    layout = cut_layout(recipe, law, (known.closing_sd, known.opening_sd))
-    edge = edge_layout(geometry.belief)
-    whole = type(layout)((*layout.parameters, *edge.parameters))
-    precision = np.diag(1.0 / whole.sd**2)
-    count = len(edge.parameters)
-    if count:
-        precision[-count:, -count:] = np.linalg.inv(geometry.belief.covariance)
-    if known.prior is not None:
-        stated = known.prior.of_response(law.response)
-        precision, whole = stated.precision(whole, precision), stated.layout(whole)
+    recipe, geometry = basis.recipe, basis.geometry
+    whole, precision = cut_prior(basis, law)
     return CutExperiment(
         likelihood=CutLikelihood(
             segments, geometry, law.fracture, line if law.fracture == "rippled" else None

@@ -8,12 +8,13 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.fit import cut_experiment, cut_optimum
-from scissorcal.calibration.cut.geometry import Geometry, belief_geometry
-from scissorcal.calibration.cut.known import USUAL_RATE, KnownFriction
-from scissorcal.calibration.cut.laws import CutLaw, allowed_laws, cut_layout
+from scissorcal.calibration.cut.geometry import Geometry
+from scissorcal.calibration.cut.known import USUAL_RATE, CutBasis, KnownFriction
+from scissorcal.calibration.cut.laws import CutLaw, allowed_laws
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.path import torque_noise_of
-from scissorcal.calibration.cut.structure import edge_layout, edge_of, geometry_of
+from scissorcal.calibration.cut.scout import cut_prior
+from scissorcal.calibration.cut.structure import geometry_of
 from scissorcal.calibration.cut.widening import error_shares
 from scissorcal.calibration.design.band import Sharing
 from scissorcal.calibration.design.information import (
@@ -72,7 +73,7 @@ def fitted_friction(
 ) -> FrictionState:
     """What a finished fit of friction knows by its own recordings."""
     design = friction_experiment(recordings, recipe.fit.friction, fit)
-    point = _point(design.layout, fit)
+    point = design.layout.unconstrained(fit.best)
     noise = torque_noise_of(fit.diagnostics)
     stroke_sd = _number(fit.diagnostics.get("stroke_offset_sd_Nm"))
     told = friction_information(design, point, noise, stroke_sd)
@@ -100,7 +101,8 @@ def fitted_cut(
 ) -> CutState:
     """What a finished fit of a cut knows by its own recordings."""
     design = cut_experiment(recordings, recipe, friction, fit, edge)
-    return _cut_state(design, _point(design.layout, fit), recipe, _between(design.layout, fit))
+    point = design.layout.unconstrained(fit.best)
+    return _cut_state(design, point, recipe, _between(design.layout, fit))
 
 
 def latest_cut(
@@ -172,15 +174,9 @@ def expected_cut(
     fractures = ("none", "smooth", "rippled")
     laws = allowed_laws(recipe)
     law = max(laws, key=lambda one: (fractures.index(one.fracture), one.loaded))
-    geometry = belief_geometry(recipe, edge or edge_of(recipe))
-    known = friction.known
-    layout = cut_layout(recipe, law, (known.closing_sd, known.opening_sd))
-    edge_part = edge_layout(geometry.belief)
-    whole = type(layout)((*layout.parameters, *edge_part.parameters))
-    prior = np.diag(1.0 / whole.sd**2)
-    count = len(edge_part.parameters)
-    if count:
-        prior[-count:, -count:] = np.linalg.inv(geometry.belief.covariance)
+    basis = CutBasis.of(recipe, friction.known, edge)
+    layout, prior = cut_prior(basis, law)
+    geometry = basis.geometry
     structure = {**law.key, **geometry_of(recipe, geometry.belief.edge)}
     share = 0.01 * recipe.fit.cut.lack_of_fit_percent
     kinds = (
@@ -192,8 +188,8 @@ def expected_cut(
     )
     shares = dict.fromkeys(kinds, share)
     knowledge = Knowledge(
-        whole,
-        whole.mean,
+        layout,
+        layout.mean,
         prior,
         error_shares=shares,
         usual_scatter=recipe.fit.cut.between_recordings,
@@ -244,13 +240,6 @@ def _cut_state(
         usual_scatter=recipe.fit.cut.between_recordings,
     )
     return CutState(knowledge, design.key, design.law, design.likelihood.geometry)
-
-
-def _point(layout: Layout, fit: FitResult) -> Array:
-    """Where the fit ended, in unconstrained coordinates; nuisances at their means."""
-    values = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
-    values |= {p.name: p.mean for p in fit.nuisance}
-    return layout.unconstrained({name: values[name] for name in layout.names})
 
 
 def _by_recording(

@@ -41,7 +41,7 @@ def fit_friction_advance(
     """Identify mass, friction and offset of the sledge from empty motion of it.
 
     As :func:`~.fit.fit_friction`, with the commanded force for the drive, which no sensor measures:
-    how late it acts is found first (:func:`~.commanded.find_actuation`). Newtons are those of the
+    how late it acts is found first (:func:`find_actuation`). Newtons are those of the
     command: a motor that gives p percent less makes mass and levels p percent too large.
     """
     if not any(np.any(driven(recording)) for recording in recordings):

@@ -292,8 +292,7 @@ class _Folds:
                 "A band needs hold-out strokes, and there is only one stroke: record several "
                 "strokes, or two recordings, and fit again."
             )
-        values = {name: float(value) for name, value in _values(fit).items()}
-        return cls(normal, design.layout.unconstrained(values), strokes, recordings)
+        return cls(normal, design.layout.unconstrained(fit.best), strokes, recordings)
 
     def of_recording(self, label: int) -> Integers:
         """The strokes of one recording."""
@@ -331,8 +330,7 @@ class _Folds:
 
 def _values(fit: FitResult) -> dict[str, Array]:
     """The fit's best point by name, nuisance parameters at their means."""
-    values = {p.name: np.asarray(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
-    return values | {p.name: np.asarray(p.mean) for p in fit.nuisance}
+    return {name: np.asarray(value) for name, value in fit.best.items()}
 
 
 def _carried(design: FrictionExperiment, windows: Windows) -> Integers:

@@ -154,10 +154,7 @@ def unconstrained_draws(
 
     ``chosen`` (n,) picks draws, all if None. Raises MissingError where the fit lacks a parameter.
     """
-    columns = {parameter.name: fit.draws[:, i] for i, parameter in enumerate(fit.parameters)}
-    if fit.nuisance_draws is not None:
-        columns |= {p.name: fit.nuisance_draws[:, i] for i, p in enumerate(fit.nuisance)}
-    layout = experiment.layout
+    columns, layout = fit.columns, experiment.layout
     missing = [name for name in layout.names if name not in columns]
     if missing:
         raise MissingError(
