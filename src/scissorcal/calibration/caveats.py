@@ -105,7 +105,8 @@ def next_recording_sentence(fit: FitResult) -> str:
 
 def _concerns(row: _Row, name: str) -> bool:
     return any(
-        name == one or (one.endswith("*") and name.startswith(one[:-1])) for one in row.parameters
+        name == parameter or (parameter.endswith("*") and name.startswith(parameter[:-1]))
+        for parameter in row.parameters
     )
 
 

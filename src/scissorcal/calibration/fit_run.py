@@ -85,12 +85,12 @@ def candidates_for(
     those that ``among`` names, if any. A name that no candidate has is passed over: the recipe may
     have changed since. ValueError where there is no candidate.
     """
-    candidates = [one for one in candidates if one.name in among] or candidates
+    candidates = [candidate for candidate in candidates if candidate.name in among] or candidates
     if not candidates:
         raise ValueError("The recipe allows no law, so there is no candidate model to fit.")
     if effort != "draft" or len(candidates) == 1:
         return tuple(candidates)
-    chosen = [one for one in candidates if one.name == last_chosen]
+    chosen = [candidate for candidate in candidates if candidate.name == last_chosen]
     return tuple(chosen[:1]) or (usual(candidates),)
 
 

@@ -221,7 +221,7 @@ def worst_stroke(errors: Sequence[StrokeError]) -> StrokeError | None:
     (Bonferroni): a stroke of a few samples is the worst only if chance would not make it so. Where
     no stroke states its independent samples, errors are compared.
     """
-    known = [one for one in errors if np.isfinite(one.relative_rms)]
+    known = [error for error in errors if np.isfinite(error.relative_rms)]
     if not known:
         return None
     tail = 0.05 / len(known)

@@ -81,9 +81,9 @@ def response_curve(fit: FitResult) -> ResponseCurve:
     force = drawn.response.force_at(x[None, :])
     band = np.quantile(force, [0.05, 0.95], axis=0)
     others = tuple(
-        OtherResponse(str(one["name"]), bool(one.get("equivalent")), _force_of(one, fit, x))
-        for one in fit.rungs
-        if not one.get("chosen")
+        OtherResponse(str(rung["name"]), bool(rung.get("equivalent")), _force_of(rung, fit, x))
+        for rung in fit.rungs
+        if not rung.get("chosen")
     )
     return ResponseCurve(
         float(low), float(high), x, force.mean(axis=0), band[0], band[1], indentation, measured,
@@ -256,7 +256,9 @@ def fracture_work(
     if cutting.fracture_energy is None:
         raise MissingError("Nothing is cut in this scene, so there is no fracture work.")
     hashes = [source.rpartition(" sha256:")[2] for source in fit.sources]
-    known = {one.content_hash: one for one in recordings if one.content_hash}
+    known = {
+        recording.content_hash: recording for recording in recordings if recording.content_hash
+    }
     chosen = tuple(known[digest] for digest in hashes if digest in known)
     if not chosen or len(chosen) < len(hashes):
         raise MissingError(

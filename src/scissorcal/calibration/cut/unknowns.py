@@ -146,7 +146,7 @@ def find_unknowns(
 
 def _rig_limit(recordings: tuple[Recording, ...]) -> float:
     """The least torque limit (N m) that the rigs of the recordings state, infinite if none does."""
-    stated = [one.device.get("torque_limit") for one in recordings]
+    stated = [recording.device.get("torque_limit") for recording in recordings]
     return min((float(limit) for limit in stated if isinstance(limit, float)), default=np.inf)
 
 

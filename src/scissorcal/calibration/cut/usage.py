@@ -67,7 +67,7 @@ def counted(
     recordings: tuple[Recording, ...], usable: tuple[Mask, ...], motions: Sequence[PathMotion]
 ) -> str:
     """What is left of the recordings after each filter of a fit of cuts, in seconds."""
-    ticks = [one.duration_s / max(len(one.samples) - 1, 1) for one in recordings]
+    ticks = [recording.duration_s / max(len(recording.samples) - 1, 1) for recording in recordings]
     recorded = sum(tick * len(good) for tick, good in zip(ticks, usable, strict=True))
     sound = sum(tick * np.count_nonzero(good) for tick, good in zip(ticks, usable, strict=True))
     kept = under = moving = 0.0

@@ -106,7 +106,7 @@ def outlook(
         ]
         if not options:
             break
-        best = max(options, key=lambda one: one.gain)
+        best = max(options, key=lambda option: option.gain)
         if best.gain <= WORTH and not needed:
             break
         chosen.append(best)

@@ -104,7 +104,9 @@ def _of_advance(
             "delay_ticks": actuation.delay_ticks,
             "lag_ticks": actuation.lag_ticks,
         },
-        verdicts=tuple(_scoped(one) for one in fit.verdicts if one.check not in NO_SENSOR),
+        verdicts=tuple(
+            _scoped(verdict) for verdict in fit.verdicts if verdict.check not in NO_SENSOR
+        ),
         notes=(*(_renamed(note) for note in kept), late, scale),
         diagnostics={n: v for n, v in fit.diagnostics.items() if not n.startswith("zero_")},
         critic=tuple(_adopted(proposal) for proposal in fit.critic),

@@ -222,7 +222,7 @@ def _diagnostics(
     """What a fit stores beside its parameters: noise, scatter of strokes and of recordings."""
     point = chosen.optimum.point
     noise = sample_noise(law, point, idle_noise(recordings))
-    probe = newest_probe(one.device for one in recordings)
+    probe = newest_probe(recording.device for recording in recordings)
     seen = probe.facts if probe else {}
     residuals = chosen.candidate.likelihood.residuals(point)
     return {

@@ -251,7 +251,7 @@ class ReducedLaw:
     @cached_property
     def _transformed(self) -> list[tuple[Transform, Integers]]:
         """Each transform but the identity, with the places of its parameters."""
-        own = [one.transform for one in self.layout.parameters]
+        own = [parameter.transform for parameter in self.layout.parameters]
         kinds = [one for one in dict.fromkeys(own) if one != IDENTITY]
         return [(kind, np.flatnonzero([one == kind for one in own])) for kind in kinds]
 

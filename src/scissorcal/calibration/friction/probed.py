@@ -62,7 +62,7 @@ class SlowFriction:
         None without one, for a linear joint, where its pushes did not tell both values, and where a
         recipe states a prior of either.
         """
-        probe = probes.newest_probe(one.device for one in recordings)
+        probe = probes.newest_probe(recording.device for recording in recordings)
         found = probe.posterior if probe else None
         stated = settings.priors.rotary.model_fields_set & {_key(name) for name in FOUND}
         told = found is not None and set(FOUND.values()) <= set(found.names)
@@ -164,7 +164,7 @@ def with_pushed_inertia(
     pushed = hidden_from_sweeps(law, recordings)
     if pushed is None:
         return fit
-    place = [one.name for one in fit.parameters].index(NAME)
+    place = [parameter.name for parameter in fit.parameters].index(NAME)
     own = fit.parameters[place]
     sweeps = Estimate(own.mean, own.sd)
     spread = pushed.sd / pushed.mean
@@ -172,7 +172,7 @@ def with_pushed_inertia(
     draws[:, place] = pushed.mean * np.exp(spread * rng.standard_normal(len(draws)))
     point = fit.map_point.copy()
     point[place] = pushed.mean
-    prior_sd = next(one.sd for one in law.layout.parameters if one.name == NAME)
+    prior_sd = next(parameter.sd for parameter in law.layout.parameters if parameter.name == NAME)
     stated = replace(
         own,
         **FittedParameter.summary_of(draws[:, place]),
@@ -230,7 +230,7 @@ def hidden_from_sweeps(
 
 def _pushed(law: FrictionExperiment, recordings: tuple[Recording, ...]) -> Estimate | None:
     """The inertia of the newest probe's pushes; None without one, or of another joint."""
-    probe = newest_probe(one.device for one in recordings)
+    probe = newest_probe(recording.device for recording in recordings)
     return probe.inertia_kg_m2 if probe and law.joint.kind == "rotary" else None
 
 

@@ -77,7 +77,7 @@ def _too_little(
 def _motion_cause(recordings: tuple[Recording, ...], every: Windows) -> str:
     """Why the joint's own motion leaves too few windows without a rest or a turn."""
     unit, floor = recordings[0].joint.position_unit, every.bins.rate_floor
-    travel = max(float(np.ptp(one.samples["opening"])) for one in recordings)
+    travel = max(float(np.ptp(recording.samples["opening"])) for recording in recordings)
     below = float(np.mean(np.abs(every.rate) <= floor)) if len(every.rate) else 1.0
     window_s, stroke_s = len(every.weights) * every.tick_s, _stroke_s(recordings)
     if stroke_s < STROKE_WINDOWS * window_s:
@@ -104,17 +104,19 @@ def _motion_cause(recordings: tuple[Recording, ...], every: Windows) -> str:
 def _stroke_s(recordings: tuple[Recording, ...]) -> float:
     """Median time of the strokes; infinite where there are none."""
     found = [
-        float(np.median(np.diff(one.device_time_s))) * np.bincount(label[label >= 0])
-        for one in recordings
-        if np.any((label := np.asarray(one.samples["stroke"], dtype=np.int64)) >= 0)
+        float(np.median(np.diff(recording.device_time_s))) * np.bincount(label[label >= 0])
+        for recording in recordings
+        if np.any((label := np.asarray(recording.samples["stroke"], dtype=np.int64)) >= 0)
     ]
     return float(np.median(np.concatenate(found))) if found else float("inf")
 
 
 def _hiding(recordings: tuple[Recording, ...], unit: str) -> str:
     """What hides the sense of motion: the encoder's step, or the noise of the position."""
-    errors = [position_error(np.asarray(one.samples["opening"], float)) for one in recordings]
-    worst = max(errors, key=lambda one: one.sd)
+    errors = [
+        position_error(np.asarray(recording.samples["opening"], float)) for recording in recordings
+    ]
+    worst = max(errors, key=lambda error: error.sd)
     if np.isfinite(worst.step) and worst.sd < worst.step:
         turned = f" ({np.degrees(worst.step):.3g} deg)" if unit == "rad" else ""
         return f"the encoder's step of {worst.step:.3g} {unit}{turned}"

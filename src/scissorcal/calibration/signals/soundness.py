@@ -86,10 +86,12 @@ def _refuse_two_rigs(recordings: tuple[Recording, ...]) -> None:
                 "log again with --handle-radius-mm."
             )
     seen = {
-        str(one.device["serial"]): f"{_name(one)} ({one.device.get('name', 'rig')}, serial number "
-        f"{one.device['serial']})"
-        for one in reversed(recordings)
-        if one.device.get("serial")
+        str(
+            recording.device["serial"]
+        ): f"{_name(recording)} ({recording.device.get('name', 'rig')}, serial number "
+        f"{recording.device['serial']})"
+        for recording in reversed(recordings)
+        if recording.device.get("serial")
     }
     if len(seen) > 1:
         one, another, *_ = reversed(seen.values())

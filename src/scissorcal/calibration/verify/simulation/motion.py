@@ -95,7 +95,9 @@ def motion_of(
     that torque is as large as a noise of ``unseen_Nm`` (N m) a sample: it grows with the
     frequency's square.
     """
-    bridged = [bridge(one, np.ones(len(one.samples), dtype=bool)) for one in recordings]
+    bridged = [
+        bridge(recording, np.ones(len(recording.samples), dtype=bool)) for recording in recordings
+    ]
     filled = tuple(one.recording for one in bridged)
     found: dict[int, list[SmoothPiece]] = {index: [] for index in range(len(recordings))}
     for motion in path_motion(recordings, inertia):  # of filled ones, steps would seem finer
