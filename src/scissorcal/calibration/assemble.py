@@ -262,13 +262,15 @@ def predictive_of(
     them a draw of the noise is added. Candidates that are no :func:`~.comparison.contenders`, and
     draft effort, have no log-likelihoods.
     """
-    own = next(one for one in compared if one.candidate is chosen.candidate)
+    own = next(candidate for candidate in compared if candidate.candidate is chosen.candidate)
     share = best_of(list(compared)).share
     near = [] if effort == "draft" else contenders(compared)
-    sampled = [one for one in near if len(one.left_out.densities)]
+    sampled = [candidate for candidate in near if len(candidate.left_out.densities)]
     densities = np.zeros((RESAMPLED, len(np.unique(own.strokes)), len(sampled)))
-    for index, one in enumerate(sampled):
-        densities[:, :, index] = share * one.left_out.densities[_resampled(one.left_out)]
+    for index, candidate in enumerate(sampled):
+        densities[:, :, index] = (
+            share * candidate.left_out.densities[_resampled(candidate.left_out)]
+        )
     reference = densities.max(axis=(0, 2)) if sampled else np.zeros(densities.shape[1])
     densities -= reference[:, None]
     layout = own.candidate.layout
@@ -283,7 +285,7 @@ def predictive_of(
         parameters=layout.names,
         log_likelihood_reference=reference,
         independent_share=share,
-        candidates=tuple(one.name for one in sampled),
+        candidates=tuple(candidate.name for candidate in sampled),
         candidate_log_likelihoods=densities if sampled else None,
     )
 

@@ -193,8 +193,8 @@ def compare_recordings(
     of the recordings' estimates before they are compared (see
     :func:`scissorcal.inference.between.between_groups`).
     """
-    every = design.candidate(design.observed)
-    law, problem = every.reduced, every.problem(design.series)
+    candidate = design.candidate(design.observed)
+    law, problem = candidate.reduced, candidate.problem(design.series)
     if not isinstance(law, ReducedLaw):
         return None
 
@@ -227,8 +227,8 @@ def gather_recordings(
     ]
     if len(labels) < 2:
         return None
-    every = design.candidate(design.observed)
-    prior = every.prior_precision
+    candidate = design.candidate(design.observed)
+    prior = candidate.prior_precision
     points, covariances, precisions, estimates, errors = [], [], [], [], []
     for label in labels:
         here = index == label
@@ -237,7 +237,7 @@ def gather_recordings(
         points.append(own.optimum.point)
         covariances.append(own.covariance)
         precisions.append(likelihood)
-        estimates.append(_without_prior(own, likelihood, prior, every.prior_mean))
+        estimates.append(_without_prior(own, likelihood, prior, candidate.prior_mean))
         reached = (fits.others(here), point, own.optimum.point)
         errors.append(_error(design, recordings[label].source, here, reached))
     scatter = between_groups(
@@ -280,13 +280,13 @@ def jackknife(
     law, problem = rung.reduced, rung.problem(design.series)
     if not isinstance(law, ReducedLaw) or len(law.moments.labels) < 3:
         return {}
-    full, every = design.layout.columns(point), np.diag(law.information(point))
+    full, information = design.layout.columns(point), np.diag(law.information(point))
     left, repeated = [], np.ones(len(point), dtype=bool)
     labels, counts = law.moments.labels, law.moments.counts
     groups = [slice(k, None, MOST_GROUPS) for k in range(min(MOST_GROUPS, len(labels)))]
     for group in groups:
         rest = law.without(labels[group])
-        repeated &= np.diag(rest.information(point)) > REPEATED * every
+        repeated &= np.diag(rest.information(point)) > REPEATED * information
         seen = replace(problem, reduced=rest)
         left.append(design.layout.columns(search_from(seen, point).point))
     size = np.array([[law.counted / counts[group].sum()] for group in groups])

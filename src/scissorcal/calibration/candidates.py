@@ -222,9 +222,9 @@ def leave_strokes_out(
         if usable.sum() < DRAWS // 4:
             break
         tempered = share * densities[usable]
-        every = log_prior[usable] + tempered.sum(axis=1) - log_density[usable]
-        weights, k_hat = _smoothed(every[None, :])
-        tried.append((float(k_hat[0]), every, tempered, draws[usable]))
+        log_weights = log_prior[usable] + tempered.sum(axis=1) - log_density[usable]
+        weights, k_hat = _smoothed(log_weights[None, :])
+        tried.append((float(k_hat[0]), log_weights, tempered, draws[usable]))
         if k_hat[0] < GOOD:
             break
         shares = np.exp(weights[0])
@@ -234,10 +234,10 @@ def leave_strokes_out(
     if not tried:
         nothing = np.full(len(labelled), np.nan), np.full(len(labelled), np.inf)
         return LeftOut(*nothing, counter.calls)
-    _, every, tempered, points = min(tried, key=lambda one: one[0])
-    weights, k_hats = _smoothed((every[:, None] - tempered).T)
+    _, log_weights, tempered, points = min(tried, key=lambda attempt: attempt[0])
+    weights, k_hats = _smoothed((log_weights[:, None] - tempered).T)
     scores = np.asarray(logsumexp(weights + tempered.T, axis=1)) / share
-    whole, _ = _smoothed(every[None, :])
+    whole, _ = _smoothed(log_weights[None, :])
     return LeftOut(scores, k_hats, counter.calls, tempered / share, whole[0], points)
 
 

@@ -102,30 +102,30 @@ def infer(
     limits = replace(options, budget=options.budget or BUDGET[effort], progress=tell)
     run = _Run(problem, local, proposal, counter, rng, count, limits, beside)
     try:
-        found = run.at(effort)
+        outcome = run.at(effort)
     except NotFiniteError as error:
         if best.success:
             raise
         raise NotFiniteError(f"{best.sentence} So nothing could be sampled: {error}") from None
-    tell(1.0, found.sentence)
+    tell(1.0, outcome.sentence)
     return Posterior(
         names=problem.names,
         optimum=best,
-        draws=found.draws,
+        draws=outcome.draws,
         covariance=local.covariance,
-        k_hat=found.k_hat,
-        effective=found.effective,
+        k_hat=outcome.k_hat,
+        effective=outcome.effective,
         inflation=local.inflation,
         null=local.null,
         effort=effort,
-        effort_reached=found.reached,
-        status=found.status,
-        sentence=found.sentence,
+        effort_reached=outcome.reached,
+        status=outcome.status,
+        sentence=outcome.sentence,
         evaluations=best.evaluations + counter.calls,
-        r_hat=found.r_hat,
-        tau=found.tau,
-        ensembles=found.ensembles,
-        acceptance=found.acceptance,
+        r_hat=outcome.r_hat,
+        tau=outcome.tau,
+        ensembles=outcome.ensembles,
+        acceptance=outcome.acceptance,
         log_posterior=laplace(problem, shape, spread).log_posterior,
         noise_orders=worth.orders if worth else (),
         dispersion=worth.dispersion if worth else 1.0,
@@ -269,10 +269,10 @@ class _Run:
             before = self.counter.calls
             for mixture in _following(self.local, self.problem.curved, left):
                 joined = mixture.joined(proposal, DEFENSIVE)
-                found = sample_by_proposal(many, joined, self.count, self.rng, left())
-                said += f", {found.k_hat:.2f} with a proposal that follows the bend"
-                if found.trusted:
-                    return self._weighed(found, said)
+                outcome = sample_by_proposal(many, joined, self.count, self.rng, left())
+                said += f", {outcome.k_hat:.2f} with a proposal that follows the bend"
+                if outcome.trusted:
+                    return self._weighed(outcome, said)
             beside = min(beside, self.counter.calls - before)
             sampled = replace(sampled, limit=GOOD_K)
         if sampled.k_hat > GOOD_K and escalate:

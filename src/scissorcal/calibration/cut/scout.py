@@ -102,10 +102,10 @@ def scout(motions: tuple[PathMotion, ...], basis: CutBasis, fracture: str) -> Sc
             evaluations += optimum.evaluations
             values = _natural(design, optimum.point)
             guess = guess_at(design.key, values)
-    found = Scouted(segments, data.materials, values, None, False, float("nan"), "", evaluations)
+    scouted = Scouted(segments, data.materials, values, None, False, float("nan"), "", evaluations)
     if fracture != "rippled" or not segments.stretches:
-        return found
-    return _with_line(found, design, optimum, basis)
+        return scouted
+    return _with_line(scouted, design, optimum, basis)
 
 
 def _known_point(basis: CutBasis, fracture: str) -> tuple[dict[str, float], Guess] | None:
@@ -203,30 +203,32 @@ def tooth_periods(
     return np.log(np.maximum(period, 1e-12)), torque
 
 
-def _with_line(found: Scouted, design: CutExperiment, optimum: Optimum, basis: CutBasis) -> Scouted:
+def _with_line(
+    scouted: Scouted, design: CutExperiment, optimum: Optimum, basis: CutBasis
+) -> Scouted:
     """Look for the teeth, test whether they agree with the rest, and fit again with them."""
     geometry = basis.geometry
-    first = _line(found, geometry, design)
-    found = replace(found, without=found.values["kappa"])
+    first = _line(scouted, geometry, design)
+    scouted = replace(scouted, without=scouted.values["kappa"])
     if first is None:
         return replace(
-            found, reason="no stroke shows the teeth of a running crack as a spectral line."
+            scouted, reason="no stroke shows the teeth of a running crack as a spectral line."
         )
     if not first.at_two_speeds:
         return replace(
-            found,
+            scouted,
             line=first,
             reason="the teeth's line appears at one stroke speed only; two are needed.",
         )
     alone = design.candidate(design.observed).problem(design.series)
-    values, line, evaluations = dict(found.values), first, found.evaluations
+    values, line, evaluations = dict(scouted.values), first, scouted.evaluations
     for _ in range(ROUNDS):
-        values |= _kappa_at(values, geometry, found, line.log_period, line.stretches)
-        design = make_experiment(found.segments, basis, design.law, values, line)
+        values |= _kappa_at(values, geometry, scouted, line.log_period, line.stretches)
+        design = make_experiment(scouted.segments, basis, design.law, values, line)
         with_line = _found(design)
         evaluations += with_line.evaluations
         values = _natural(design, with_line.point)
-        again = _line(replace(found, values=values), geometry, design, near=True)
+        again = _line(replace(scouted, values=values), geometry, design, near=True)
         if again is None:
             break
         line = again
@@ -237,8 +239,8 @@ def _with_line(found: Scouted, design: CutExperiment, optimum: Optimum, basis: C
             f"the line's period is {away:.1f} standard deviations (limit {MOST_SDS:g}) from the "
             "rest of the data, as for encoder counts that alias with the samples."
         )
-        return replace(found, line=line, reason=reason, evaluations=evaluations)
-    return replace(found, values=values, line=line, accepted=True, evaluations=evaluations)
+        return replace(scouted, line=line, reason=reason, evaluations=evaluations)
+    return replace(scouted, values=values, line=line, accepted=True, evaluations=evaluations)
 
 
 def _found(design: CutExperiment) -> Optimum:
@@ -254,31 +256,33 @@ def _found(design: CutExperiment) -> Optimum:
 
 
 def _line(
-    found: Scouted, geometry: Geometry, design: CutExperiment, near: bool = False
+    scouted: Scouted, geometry: Geometry, design: CutExperiment, near: bool = False
 ) -> Line | None:
-    response = response_from(design.key, {k: np.asarray(v) for k, v in found.values.items()})
+    response = response_from(design.key, {k: np.asarray(v) for k, v in scouted.values.items()})
     rows = [
-        tooth_periods(geometry, response, found.values, geometry.running(_middles(found, index)))
-        for index in range(len(found.segments.stretches))
+        tooth_periods(
+            geometry, response, scouted.values, geometry.running(_middles(scouted, index))
+        )
+        for index in range(len(scouted.segments.stretches))
     ]
-    gain = 1.0 + float(found.values.get("load_share", 0.0))
-    offset = float(found.values.get("offset_closing", 0.0))
+    gain = 1.0 + float(scouted.values.get("load_share", 0.0))
+    offset = float(scouted.values.get("offset_closing", 0.0))
     growth = 1.0 / float(np.asarray(response.exponent))
     periods, torques = [row[0] for row in rows], [gain * row[1] + offset for row in rows]
-    signals = phase_signals(found.segments, found.materials, geometry, periods, torques, growth)
+    signals = phase_signals(scouted.segments, scouted.materials, geometry, periods, torques, growth)
     return find_line(signals, periods, torques, near)
 
 
-def _middles(found: Scouted, index: int) -> Array:
-    stretch = found.segments.stretches[index]
-    opening = found.segments.motions[stretch.motion].opening
+def _middles(scouted: Scouted, index: int) -> Array:
+    stretch = scouted.segments.stretches[index]
+    opening = scouted.segments.motions[stretch.motion].opening
     return 0.5 * (opening[stretch.ends[1:]] + opening[stretch.ends[:-1]])
 
 
 def _kappa_at(
     values: Mapping[str, float],
     geometry: Geometry,
-    found: Scouted,
+    scouted: Scouted,
     log_period: float,
     stretches: tuple[int, ...],
 ) -> dict[str, float]:
@@ -287,7 +291,7 @@ def _kappa_at(
     response = Response(
         "power", values["response_force"], values["response_exponent"], geometry.reference_m
     )
-    view = geometry.running(np.concatenate([_middles(found, index) for index in stretches])[::7])
+    view = geometry.running(np.concatenate([_middles(scouted, index) for index in stretches])[::7])
     misses = []
     for kappa in KAPPAS:
         tried = {**values, "kappa": kappa, "fracture_energy": 2.0 * mean / (1.0 + kappa)}

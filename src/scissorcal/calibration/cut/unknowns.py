@@ -116,12 +116,12 @@ def with_unknowns(
     lies within the data. A bound is no observed error: a large one rejects nothing; the check
     counts as not evaluated and names what to measure.
     """
-    found = find_unknowns(fit, recipe, friction, recordings)
+    unknowns = find_unknowns(fit, recipe, friction, recordings)
     limit = recipe.scene.tolerance_percent / 100.0
-    facts = {"not_measured": [dict(vars(one)) for one in found]}
+    facts = {"not_measured": [dict(vars(unknown)) for unknown in unknowns]}
     return replace(
         fit,
-        verdicts=(*fit.verdicts, *(_verdict(one, limit) for one in found)),
+        verdicts=(*fit.verdicts, *(_verdict(unknown, limit) for unknown in unknowns)),
         diagnostics={**fit.diagnostics, **facts},
     )
 
@@ -150,14 +150,16 @@ def _rig_limit(recordings: tuple[Recording, ...]) -> float:
     return min((float(limit) for limit in stated if isinstance(limit, float)), default=np.inf)
 
 
-def _verdict(one: Unknown, limit: float) -> Verdict:
-    size = f"Error up to {one.share:.1%} of the scene's mean torque ({one.torque_Nm:.2g} N m)"
-    if one.torque_Nm == 0.0:
+def _verdict(unknown: Unknown, limit: float) -> Verdict:
+    size = (
+        f"Error up to {unknown.share:.1%} of the scene's mean torque ({unknown.torque_Nm:.2g} N m)"
+    )
+    if unknown.torque_Nm == 0.0:
         size = "No torque error"
-    why = f"{size}: {one.spread} {one.removed_by}".rstrip()
-    if one.share > limit:
-        return UNKNOWNS[one.name].not_evaluated(why, one.share, threshold=limit)
-    return UNKNOWNS[one.name].judge(one.share, why, threshold=limit)
+    why = f"{size}: {unknown.spread} {unknown.removed_by}".rstrip()
+    if unknown.share > limit:
+        return UNKNOWNS[unknown.name].not_evaluated(why, unknown.share, threshold=limit)
+    return UNKNOWNS[unknown.name].judge(unknown.share, why, threshold=limit)
 
 
 def _opening_zero(scene: SceneMean, recipe: Recipe) -> tuple[float, str, str]:

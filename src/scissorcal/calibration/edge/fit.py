@@ -58,17 +58,17 @@ def fit_blade(
     """
     if not measured:
         raise InputError("No photograph of a blade could be measured, so there is nothing to fit.")
-    sized = tuple(_sized(one, blade.length_m) for one in measured)
-    if len({one.metric for one in sized}) > 1:
+    sized = tuple(_sized(measurement, blade.length_m) for measurement in measured)
+    if len({measurement.metric for measurement in sized}) > 1:
         raise InputError(
             "Photographs with and without a scale cannot be fitted together: give --length-mm, or "
             "leave one kind out."
         )
     metric = sized[0].metric
     priors = recipe.fit.blade.priors if recipe else BladePriors()
-    lengths = np.array([one.length for one in sized])
+    lengths = np.array([measurement.length for measurement in sized])
     length = float(np.median(lengths))
-    cells = tuple(edge_cells(one, cells_each(len(sized))) for one in sized)
+    cells = tuple(edge_cells(measurement, cells_each(len(sized))) for measurement in sized)
     best = compare_edges(CellData(cells, length), effort, rng, priors=priors, progress=progress)
     first = min(float(c.station[0]) for c in cells)
     last = max(float(c.station[-1]) for c in cells)
@@ -77,8 +77,14 @@ def fit_blade(
     rows = _rows(sized, cells, best)
     opening, contact, height = _height(best.belief, recipe, rng) if metric else _no_height()
     pivot = [
-        float(np.sqrt(np.mean(np.sum(np.square(one.modes[:, _columns(one, "pivot")]), axis=1))))
-        for one in sized
+        float(
+            np.sqrt(
+                np.mean(
+                    np.sum(np.square(measurement.modes[:, _columns(measurement, "pivot")]), axis=1)
+                )
+            )
+        )
+        for measurement in sized
     ]
     fit = BladeFit(
         blade.name,
@@ -127,32 +133,32 @@ def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
     )
 
 
-def _sized(one: BladeMeasurement, length_m: float | None) -> BladeMeasurement:
+def _sized(measurement: BladeMeasurement, length_m: float | None) -> BladeMeasurement:
     """The measurement in metres, or in blade lengths where nobody knows its size.
 
     The error of the length that gives the size stretches the edge along and across: a mode.
     """
-    if one.metric:
-        return one
-    factor = (length_m or 1.0) / (one.unit_length or one.length)
-    station, offset = one.station * factor, one.offset * factor
+    if measurement.metric:
+        return measurement
+    factor = (length_m or 1.0) / (measurement.unit_length or measurement.length)
+    station, offset = measurement.station * factor, measurement.offset * factor
     slope = smooth_slope(station, offset) if len(station) > 4 else 0.0
-    size = one.unit_length_sd * (offset - station * slope)
+    size = measurement.unit_length_sd * (offset - station * slope)
     return replace(
-        one,
+        measurement,
         station=station,
         offset=offset,
-        sd=one.sd * factor,
-        modes=np.column_stack([one.modes * factor, size]),
-        mode_names=(*one.mode_names, "size"),
-        length=one.length * factor,
-        hole_radius=one.hole_radius * factor,
+        sd=measurement.sd * factor,
+        modes=np.column_stack([measurement.modes * factor, size]),
+        mode_names=(*measurement.mode_names, "size"),
+        length=measurement.length * factor,
+        hole_radius=measurement.hole_radius * factor,
         metric=length_m is not None,
     )
 
 
-def _columns(one: BladeMeasurement, name: str) -> list[int]:
-    return [index for index, known in enumerate(one.mode_names) if known == name]
+def _columns(measurement: BladeMeasurement, name: str) -> list[int]:
+    return [index for index, known in enumerate(measurement.mode_names) if known == name]
 
 
 def _band(draws: Array) -> Band:
@@ -184,7 +190,7 @@ def _rows(
 ) -> tuple[PhotographRow, ...]:
     rows = []
     begin = 0
-    for one, own in zip(measured, cells, strict=True):
+    for measurement, own in zip(measured, cells, strict=True):
         count = len(own.station)
         residual = best.residual[begin : begin + count]
         begin += count
@@ -194,15 +200,15 @@ def _rows(
         spread = float(np.sqrt(np.mean(np.sum(own.modes[:, own_modes] ** 2, axis=1))))
         rows.append(
             PhotographRow(
-                one.source,
-                len(one.station),
-                one.edge.blur_px,
-                one.edge.good_share,
+                measurement.source,
+                len(measurement.station),
+                measurement.edge.blur_px,
+                measurement.edge.good_share,
                 own.spoilt,
-                one.length,
+                measurement.length,
                 float(residual.mean()),
                 float(np.hypot(spread, best.best.between_m)),
-                one.uncertainty,
+                measurement.uncertainty,
                 tuple(own.station.tolist()),
                 tuple(residual.tolist()),
             )
@@ -213,7 +219,7 @@ def _rows(
 def _notes(
     measured: Sequence[BladeMeasurement], best: "EdgeComparison", metric: bool
 ) -> tuple[str, ...]:
-    notes = list(dict.fromkeys(one.uncertainty for one in measured))
+    notes = list(dict.fromkeys(measurement.uncertainty for measurement in measured))
     if not metric:
         notes.append(
             "The edge is known up to its size: lengths are in blade lengths. Give the blade's "
@@ -281,10 +287,10 @@ def compare_edges(
         evidences.append(EdgeEvidence(data, basis_of(data, family, priors), priors))
         found.append(search(evidences[-1]))
     sizes = [evidence.basis.columns.shape[1] for evidence in evidences]
-    chosen = _chosen(families, sizes, [one.evidence for one in found])
+    chosen = _chosen(families, sizes, [searched.evidence for searched in found])
     rows = tuple(
-        _row(data, family, one, index == chosen)
-        for index, (family, one) in enumerate(zip(families, found, strict=True))
+        _row(data, family, searched, index == chosen)
+        for index, (family, searched) in enumerate(zip(families, found, strict=True))
     )
     evidence = evidences[chosen]
     posterior = infer(
@@ -301,7 +307,7 @@ def compare_edges(
     draws = np.stack([_draw(evidence, u, rng) for u in posterior.draws])
     residual = data.offset - evidence.basis.columns @ draws.mean(axis=0)
     belief, natural = _belief(data, families[chosen], draws)
-    others = sum(one.evaluations for index, one in enumerate(found) if index != chosen)
+    others = sum(searched.evaluations for index, searched in enumerate(found) if index != chosen)
     tell(1.0, f"edge fitted: {families[chosen]}")
     return EdgeComparison(
         rows,

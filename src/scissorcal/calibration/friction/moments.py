@@ -58,10 +58,10 @@ class StrokeMoments:
             if (b, a) in self._products:
                 return np.asarray(self._products[b, a].transpose(0, 2, 1))
             left, right = self._columns(a), self._columns(b)
-            found = np.zeros((len(self.labels), len(left), len(right)))
+            sums = np.zeros((len(self.labels), len(left), len(right)))
             for stroke, low, high in self._runs:
-                found[stroke] += left[:, low:high] @ right[:, low:high].T
-            self._products[a, b] = found
+                sums[stroke] += left[:, low:high] @ right[:, low:high].T
+            self._products[a, b] = sums
         return self._products[a, b]
 
     def squares(self, cell: Cell, factors: Array) -> Array:

@@ -158,7 +158,7 @@ def _shown(recording: Recording) -> "tuple[IdlePeriod, ...]":
     if force is not None and np.isfinite(recording.handle_radius_m):
         radius = recording.handle_radius_m
     pushed = (0.0, 0.0) if force is None else (force.mean, force.sd)
-    found = IdlePeriod(
+    before = IdlePeriod(
         time_s=0.0,
         torque=torque.mean,
         force_N=pushed[0],
@@ -166,7 +166,7 @@ def _shown(recording: Recording) -> "tuple[IdlePeriod, ...]":
         drive_sd=float(np.hypot(torque.sd, radius * pushed[1])),
         seconds=IDLE_S,
     )
-    return (found, *periods)
+    return (before, *periods)
 
 
 def _zero_of(periods: "tuple[IdlePeriod, ...]", unmeasured_sd: float) -> DriveZero:
@@ -272,16 +272,16 @@ def idle_zero(recordings: tuple[Recording, ...]) -> Zero | None:
 
 def idle_noise(recordings: tuple[Recording, ...]) -> float:
     """White noise of the drive's sensors (sd, N m or N) over idle periods; 0 without any."""
-    found = []
+    noises = []
     for recording in recordings:
         effort = recording.drive_effort
-        found += [noise_of(effort[span]) for span in idle_spans(recording)]
-    return float(np.median(found)) if found else 0.0
+        noises += [noise_of(effort[span]) for span in idle_spans(recording)]
+    return float(np.median(noises)) if noises else 0.0
 
 
 def idle_periods(recording: Recording) -> "tuple[IdlePeriod, ...]":
     """Means over each idle period of a recording, in order of time."""
-    found = []
+    periods = []
     has_force = bool(np.isfinite(recording.handle_radius_m))
     spans = idle_spans(recording)
     effort, time = recording.drive_effort, recording.device_time_s
@@ -289,7 +289,7 @@ def idle_periods(recording: Recording) -> "tuple[IdlePeriod, ...]":
     for span in spans:
         samples, drive = recording.samples[span], effort[span]
         seconds = tick * len(drive)
-        found.append(
+        periods.append(
             IdlePeriod(
                 time_s=float(time[span].mean()),
                 torque=float(samples["motor_torque"].mean()),
@@ -299,7 +299,7 @@ def idle_periods(recording: Recording) -> "tuple[IdlePeriod, ...]":
                 seconds=seconds,
             )
         )
-    return tuple(found)
+    return tuple(periods)
 
 
 def idle_spans(recording: Recording) -> list[slice]:
@@ -317,15 +317,15 @@ def idle_spans(recording: Recording) -> list[slice]:
     still = resolution_of(opening)
     still = max(STILL_STEPS * still if np.isfinite(still) else 0.0, STILL[recording.joint.kind])
     quiet = (command == 0.0) & (np.asarray(samples["stroke"]) < 0)
-    tick, found = _tick(recording), []
+    tick, spans = _tick(recording), []
     for first, last in pieces_of(recording):
         for low, high in zip(*stretches(quiet[first:last]), strict=True):
             begin, end = first + int(low), first + int(high)
             away = np.flatnonzero(np.abs(opening[begin:end] - opening[end - 1]) > still)
             begin += int(away[-1]) + 1 if len(away) else 0
             if (end - begin) * tick >= IDLE_S:
-                found.append(slice(begin, end))
-    return found
+                spans.append(slice(begin, end))
+    return spans
 
 
 def is_driven(recording: Recording) -> bool:
