@@ -2,7 +2,6 @@
 
 import pickle
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -23,7 +22,7 @@ from scissorcal.calibration.verify.verdicts import held_by_90
 from scissorcal.errors import InputError, MissingError
 from scissorcal.inference import ArNoise, infer
 
-from .toy import BINS, LAYOUT, Linear, LinearSimulator, as_fit
+from .toy import BINS, LAYOUT, Linear, LinearSimulator, StandIn, as_fit
 
 TRUTH = np.array([0.3, -0.5, np.log(0.8), np.log(0.3)])
 
@@ -121,7 +120,7 @@ class Refusing(LinearSimulator):
         draws = np.delete(fit.draws, 1, axis=1)
         other = {**fit.__dict__, "parameters": kept, "draws": draws, "rung": "flat"}
         other["column"] = lambda name: draws[:, [p.name for p in kept].index(name)]
-        return cast(FitResult, SimpleNamespace(**other))
+        return cast(FitResult, StandIn(**other))
 
 
 def test_refused_data_count_and_other_laws_rank_common_quantities():
