@@ -75,14 +75,16 @@ def test_one_failure_rejects_and_says_what_to_do() -> None:
     headline = headline_of(cut_fit())
     assert headline.stance == "reject"
     assert "whiteness failed" in headline.sentence
-    assert "residuals are autocorrelated" in headline.next_steps[0]
+    assert headline.next_steps[0] == next(
+        v.why for v in cut_fit().verdicts if v.check == "whiteness"
+    )
     assert "scissorcal fit cut" in headline.next_steps[-1]
 
 
-def test_an_unknown_failure_still_names_a_step() -> None:
+def test_a_failure_of_an_unknown_check_states_its_reason() -> None:
     odd = Verdict("fit.cut", "phase of the moon", "fail", 1.0, 0.5, "It waxes.")
     headline = headline_of(replace(cut_fit(), verdicts=(odd,)))
-    assert "Read why phase of the moon failed" in headline.next_steps[0]
+    assert headline.next_steps[0] == "It waxes."
 
 
 @pytest.mark.parametrize(
@@ -319,7 +321,7 @@ def test_a_panel_in_the_terminal_has_its_numbers_units_and_limits() -> None:
         Row("a", (Value("mean", 0.0213, "N m", sd=0.0002), Value("used", 3))),
         Row("b", (Value("mean", 1.5, "rad/s"),)),
     )
-    verdict = Verdict("fit.cut", "hold-out", "fail", 0.31, 0.2, "New strokes differ.")
+    verdict = Verdict("fit.cut", "hold-out", "fail", 0.31, 0.2, "New strokes differ.", "at most")
     text = panel_text(Panel("p", "cut", "Rows", "Two.", rows, verdicts=(verdict,)))
     assert columns(rows) == (("mean", ""), ("used", ""))
     assert "0.02130 ± 0.00020 N m" in text

@@ -29,9 +29,7 @@ CONTACT = Check(
     "control contact", "path on a surface: how often contact was lost or let go of", at_most=0.0
 )
 NO_FORCE = Check(
-    "control no force",
-    "force on a surface: what the balance made of none before, N",
-    at_most=STATED,
+    "control no force", "force on a surface: the balance's before the touch, N", at_most=STATED
 )
 
 

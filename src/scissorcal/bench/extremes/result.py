@@ -28,9 +28,7 @@ OUTCOMES: tuple[Outcome, ...] = ("right", "refused", "flagged", "not compared", 
 MOST_WRONG = 50
 Number = float | None
 WRONG = Check(
-    "bench wrong",
-    "answers of model and kernel: how many are neither right nor refused",
-    at_most=0.0,
+    "bench wrong", "answers of model and kernel: those neither right nor refused", at_most=0.0
 )
 
 

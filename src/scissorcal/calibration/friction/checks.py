@@ -36,9 +36,7 @@ KNOWN_NEAR_REST = Check(
 """Half width of an interval, share of friction: with as much from the rest, a recipe's tolerance of
 7 % of the torque is kept."""
 BANDWIDTH = Check(
-    "fit.friction bandwidth",
-    f"{INTERVALS}: sds that a parameter moves with the cutoff",
-    at_most=4.0,
+    "fit.friction bandwidth", f"{INTERVALS}: sds a parameter moves with the cutoff", at_most=4.0
 )
 """Posterior standard deviations by which a parameter may change with the cutoff."""
 

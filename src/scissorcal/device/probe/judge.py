@@ -32,9 +32,7 @@ GAIN_WARNING, GAIN_LIMIT = 0.05, 0.2
 """Torque in a fit errs as the gain does: 5 % is most of a recipe's tolerance of 7 %, 20 % is no
 calibration of any current sensor but a wrong scale."""
 FAULTS = Check("probe.motors faults", f"{MOTORS}: faults that do not clear", at_most=0.0)
-WATCHDOG_VALUE = Check(
-    "probe.motors watchdog value", f"{MOTORS}: whether BRAKE_AFTER_MS can be set"
-)
+WATCHDOG_VALUE = Check("probe.motors watchdog value", f"{MOTORS}: if BRAKE_AFTER_MS can be set")
 WATCHDOG = Check(
     "probe.motors watchdog", f"{MOTORS}: silence after which the device brakes, ms", at_most=STATED
 )
@@ -56,11 +54,9 @@ ENCODER_STEP = Check(
     "probe.sensors encoder step", f"{SENSORS}: step seen over step stated", at_most=1.5
 )
 """Halfway, in ratio, to the next count of an encoder that is counted by half or double."""
-TORQUE_ZERO = Check(
-    "probe.sensors torque zero", f"{SENSORS}: it is subtracted, N m", at_most=STATED
-)
+TORQUE_ZERO = Check("probe.sensors torque zero", f"{SENSORS}: subtracted, N m", at_most=STATED)
 TORQUE_NOISE = Check("probe.sensors torque noise", f"{SENSORS}: sd, N m", at_most=STATED)
-FORCE_ZERO = Check("probe.sensors force zero", f"{SENSORS}: it is subtracted, N", at_most=0.05)
+FORCE_ZERO = Check("probe.sensors force zero", f"{SENSORS}: subtracted, N", at_most=0.05)
 """At a radius of 60 mm, 3 mN m: a fifth of the friction of office scissors. It is subtracted."""
 FORCE_NOISE = Check("probe.sensors force noise", f"{SENSORS}: sd, N", at_most=0.5)
 HANDLE_RADIUS = Check(
@@ -104,7 +100,7 @@ def judge_watchdog(found: Watchdog, lag: Lag, tick_ms: float) -> list[Verdict]:
 def judge_follow(found: Follow) -> Verdict:
     """Verdict on measured against commanded torque."""
     gain, sd = found.gain.mean, found.gain.sd
-    limit = GAIN_LIMIT
+    limit = MEASURED_TORQUE.threshold
     if found.constant:
         why = (
             "motor_torque never changed, whatever was commanded: the device must send the torque "

@@ -27,9 +27,7 @@ LAG = Check(
 )
 """A loop that is so late holds a bandwidth of pi / 4 / 25 ms = 31 rad/s at a phase margin of 45
 degrees: blades then stay behind by 30 mrad at 1 rad/s, and no sweep is steady."""
-LOST_COMMANDS = Check(
-    "probe.line lost commands", f"{LINE}: share of single commands", at_most=0.005
-)
+LOST_COMMANDS = Check("probe.line lost commands", f"{LINE}: share of commands", at_most=0.005)
 """Share of commands. One in 200 lost lets two in a row go missing once a minute at 1 kHz."""
 
 
