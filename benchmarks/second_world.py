@@ -11,11 +11,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from benchmarks.consistency import mean_band, nees, share_held
 from scipy.spatial.transform import Rotation
 from tests.second_world import SHAPES, Scene, World, draw_world
 
 from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
-from scissorcal.tracking.consistency import mean_band, nees, share_held
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import PlateMotion, TrackingSettings
 from scissorcal.tracking.tracker import PoseTracker
@@ -75,9 +75,15 @@ def follow(
         rows.stamp_s.tolist(), rows.point_m, rows.force_N.tolist(), strict=True
     ):
         while waiting and waiting[0].arrives_s <= stamp:
-            seen = waiting.pop(0)
+            picture = waiting.pop(0)
             tracker.picture(
-                CameraPose(seen.stamp_s, seen.rotation, seen.place_m, seen.covariance, seen.certain)
+                CameraPose(
+                    picture.stamp_s,
+                    picture.rotation,
+                    picture.place_m,
+                    picture.covariance,
+                    picture.certain,
+                )
             )
         if contacts:
             tracker.contact(stamp, point, force)
@@ -87,15 +93,15 @@ def follow(
 def judge(world: World, tracker: PoseTracker) -> Ended:
     """Compare the pose at the last row's stamp with the truth at that time."""
     stamp = float(world.touches.stamp_s[-1])
-    found = tracker.estimate(stamp)
+    estimate = tracker.estimate(stamp)
     (axes,), (place,) = world.motion(np.array([stamp]))
-    turn = (Rotation.from_matrix(axes) * Rotation.from_matrix(found.rotation).inv()).as_rotvec()
-    error = np.concatenate([turn, place - found.place_m])
+    turn = (Rotation.from_matrix(axes) * Rotation.from_matrix(estimate.rotation).inv()).as_rotvec()
+    error = np.concatenate([turn, place - estimate.place_m])
     (touched,), (normal,), _ = world.shape.walk(world.touches.arcs_m[-1:])
-    away = found.place_m + found.rotation @ touched - place - axes @ touched
+    away = estimate.place_m + estimate.rotation @ touched - place - axes @ touched
     along = float(axes @ normal @ away)
     across = float(np.linalg.norm(away - along * (axes @ normal)))
-    return Ended(along, across, nees(error, found.covariance), found.counts.restarts)
+    return Ended(along, across, nees(error, estimate.covariance), estimate.counts.restarts)
 
 
 def runs(
@@ -103,26 +109,26 @@ def runs(
 ) -> tuple[list[Ended], list[Ended]]:
     """Runs of a case by pictures alone, and with contacts."""
     shape, scene = case[0], ROWS[case[1]]
-    found: tuple[list[Ended], list[Ended]] = ([], [])
+    ended: tuple[list[Ended], list[Ended]] = ([], [])
     for seed in seeds:
         world = draw_world(scene, SHAPES[shape], np.random.default_rng([SEED, seed]))
         for contacts in (False, True):
             tracker = follow(
                 world, SURFACES[shape], settings or settings_of(scene), contacts=contacts
             )
-            found[contacts].append(judge(world, tracker))
-    return found
+            ended[contacts].append(judge(world, tracker))
+    return ended
 
 
-def line(case: tuple[str, str], found: tuple[Sequence[Ended], Sequence[Ended]]) -> str:
+def line(case: tuple[str, str], ended: tuple[Sequence[Ended], Sequence[Ended]]) -> str:
     """A row of the table."""
     parts = [f"| {case[0]}, {case[1]} "]
-    medians = [1e3 * float(np.median([abs(one.normal_m) for one in part])) for part in found]
+    medians = [1e3 * float(np.median([abs(run.normal_m) for run in part])) for part in ended]
     parts.append(f"| {medians[0]:.3f} | {medians[1]:.3f} | {medians[1] / medians[0]:.2f} ")
-    across = (1e3 * float(np.median([one.across_m for one in part])) for part in found)
+    across = (1e3 * float(np.median([run.across_m for run in part])) for part in ended)
     parts += [f"| {value:.2f} " for value in across]
-    for part in found:
-        values = [one.nees for one in part]
+    for part in ended:
+        values = [run.nees for run in part]
         parts.append(f"| {np.mean(values):.1f}, {100.0 * share_held(values):.0f} % ")
     return "".join(parts) + "|"
 

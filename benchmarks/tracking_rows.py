@@ -12,8 +12,9 @@ from collections.abc import Callable
 from itertools import cycle
 
 import numpy as np
+from benchmarks.control.plates import probed_surface
 
-from scissorcal.model.surface import Cylinder, HeightField, Plane, Surface
+from scissorcal.model.surface import Cylinder, Plane, Surface
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.tracker import PoseTracker
 
@@ -32,19 +33,12 @@ def main() -> None:
 
     print("| row | us | times the solution of 24 equations |")
     print("|---|---|---|")
-    for name, surface in (("plane", Plane()), ("cylinder", Cylinder(0.03)), ("probed", _probed())):
+    surfaces = {"plane": Plane(), "cylinder": Cylinder(0.03), "probed": probed_surface()}
+    for name, surface in surfaces.items():
         print(_line(f"contact, {name}", Fed(surface).contact, yardstick))
     for late in (0, LATE_ROWS):
         fed = Fed(Plane(), late)
         print(_line(f"picture, {late} contacts late", fed.picture, yardstick, fed.between))
-
-
-def _probed() -> HeightField:
-    from scissorcal.bench.control.objects import plate_of
-
-    surface = plate_of("spline").surface
-    assert isinstance(surface, HeightField)
-    return surface
 
 
 class Fed:
@@ -82,8 +76,8 @@ def _line(
     yardstick: Callable[[], None],
     between: Callable[[], None] | None = None,
 ) -> str:
-    found = [(_seconds(row, between), _seconds(yardstick, None)) for _ in range(TURNS)]
-    took, plain = (float(np.median(part)) for part in zip(*found, strict=True))
+    timed = [(_seconds(row, between), _seconds(yardstick, None)) for _ in range(TURNS)]
+    took, plain = (float(np.median(part)) for part in zip(*timed, strict=True))
     return f"| {name} | {1e6 * took:.0f} | {took / plain:.1f} |"
 
 

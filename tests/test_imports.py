@@ -37,8 +37,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "tracking": {"model", "recipe"},
     "control": {"kernel", "model", "recipe", "recording", "device", "tracking"},
     "prototype": {"kernel", "model", "recipe", "recording", "package", "calibration", "report"},
-    "bench": LOWEST
-    | {"vision", "device", "calibration", "package", "render", "tracking", "control"},
+    "bench": LOWEST | {"vision", "device", "calibration", "package", "render"},
     "workday": LOWEST | MIDDLE | {"bench", "prototype"},
     "cli": LOWEST | MIDDLE | {"workday", "bench", "prototype"},
     "library": {"calibration", "package", "recipe", "recording", "workday"},

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from scissorcal.bench.trade.case import Case, Photographed
+from scissorcal.calibration.plate.checks import RESIDUALS
 from scissorcal.identity import file_digest
 from scissorcal.model import Edge, EdgeBelief
-from scissorcal.verdicts import judge
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.workday.runs import bench_case
 from scissorcal.workday.runs.bench_case import inputs_hash
@@ -59,7 +59,7 @@ def other_values(whole: Case) -> dict[str, Any]:
         "friction": (recording,),
         "cut": (recording,),
         "edge": replace(EDGE, covariance=np.diag([2e-10])),
-        "edge_verdicts": (judge("fit.plate", "residuals", 0.1, 0.3, "Said."),),
+        "edge_verdicts": (RESIDUALS.judge(0.1, "Said."),),
         "friction_fit": None,
         "cut_fit": None,
         "effort": "thorough",

@@ -206,7 +206,7 @@ def test_a_failed_verdict_is_three_and_prose_leaves_stdout_to_the_object(
     cli: Cli, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     verdicts = [
-        Verdict("fit.cut", "k-hat", "fail", 0.9, 0.7, "Far off."),
+        Verdict("fit.cut", "k-hat", "fail", 0.9, 0.7, "Far off.", "at most"),
         Verdict("fit.cut", "bounds", "not_evaluated", None, None, "No search."),
     ]
 

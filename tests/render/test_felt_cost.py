@@ -13,6 +13,7 @@ from scissorcal.render.admission import admit, rendered_tables
 from scissorcal.render.derating import softened
 from scissorcal.render.felt_cost import FeltTorque, felt_change, felt_rates, plate_strokes
 from scissorcal.render.result import felt_verdict
+from scissorcal.verdicts import TORQUE
 from tests.kernel.zoo import make_tables
 from tests.render.test_admission import ASKED, LIMIT, RIG
 
@@ -197,7 +198,7 @@ def test_the_verdict_fails_beyond_the_tolerance_and_says_what_cures_it() -> None
     verdict = felt_verdict(strict)
     assert (verdict.status, verdict.value) == ("fail", strict.felt_share)
     assert verdict.threshold == strict.tolerance
-    assert verdict.bounds_torque
+    assert verdict.guards.startswith(TORQUE)
     assert f"{strict.felt_share:.1%}" in verdict.why
     assert "A delay of" in verdict.why
     assert "--accept-derated" in verdict.why

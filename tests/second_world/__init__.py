@@ -1,6 +1,6 @@
 """A second world for judging the filter of a plate's pose, of other construction than the first.
 
-The first is scissorcal.bench.control.world. This one shares no code with it, with
+The first is benchmarks.control.world. This one shares no code with it, with
 scissorcal.tracking or with scissorcal.model: rotations are SciPy's, a plate moves as a body on
 springs or as a hand moves it, a picture's pose is solved from noisy projected corners, and a
 contact is a ball on a half-linear, half-Hertzian plate with creep, stick-slip and a drifting

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.consistency import mean_band, share_held
 from benchmarks.second_world import ROWS, SURFACES, follow, judge, runs, settings_of
-
-from scissorcal.tracking.consistency import mean_band, share_held
 
 from . import SHAPES, Scene, draw_world
 
@@ -28,13 +27,13 @@ def test_the_filter_is_consistent_in_a_world_it_was_not_made_in(case: tuple[str,
     False alarms: 0.1 % a mean, 0.8 % over all eight. A hand moves more smoothly than the filter's
     process, which makes the filter cautious there, so that its lower edge is not asked.
     """
-    found = runs(case, SEEDS)
+    both = runs(case, SEEDS)
     low, high = mean_band(RUNS, share=0.999)
-    for part in found:
-        mean = float(np.mean([one.nees for one in part]))
+    for part in both:
+        mean = float(np.mean([run.nees for run in part]))
         assert mean < high
         assert mean > low or case[1] == "carried by hand"
-    vision, contact = (float(np.median([abs(one.normal_m) for one in part])) for part in found)
+    vision, contact = (float(np.median([abs(run.normal_m) for run in part])) for part in both)
     assert contact < MOST[case[1]] * vision
 
 
@@ -48,17 +47,17 @@ def test_without_the_rigs_bias_the_filter_claims_too_much():
     scene = Scene(seconds=20.0)
     whole = settings_of(scene)
     none = replace(whole.contact, turn_bias_rad=0.0, place_bias_m=0.0)
-    found: dict[bool, list[float]] = {False: [], True: []}
+    scores: dict[bool, list[float]] = {False: [], True: []}
     for seed in range(510_000, 510_010):
         world = draw_world(scene, SHAPES["sphere 30 mm"], np.random.default_rng(seed))
-        for told in found:
+        for told in scores:
             settings = whole if told else replace(whole, contact=none)
             tracker = follow(world, SURFACES["sphere 30 mm"], settings, contacts=True)
-            found[told].append(judge(world, tracker).nees)
+            scores[told].append(judge(world, tracker).nees)
     _, high = mean_band(10, share=0.998)
-    assert np.mean(found[False]) > high
-    assert np.mean(found[True]) < min(1.5 * high, 0.8 * np.mean(found[False]))
-    assert share_held(found[True]) > share_held(found[False])
+    assert np.mean(scores[False]) > high
+    assert np.mean(scores[True]) < min(1.5 * high, 0.8 * np.mean(scores[False]))
+    assert share_held(scores[True]) > share_held(scores[False])
 
 
 def test_a_run_gives_a_pose_and_the_same_again():

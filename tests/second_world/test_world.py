@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.control import world as first_world
 from scipy.spatial.transform import Rotation
 
-from scissorcal.bench.control import world as first_world
 from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
 
 from . import SHAPES, Scene, draw_world
@@ -20,18 +20,22 @@ SURFACES: dict[str, Surface] = {
     "cylinder 30 mm": Cylinder(30e-3),
     "sphere 30 mm": Sphere(30e-3),
 }
-OUTSIDE = {"numpy", "scipy", "cv2", "math", "dataclasses", "collections"}
+ALIASES = "scissorcal.aliases"
+"""Names of types, without code."""
+OUTSIDE = {"numpy", "scipy", "cv2", "math", "dataclasses", "collections", ALIASES}
 
 
 def imported(path: Path) -> set[str]:
     """The packages that a file imports anywhere, those of its own folder as "."."""
-    found = set()
+    packages = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[0] for alias in node.names}
+            packages |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            found.add("." if node.level else (node.module or "").split(".")[0])
-    return found
+            module = node.module or ""
+            package = module if module == ALIASES else module.split(".")[0]
+            packages.add("." if node.level else package)
+    return packages
 
 
 def test_the_worlds_share_nothing_with_the_tracker_and_each_other():
@@ -81,31 +85,31 @@ def test_a_pictures_covariance_is_that_of_its_errors():
         errors = np.array(
             [
                 [
-                    *(true * Rotation.from_matrix(seen.rotation).inv()).as_rotvec(),
-                    *(place - seen.place_m),
+                    *(true * Rotation.from_matrix(picture.rotation).inv()).as_rotvec(),
+                    *(place - picture.place_m),
                 ]
-                for seen in world.pictures
+                for picture in world.pictures
             ]
         )
         errors -= errors.mean(axis=0)
         squares += [
-            error @ np.linalg.solve(seen.covariance, error)
-            for error, seen in zip(errors, world.pictures, strict=True)
+            error @ np.linalg.solve(picture.covariance, error)
+            for error, picture in zip(errors, world.pictures, strict=True)
         ]
-        assert all(seen.certain and not seen.mirrored for seen in world.pictures)
+        assert all(picture.certain and not picture.mirrored for picture in world.pictures)
     assert np.mean(squares) == pytest.approx(6.0, rel=0.1)
 
 
 def test_a_flat_view_has_mirrored_poses_that_are_not_made_up():
-    seen = [
-        one
+    pictures = [
+        picture
         for seed in range(6)
-        for one in draw_world(
+        for picture in draw_world(
             Scene(flat=True), SHAPES["plane"], np.random.default_rng([4, seed])
         ).pictures
     ]
-    mirrored = np.mean([one.mirrored for one in seen])
-    doubted = np.mean([not one.certain for one in seen])
+    mirrored = np.mean([picture.mirrored for picture in pictures])
+    doubted = np.mean([not picture.certain for picture in pictures])
     assert 0.005 < mirrored < 0.2
     assert doubted > 2.0 * mirrored
 

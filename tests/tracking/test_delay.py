@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from benchmarks.control.pose_run import settings_for
+from benchmarks.control.world import Scenario, circle, make_world, plane
 from scipy.stats import chi2
 
-from scissorcal.bench.control.traps import settings_for
-from scissorcal.bench.control.world import Scenario, circle, make_world, plane
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.delay import DelayFit, _last, measure_delay
@@ -32,11 +32,11 @@ def measured(scenario: Scenario, seed: int, late_s: float) -> DelayFit:
     ("seed", "late_s"), [pytest.param(8, 0.0, marks=pytest.mark.slow), (12, 0.03)]
 )
 def test_a_moving_plate_that_is_touched_shows_the_delay(seed: int, late_s: float) -> None:
-    found = measured(Scenario("moving", moving=True, seconds=8.0), seed, late_s)
-    assert found.known
-    assert found.later_s == pytest.approx(late_s, abs=3.0 * found.sd_s)
-    assert 1e-3 < found.sd_s < 8e-3
-    assert "ms later than camera_delay_ms says" in found.sentence
+    fit = measured(Scenario("moving", moving=True, seconds=8.0), seed, late_s)
+    assert fit.known
+    assert fit.later_s == pytest.approx(late_s, abs=3.0 * fit.sd_s)
+    assert 1e-3 < fit.sd_s < 8e-3
+    assert "ms later than camera_delay_ms says" in fit.sentence
 
 
 @pytest.mark.slow
@@ -50,17 +50,17 @@ def test_its_standard_deviation_is_honest() -> None:
     scores = []
     for seed in range(100, 112):
         late = 0.02 * (seed % 3 - 1)
-        found = measured(scenario, seed, late)
-        if found.known:
-            scores.append((found.later_s - late) / found.sd_s)
+        fit = measured(scenario, seed, late)
+        if fit.known:
+            scores.append((fit.later_s - late) / fit.sd_s)
     assert len(scores) > 7
     assert np.mean(np.square(scores)) < chi2.ppf(0.999, len(scores)) / len(scores)
 
 
 def test_a_plate_at_rest_shows_none() -> None:
-    found = measured(Scenario("fixed", seconds=4.0), 1, 0.02)
-    assert not found.known
-    assert "was not measured" in found.sentence
+    fit = measured(Scenario("fixed", seconds=4.0), 1, 0.02)
+    assert not fit.known
+    assert "was not measured" in fit.sentence
 
 
 def test_a_long_track_is_measured_by_its_end() -> None:
@@ -78,6 +78,6 @@ def test_a_long_track_is_measured_by_its_end() -> None:
 
 
 def test_pictures_without_contacts_show_none() -> None:
-    found = measure_delay(Plane(), settings_for(Scenario("fixed")), [], [])
-    assert not found.known
-    assert "20 of each are needed" in found.sentence
+    fit = measure_delay(Plane(), settings_for(Scenario("fixed")), [], [])
+    assert not fit.known
+    assert "20 of each are needed" in fit.sentence

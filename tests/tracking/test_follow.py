@@ -6,16 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.consistency import nees
+from benchmarks.control.pose_run import settings_for
+from benchmarks.control.world import Scenario, World, circle, make_world, plane
 from scipy.spatial.transform import Rotation
 
 from scissorcal.aliases import Array
-from scissorcal.bench.control.traps import settings_for
-from scissorcal.bench.control.world import Scenario, World, circle, make_world, plane
 from scissorcal.errors import DeviceError
 from scissorcal.model.surface import Plane
-from scissorcal.tracking.consistency import nees, pose_error
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PlateFollower, SeenPose
+from scissorcal.tracking.rotation import pose_error
 from scissorcal.tracking.tracker import Outcome
 
 SHORTEST_S = 0.06
@@ -35,7 +36,7 @@ class Given:
         return np.zeros(3)
 
     def take(self, time_s: Array, *_: Array) -> list[TipContact]:
-        due = [one for one in self.waiting if one.time_s <= time_s[-1]]
+        due = [contact for contact in self.waiting if contact.time_s <= time_s[-1]]
         self.waiting = self.waiting[len(due) :]
         return due
 
@@ -57,16 +58,18 @@ def followed(
         Plane(), settings_for(MOVING), camera_delay_s=delay_s, rig=True, contacts=Given(world, RIG)
     )
     waiting = [(p.exposed_s + SHORTEST_S + 0.04 * rng.random(), p) for p in world.pictures]
-    waiting.sort(key=lambda one: one[0])
+    waiting.sort(key=lambda arrival: arrival[0])
     none = np.zeros(50)
     for end in np.arange(0.05, MOVING.seconds, 0.05):
         true = end - 0.05 + 1e-3 * np.arange(1, 51)
         arrived = true + 5e-5 + rng.exponential(1e-4, 50)
         follower.samples(RIG[0] + RIG[1] * true, arrived, none, none, none)
         while waiting and waiting[0][0] <= end:
-            at, seen = waiting.pop(0)
-            stamp = _on(camera, seen.exposed_s)
-            pose = SeenPose(stamp, at, seen.rotation, seen.place_m, seen.covariance, seen.certain)
+            at, picture = waiting.pop(0)
+            stamp = _on(camera, picture.exposed_s)
+            pose = SeenPose(
+                stamp, at, picture.rotation, picture.place_m, picture.covariance, picture.certain
+            )
             follower.picture(pose)
     return follower
 
@@ -82,9 +85,9 @@ def test_exposures_are_put_at_the_rigs_time() -> None:
     """
     world = a_world(0)
     follower = followed(world)
-    for seen in world.pictures[30::20]:
-        time, sd = follower.exposed(_on(CAMERA, seen.exposed_s))
-        assert time == pytest.approx(_on(RIG, seen.exposed_s), abs=3e-3)
+    for picture in world.pictures[30::20]:
+        time, sd = follower.exposed(_on(CAMERA, picture.exposed_s))
+        assert time == pytest.approx(_on(RIG, picture.exposed_s), abs=3e-3)
         assert 0.0 < sd < 3e-3
     assert follower.rig is not None
     assert follower.rig.fit.drift_ppm == pytest.approx(-300.0, abs=5.0)
@@ -104,10 +107,12 @@ def test_tracks_are_consistent_on_drifting_clocks(plates: Iterable[int], limit: 
         world = a_world(seed)
         for delay_s, scores in ((SHORTEST_S, good), (0.0, crippled)):
             follower = followed(world, delay_s=delay_s, seed=seed)
-            found = follower.estimate(float(world.times_s[-2]))
-            assert found is not None
-            error = pose_error(found.rotation, found.place_m, world.rotation[-2], world.place_m[-2])
-            scores.append(nees(error, found.covariance))
+            estimate = follower.estimate(float(world.times_s[-2]))
+            assert estimate is not None
+            error = pose_error(
+                estimate.rotation, estimate.place_m, world.rotation[-2], world.place_m[-2]
+            )
+            scores.append(nees(error, estimate.covariance))
     assert np.mean(good) < limit < np.mean(crippled)
 
 
@@ -115,8 +120,8 @@ def test_rows_tell_what_the_pose_rests_on() -> None:
     world = a_world(3)
     follower = PlateFollower(Plane(), settings_for(MOVING), rig=True, contacts=Given(world, RIG))
     assert follower.state == "waiting"
-    seen = world.pictures[0]
-    early = SeenPose(0.0, 0.06, seen.rotation, seen.place_m, seen.covariance)
+    picture = world.pictures[0]
+    early = SeenPose(0.0, 0.06, picture.rotation, picture.place_m, picture.covariance)
     assert follower.picture(early) is None, "the rig has sent no time"
     none = np.zeros(50)
     block = 1e-3 * np.arange(1, 51)
@@ -151,13 +156,13 @@ def test_a_camera_alone_keeps_its_own_time() -> None:
     follower = PlateFollower(Plane(), settings_for(MOVING), camera_delay_s=0.05)
     for number in range(60):
         at = number / 30.0
-        seen = SeenPose(100.0 + at, 5.0 + at + 0.05, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
-        row = follower.picture(seen)
+        picture = SeenPose(100.0 + at, 5.0 + at + 0.05, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
+        row = follower.picture(picture)
         assert row is not None
         assert row.time_s == pytest.approx(100.0 + at - 0.05)
-    found = follower.estimate(5.0 + 59 / 30.0)
-    assert found is not None
-    assert found.time_s == pytest.approx(100.0 + 59 / 30.0 - 0.05, abs=1e-6), "exposed just then"
+    estimate = follower.estimate(5.0 + 59 / 30.0)
+    assert estimate is not None
+    assert estimate.time_s == pytest.approx(100.0 + 59 / 30.0 - 0.05, abs=1e-6), "exposed just then"
     assert follower.samples(*[np.zeros(1)] * 5) == []
 
 
@@ -172,11 +177,11 @@ def test_pictures_without_a_pose_let_it_age() -> None:
     assert follower.state == "pictures"
     for number in range(30, 180):
         follower.blank(number / 30.0)
-    found = follower.now()
-    assert found is not None
+    estimate = follower.now()
+    assert estimate is not None
     assert follower.state == "coasting"
-    assert found.picture_age_s == pytest.approx(5.0)
-    assert found.covariance[3, 3] > 100.0 * known.covariance[3, 3]
+    assert estimate.picture_age_s == pytest.approx(5.0)
+    assert estimate.covariance[3, 3] > 100.0 * known.covariance[3, 3]
 
 
 @pytest.mark.parametrize("jump_s", [-60.0, 60.0])
@@ -197,11 +202,11 @@ def test_a_camera_alone_whose_clock_jumps_is_followed_on(jump_s: float) -> None:
 
 def test_a_camera_whose_clock_stands_ends_it() -> None:
     follower = PlateFollower(Plane(), settings_for(MOVING))
-    seen = SeenPose(1.0, 0.0, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
+    picture = SeenPose(1.0, 0.0, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
     for number in range(30):
-        follower.picture(replace(seen, arrived_s=number / 30.0))
+        follower.picture(replace(picture, arrived_s=number / 30.0))
     with pytest.raises(DeviceError, match=r"camera's clock stands"):
-        follower.picture(replace(seen, arrived_s=1.1))
+        follower.picture(replace(picture, arrived_s=1.1))
 
 
 def test_a_turned_plate_gives_the_normal_of_its_face() -> None:
@@ -225,7 +230,7 @@ def test_a_rig_whose_clock_begins_anew_keeps_the_pose(expected: bool) -> None:
         Plane(), settings_for(MOVING), camera_delay_s=SHORTEST_S, rig=True, contacts=None
     )
     waiting = [(p.exposed_s + SHORTEST_S + 0.04 * rng.random(), p) for p in world.pictures]
-    waiting.sort(key=lambda one: one[0])
+    waiting.sort(key=lambda arrival: arrival[0])
     none, began_anew_s, base = np.zeros(50), 3.0, 7.0
     for end in np.arange(0.05, MOVING.seconds, 0.05):
         if base and end > began_anew_s:
@@ -235,16 +240,18 @@ def test_a_rig_whose_clock_begins_anew_keeps_the_pose(expected: bool) -> None:
         true = end - 0.05 + 1e-3 * np.arange(1, 51)
         follower.samples(base + true, true + 5e-5 + rng.exponential(1e-4, 50), none, none, none)
         while waiting and waiting[0][0] <= end:
-            at, seen = waiting.pop(0)
-            stamp = _on(CAMERA, seen.exposed_s)
-            pose = SeenPose(stamp, at, seen.rotation, seen.place_m, seen.covariance, seen.certain)
+            at, picture = waiting.pop(0)
+            stamp = _on(CAMERA, picture.exposed_s)
+            pose = SeenPose(
+                stamp, at, picture.rotation, picture.place_m, picture.covariance, picture.certain
+            )
             follower.picture(pose)
     counts = follower.tracker.estimate().counts
     assert (counts.restarts, counts.late_pictures) == (0, 0)
     assert counts.pictures > 0.9 * len(world.pictures) - counts.refused_pictures - 5
-    found = follower.estimate(MOVING.seconds)
-    assert found is not None
-    assert found.picture_age_s < 0.3
-    assert found.time_s == pytest.approx(base + MOVING.seconds, abs=5e-3)
+    estimate = follower.estimate(MOVING.seconds)
+    assert estimate is not None
+    assert estimate.picture_age_s < 0.3
+    assert estimate.time_s == pytest.approx(base + MOVING.seconds, abs=5e-3)
     assert follower.rig is not None
     assert len(follower.rig.jumps) == (0 if expected else 1)

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.control.pose_run import settings_for
+from benchmarks.control.world import Scenario
 
-from scissorcal.bench.control.traps import settings_for
-from scissorcal.bench.control.world import Scenario
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PlateFollower, SeenPose
@@ -37,25 +37,25 @@ def test_what_was_not_given_is_not_judged() -> None:
 
 
 def test_many_refused_pictures_name_both_causes() -> None:
-    found = replace(FIGURES, pictures=replace(COUNTS, refused=20))
-    assert status(found)["refused pictures"] == "fail"
-    assert "16.7 % of the pictures were refused" in why(found, "refused pictures")
-    assert "speed_mm_per_s" in why(found, "refused pictures")
+    figures = replace(FIGURES, pictures=replace(COUNTS, refused=20))
+    assert status(figures)["refused pictures"] == "fail"
+    assert "16.7 % of the pictures were refused" in why(figures, "refused pictures")
+    assert "speed_mm_per_s" in why(figures, "refused pictures")
 
 
 def test_contacts_away_from_the_surface_are_told_in_mm_against_their_sd() -> None:
     contacts = RowCounts(used=10, refused=90, late=0, waiting=0, mean_nis=100.0, freedom=1)
-    found = replace(FIGURES, contacts=contacts, away_mm=4.2, away_sd_mm=0.11)
-    assert status(found)["refused contacts"] == "fail"
-    text = why(found, "refused contacts")
+    figures = replace(FIGURES, contacts=contacts, away_mm=4.2, away_sd_mm=0.11)
+    assert status(figures)["refused contacts"] == "fail"
+    text = why(figures, "refused contacts")
     assert "the last was 4.2 mm outside of the surface, where 0.11 mm (sd) were expected" in text
-    assert status(found)["contact consistency"] == "fail"
+    assert status(figures)["contact consistency"] == "fail"
 
 
 def test_errors_larger_than_stated_fail_the_consistency() -> None:
-    found = replace(FIGURES, pictures=replace(COUNTS, mean_nis=13.0))
-    assert status(found)["picture consistency"] == "fail"
-    assert "The mean NIS is 13, where 6 are expected" in why(found, "picture consistency")
+    figures = replace(FIGURES, pictures=replace(COUNTS, mean_nis=13.0))
+    assert status(figures)["picture consistency"] == "fail"
+    assert "The mean NIS is 13, where 6 are expected" in why(figures, "picture consistency")
 
 
 def test_figures_are_those_of_what_was_given() -> None:

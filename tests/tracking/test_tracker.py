@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.control.pose_run import settings_for
+from benchmarks.control.world import Scenario, World, circle, make_world, plane
 from scipy.spatial.transform import Rotation
 
-from scissorcal.bench.control.traps import settings_for
-from scissorcal.bench.control.world import Scenario, World, circle, make_world, plane
 from scissorcal.errors import InputError
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.rows import CameraPose
@@ -30,7 +30,7 @@ def test_late_pictures_give_what_pictures_in_order_give() -> None:
     """Rewind and replay is exact: the order of arrival changes nothing but rounding."""
     world, settings = a_world(), settings_for(MOVING)
     late, sorted_rows = PoseTracker(Plane(), settings), PoseTracker(Plane(), settings)
-    events = [(seen.exposed_s, seen.arrives_s, seen) for seen in world.pictures]
+    events = [(picture.exposed_s, picture.arrives_s, picture) for picture in world.pictures]
     rows = list(zip(world.times_s.tolist(), world.point_m, world.force_N.tolist(), strict=True))
 
     def feed(tracker: PoseTracker, order: list[tuple[float, object]]) -> None:
@@ -38,26 +38,28 @@ def test_late_pictures_give_what_pictures_in_order_give() -> None:
             if isinstance(row, tuple):
                 tracker.contact(*row)
             else:
-                seen = row
+                picture = row
                 tracker.picture(
-                    CameraPose(seen.exposed_s, seen.rotation, seen.place_m, seen.covariance)
+                    CameraPose(
+                        picture.exposed_s, picture.rotation, picture.place_m, picture.covariance
+                    )
                 )
 
     # The first picture comes before every contact in both orders: a filter starts from it.
     first, *others = sorted(events, key=lambda event: event[0])
     begin = [(0.0, first[2])]
     contacts = [(row[0], row) for row in rows if row[0] > first[1]]
-    by_arrival = contacts + [(arrives, seen) for _, arrives, seen in others if arrives < 1.99]
+    by_arrival = contacts + [(arrives, picture) for _, arrives, picture in others if arrives < 1.99]
     by_exposure = contacts + [
-        (exposed, seen) for exposed, arrives, seen in others if arrives < 1.99
+        (exposed, picture) for exposed, arrives, picture in others if arrives < 1.99
     ]
     feed(late, begin + sorted(by_arrival, key=lambda event: event[0]))
     feed(sorted_rows, begin + sorted(by_exposure, key=lambda event: event[0]))
-    found, wanted = late.estimate(2.0), sorted_rows.estimate(2.0)
-    assert found.counts.pictures == wanted.counts.pictures > 40
-    np.testing.assert_allclose(found.rotation, wanted.rotation, atol=1e-12)
-    np.testing.assert_allclose(found.place_m, wanted.place_m, atol=1e-12)
-    np.testing.assert_allclose(found.covariance, wanted.covariance, rtol=1e-7, atol=1e-16)
+    estimate, wanted = late.estimate(2.0), sorted_rows.estimate(2.0)
+    assert estimate.counts.pictures == wanted.counts.pictures > 40
+    np.testing.assert_allclose(estimate.rotation, wanted.rotation, atol=1e-12)
+    np.testing.assert_allclose(estimate.place_m, wanted.place_m, atol=1e-12)
+    np.testing.assert_allclose(estimate.covariance, wanted.covariance, rtol=1e-7, atol=1e-16)
 
 
 def test_there_is_no_pose_before_a_certain_picture() -> None:
@@ -153,10 +155,10 @@ def test_minutes_of_pictures_keep_a_rotation_and_a_covariance(rows: int) -> None
     for step in range(rows):
         turn = Rotation.from_rotvec([0.0, 0.0, 0.003 * step]).as_matrix()
         tracker.picture(pose_at(0.03 * step, turn, np.zeros(3)))
-    found = tracker.estimate()
-    assert found.counts.refused_pictures == 0
-    assert np.abs(found.rotation @ found.rotation.T - np.eye(3)).max() < 1e-12
-    assert np.all(np.linalg.eigvalsh(found.covariance) > 0.0)
+    estimate = tracker.estimate()
+    assert estimate.counts.refused_pictures == 0
+    assert np.abs(estimate.rotation @ estimate.rotation.T - np.eye(3)).max() < 1e-12
+    assert np.all(np.linalg.eigvalsh(estimate.covariance) > 0.0)
 
 
 def test_euler_angles_fail_where_the_filter_does_not() -> None:
@@ -179,8 +181,8 @@ def test_euler_angles_fail_where_the_filter_does_not() -> None:
     errors = []
     for step in range(300):
         attitude = Rotation.from_euler("ZYX", [0.3, np.radians(75.0 + 0.1 * step), 0.2])
-        seen = Rotation.from_rotvec(math.sqrt(1e-7) * rng.standard_normal(3)) * attitude
-        tracker.picture(pose_at(0.03 * step, seen.as_matrix(), np.zeros(3)))
+        turned = Rotation.from_rotvec(math.sqrt(1e-7) * rng.standard_normal(3)) * attitude
+        tracker.picture(pose_at(0.03 * step, turned.as_matrix(), np.zeros(3)))
         away = Rotation.from_matrix(tracker.estimate().rotation) * attitude.inv()
         errors.append(away.magnitude())
     assert tracker.estimate().counts.refused_pictures == 0

@@ -27,8 +27,8 @@ from scissorcal.render import (
     render,
 )
 from scissorcal.render.admission import rendered_tables
-from scissorcal.tracking.consistency import pose_error
 from scissorcal.tracking.contacts import TipContacts
+from scissorcal.tracking.rotation import pose_error
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.seen_plate import SeenPlate
 from scissorcal.vision.live import Frame
@@ -84,8 +84,8 @@ class Case:
             f"contact_bias_mm = {self.contact_bias_mm}",
             f"contact_bias_deg = {self.contact_bias_deg}",
         )
-        found = parse_recipe("\n".join([TEXT, *lines]))
-        scene = found.scene.model_copy(
+        recipe = parse_recipe("\n".join([TEXT, *lines]))
+        scene = recipe.scene.model_copy(
             update={
                 "simplify": False,
                 "plate_pose": "estimated",
@@ -93,8 +93,8 @@ class Case:
                 "tolerance_percent": self.tolerance_percent,
             }
         )
-        rig = found.rig.model_copy(update={"moving": "upper"})
-        return found.model_copy(update={"scene": scene, "rig": rig})
+        rig = recipe.rig.model_copy(update={"moving": "upper"})
+        return recipe.model_copy(update={"scene": scene, "rig": rig})
 
 
 class CarriedPlate:
@@ -193,11 +193,11 @@ class Watched:
     rows: list[tuple[float, Array, Array]] = field(default_factory=list)
 
     def __call__(self, now_s: float, samples: Samples) -> PlatePose | None:
-        found = self.source(now_s, samples)
-        if found is not None:
-            error = pose_error(found.rotation, found.translation, *self.world.truth(now_s))
-            self.rows.append((now_s, error, found.covariance))
-        return found
+        pose = self.source(now_s, samples)
+        if pose is not None:
+            error = pose_error(pose.rotation, pose.translation, *self.world.truth(now_s))
+            self.rows.append((now_s, error, pose.covariance))
+        return pose
 
 
 @dataclass(frozen=True)
@@ -297,6 +297,6 @@ def _session(case: Case, recipe: Recipe, world: CarriedWorld) -> TrackSession:
 
 def _located(world: CarriedWorld, eye: PlateEye) -> Due:
     def due(now_s: float) -> Iterator[PlatePicture]:
-        return (eye.picture(found) for found in eye.locate(world.frames(now_s)))
+        return (eye.picture(located) for located in eye.locate(world.frames(now_s)))
 
     return due

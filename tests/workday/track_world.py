@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from benchmarks.consistency import nees
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.plate.fit import plate_target
@@ -15,8 +16,8 @@ from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import parse_recipe, read_text
 from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.recipe.schema import Recipe
-from scissorcal.tracking.consistency import nees, pose_error
 from scissorcal.tracking.contacts import TipContacts
+from scissorcal.tracking.rotation import pose_error
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import RigPose
@@ -105,17 +106,17 @@ def run_rig(
 
 def score(session: TrackSession, world: SimWorld, host_s: float) -> tuple[float, Array]:
     """NEES and error (6,) of the pose at the last row, against the world's truth."""
-    found = session.follower.tracker.estimate()
+    estimate = session.follower.tracker.estimate()
     clock = session.follower.rig
     if clock is not None:
-        at = clock.fit.host(found.time_s)
+        at = clock.fit.host(estimate.time_s)
     else:
         from scissorcal.workday.tracking.sim_world import CAMERA_DRIFT, CAMERA_OFFSET_S
 
         delay = 1e-3 * session.about.camera_delay_ms
-        at = (found.time_s + delay - CAMERA_OFFSET_S) / (1.0 + CAMERA_DRIFT)
-    error = pose_error(found.rotation, found.place_m, *world.truth(at))
-    return nees(error, found.covariance), error
+        at = (estimate.time_s + delay - CAMERA_OFFSET_S) / (1.0 + CAMERA_DRIFT)
+    error = pose_error(estimate.rotation, estimate.place_m, *world.truth(at))
+    return nees(error, estimate.covariance), error
 
 
 def recorder_at(path: Path) -> TrackRecorder:

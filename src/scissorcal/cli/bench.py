@@ -5,7 +5,6 @@ from scissorcal.cli.lazy import group
 _COMMANDS = {
     "trade": ("scissorcal.cli.bench_trade:trade", "What accuracy costs, knob by knob."),
     "extremes": ("scissorcal.cli.bench_extremes:extremes", "Where numbers stop being right."),
-    "control": ("scissorcal.cli.bench_control:control", "What contact adds to a camera."),
 }
 
 

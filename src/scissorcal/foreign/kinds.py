@@ -66,7 +66,6 @@ _MAGIC: tuple[tuple[bytes, FileKind], ...] = (
 """Bytes at the beginning that no text, and no other of these formats, begins with."""
 
 _OWN = {
-    "bench-control": "a result of 'scissorcal bench control'",
     "capture-design": "the design of a capture",
     "comparison": "a comparison's data",
     "extremes": "a result of 'scissorcal bench extremes'",
@@ -109,10 +108,10 @@ def refuse_other_kind(file: IO[bytes], path: object, name: str, holds: Sequence[
 
     ``name`` is what is needed, with an article.
     """
-    found = None if "*" in holds else kind_of(file)
-    if found is not None and found.key not in holds:
-        what = _fit_in(file) if found.key == "fit" else found.name
-        raise OtherKindError(path, what, name, found.use)
+    kind = None if "*" in holds else kind_of(file)
+    if kind is not None and kind.key not in holds:
+        what = _fit_in(file) if kind.key == "fit" else kind.name
+        raise OtherKindError(path, what, name, kind.use)
 
 
 def is_unknown(content: bytes) -> bool:
@@ -138,8 +137,8 @@ def fit_name(what: str) -> str:
 
 def _fit_in(file: IO[bytes]) -> str:
     """The name of a stored fit, by the text that its header is."""
-    found = re.search(rb'\{"what": "([a-z-]{1,40})"', file.read(_LARGEST_FIT))
-    return fit_name(found[1].decode() if found else "")
+    match = re.search(rb'\{"what": "([a-z-]{1,40})"', file.read(_LARGEST_FIT))
+    return fit_name(match[1].decode() if match else "")
 
 
 def _hdf5(head: bytes, tail: bytes) -> FileKind | None:
@@ -199,8 +198,8 @@ def _text(head: bytes, tail: bytes) -> FileKind | None:
     if head.startswith(b"version https://git-lfs.github.com/spec/"):
         return FileKind("lfs", "a pointer of Git LFS to a file", "'git lfs pull' fetches the file.")
     text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-    if own := _OWN_FORMAT.search(text):
-        word = own[1].decode()
+    if match := _OWN_FORMAT.search(text):
+        word = match[1].decode()
         return FileKind(word, _OWN.get(word, f"a file of scissorcal ({word})"))
     low = text[:1000].lower()
     if low.startswith((b"<!doctype html", b"<html")):
@@ -223,7 +222,9 @@ def _is_printable(text: bytes) -> bool:
     """Whether bytes are UTF-8 without control characters; the last character may be cut off."""
     decoded = getincrementaldecoder("utf-8")(errors="strict")
     try:
-        return all(one >= " " or one in "\t\r\n\f" for one in decoded.decode(text))
+        return all(
+            character >= " " or character in "\t\r\n\f" for character in decoded.decode(text)
+        )
     except UnicodeDecodeError:
         return False
 

@@ -1,4 +1,4 @@
-"""Multistart search for the posterior's optima, with an honest word on how it ended."""
+"""Local searches for the posterior's optima from several starts, and how they ended."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -87,12 +87,12 @@ def find_optimum(
     Where residuals are normal, each start is followed by least squares and Fisher scoring
     (:func:`~scissorcal.inference.squares.descend`), where the posterior is smooth by BFGS
     (:func:`~scissorcal.inference.ascent.ascend`). What then still promises a rise, and every
-    start of other problems, is followed by rounds of BOBYQA (Powell 2009, report DAMTP 2009/NA06)
-    in coordinates that the scores' outer product makes round, until a round gains nothing: strongly
-    correlated parameters then cost no more than independent ones. A start whose first rounds end
-    far below another's is given up. The best point ever seen is kept, whatever code the library
-    returns, since it reports rounding trouble at points that are solved and success at points it
-    never could evaluate. Ends between which the log-posterior does not dip are one optimum.
+    start of other problems, is followed by rounds of NLopt's BOBYQA, a local search without
+    derivatives (Powell 2009, report DAMTP 2009/NA06), in coordinates that the scores' outer product
+    makes round, until a round gains nothing: strongly correlated parameters then cost no more than
+    independent ones. A start whose first rounds end far below another's is given up. The best point
+    is kept, whatever NLopt returns: it reports rounding trouble at points that are solved and
+    success at points it never could evaluate. Ends without a dip between them are one optimum.
 
     An end counts as settled only where the log-posterior falls on both sides along each axis of
     its covariance; where it rises instead, the search goes on from there. ``stop`` says whether the
@@ -268,7 +268,7 @@ def _round(
 
     best_point, best_value = centre, value
 
-    def seen(z: Array, gradient: Array) -> float:
+    def cost(z: Array, gradient: Array) -> float:
         nonlocal best_point, best_value
         if stop is not None and stop():
             search.force_stop()
@@ -283,7 +283,7 @@ def _round(
 
     size = len(centre)
     search = nlopt.opt(nlopt.LN_BOBYQA, size)
-    search.set_min_objective(seen)
+    search.set_min_objective(cost)
     search.set_lower_bounds(np.full(size, -1e3))
     search.set_upper_bounds(np.full(size, 1e3))
     search.set_initial_step(np.ones(size))
@@ -313,18 +313,18 @@ def _rounding(problem: Problem, point: Array) -> Array:
 
 def _clusters(problem: Problem, ended: list[_Climb]) -> tuple[Cluster, ...]:
     """Distinct optima, highest first."""
-    found: list[Cluster] = []
+    clusters: list[Cluster] = []
     for climb in sorted(ended, key=lambda climb: -climb.value):
         if not np.isfinite(climb.value):
             continue
-        for index, known in enumerate(found):
+        for index, known in enumerate(clusters):
             if _same(problem, climb, known):
                 settled = known.settled or climb.gained < SETTLED
-                found[index] = replace(known, starts=known.starts + 1, settled=settled)
+                clusters[index] = replace(known, starts=known.starts + 1, settled=settled)
                 break
         else:
-            found.append(Cluster(climb.point, climb.value, 1, climb.gained < SETTLED))
-    return tuple(found)
+            clusters.append(Cluster(climb.point, climb.value, 1, climb.gained < SETTLED))
+    return tuple(clusters)
 
 
 def _same(problem: Problem, climb: _Climb, known: Cluster) -> bool:

@@ -24,7 +24,6 @@ from scissorcal.kernel.hybrid import (
     NormalLaw,
     hybrid_inputs,
 )
-from scissorcal.kernel.lag import LagCounts
 from scissorcal.kernel.loop import (
     Histogram,
     LoopBlock,
@@ -51,6 +50,7 @@ from scissorcal.kernel.messages import (
 )
 from scissorcal.kernel.modes import Mode
 from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
+from scissorcal.kernel.paths import estimated_rates, presliding_path
 from scissorcal.kernel.pieces import (
     MOST_PIECES,
     MOST_STRIPS,
@@ -60,8 +60,6 @@ from scissorcal.kernel.pieces import (
     largest_overlap,
 )
 from scissorcal.kernel.plate import PlacedModel, PlateConfig, Pull, Section
-from scissorcal.kernel.presliding import presliding_path
-from scissorcal.kernel.rates import estimated_rates
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
     SampleFlag,
@@ -74,7 +72,7 @@ from scissorcal.kernel.stepping import STEP_DTYPE, Kernel, StepFlag, StepOutput
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.table16 import Row16, Table16
 from scissorcal.kernel.tables import ModelTables, Table
-from scissorcal.kernel.watching import WatchConfig
+from scissorcal.kernel.watching import LagCounts, WatchConfig
 from scissorcal.kernel.wire import FrameDecoder, crc16, decode, encode, encode_frame
 
 __all__ = [

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
 from scissorcal.kernel.control import ControlConfig, ControlTask, control_sample
-from scissorcal.kernel.lag import LagCounts
 from scissorcal.kernel.layout import dtype_of, fill_struct
 from scissorcal.kernel.messages import Command, State
 from scissorcal.kernel.modes import Mode, reference_arrays, refuse_change, refuse_mode
@@ -19,7 +18,7 @@ from scissorcal.kernel.pieces import Piece, fill_pieces, refuse_pieces
 from scissorcal.kernel.plate import KNOWN_PLATE, PlateConfig, Section, placing
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, model_struct
-from scissorcal.kernel.watching import NO_WATCHES, WatchConfig, largest_seen
+from scissorcal.kernel.watching import NO_WATCHES, LagCounts, WatchConfig, largest_seen
 from scissorcal.kernel.wire import encode_frame
 
 SAMPLE_DTYPE = dtype_of("sc_sample")

@@ -1,9 +1,12 @@
-"""Thresholds of what the servo watches while motors drive the blades."""
+"""What the servo watches while motors drive the blades, and the lag that it counts."""
 
 import math
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+
+from scissorcal.aliases import Integers
 from scissorcal.kernel._kernel import lib
 from scissorcal.kernel.stop_reason import StopReason
 
@@ -84,3 +87,23 @@ def largest_seen(watch: Any) -> dict[str, float]:
         StopReason(_FIRST + index).name.lower(): float(watch.worst[index])
         for index in range(_COUNT)
     }
+
+
+@dataclass(frozen=True, eq=False)
+class LagCounts:
+    """Ticks of the device by their lag and by the mode in force then.
+
+    ``counts[mode, i]`` ticks had a lag of i + 1 ticks, the last column also all longer ones;
+    ``held[mode]`` ticks had no new command since the tick before; ``worst[mode]`` is the longest
+    lag, 0 where there was none.
+    """
+
+    counts: Integers
+    held: Integers
+    worst: Integers
+
+    @classmethod
+    def of(cls, lag: Any) -> "LagCounts":
+        """Copy what a C struct ``sc_lag`` has now."""
+        rows = ([list(row) for row in lag.count], list(lag.held), list(lag.worst))
+        return cls(*(np.array(values, dtype=np.int64) for values in rows))

@@ -95,17 +95,12 @@ class RecordingFollower:
         The lock is tried and given back at once, so ask seldom, and only where the file does not
         grow.
         """
-        from scissorcal.locks import NO_LOCKS, try_lock, unlock
+        from scissorcal.locks import try_lock, unlock
 
-        try:
-            if not try_lock(self._stream):
-                return True
-        except OSError as error:
-            if error.errno not in NO_LOCKS:
-                raise
-            return False
-        unlock(self._stream)
-        return False
+        free = try_lock(self._stream)
+        if free:
+            unlock(self._stream)
+        return free is False
 
     def read(self) -> NDArray[np.void]:
         """The samples (n,) that were appended since the last call, with SAMPLE_DTYPE.

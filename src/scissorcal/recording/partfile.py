@@ -16,7 +16,7 @@ def create_locked(path: Path, part: Path) -> IO[bytes]:
     The lock ends with the process; where there are no locks, none is held. Raises InputError if
     either name is taken or the folder cannot be written.
     """
-    from scissorcal.locks import NO_LOCKS, lock  # commands that write nothing need it not
+    from scissorcal.locks import lock  # commands that write nothing need it not
 
     while True:
         if path.exists():
@@ -33,11 +33,7 @@ def create_locked(path: Path, part: Path) -> IO[bytes]:
                 f"{part} cannot be created: {error.strerror}. Make the folder {path.parent} "
                 "first, or choose one that you may write to."
             ) from error
-        try:
-            lock(stream)
-        except OSError as error:
-            if error.errno not in NO_LOCKS:
-                raise
+        lock(stream)
         # A recovery may have renamed the empty file between its creation and the lock.
         if is_same_file(part, stream):
             return stream

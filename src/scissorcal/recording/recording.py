@@ -107,7 +107,7 @@ class Recording:
 def columns(recording: Recording) -> dict[str, NDArray[Any]]:
     """Return the samples by column, each (N,): the fields by :func:`column_name`, and ``time_s``.
 
-    >>> from scissorcal.recording import Recording
+    >>> from scissorcal.recording.layout import empty_samples
     >>> list(columns(Recording("cut", empty_samples(2))))[3:6]
     ['device_time_us', 'time_s', 'opening_rad']
     """

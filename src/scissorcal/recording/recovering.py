@@ -47,16 +47,13 @@ def recover(folder: str | Path) -> tuple[Recovered, ...]:
 
 
 def _recover_one(part: Path) -> Recovered | None:
-    from scissorcal.locks import NO_LOCKS, try_lock
+    from scissorcal.locks import try_lock
 
     if not part.exists():
         return None
     with open_foreign(part, RECORDING) as stream, explained(part):
-        try:
-            free = try_lock(stream)
-        except OSError as error:
-            if error.errno not in NO_LOCKS:
-                raise
+        free = try_lock(stream)
+        if free is None:
             sentence = (
                 f"{part.name} was not touched: there are no locks here, so that it is not known "
                 "whether it is still being written. Copy the folder to a disk of a computer that "

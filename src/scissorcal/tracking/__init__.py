@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scissorcal.tracking.clocks import ClockFit, ClockWatch, fit_clock
-    from scissorcal.tracking.consistency import mean_band, nees, pose_error, share_held
     from scissorcal.tracking.contacts import TipContact, TipContacts
     from scissorcal.tracking.delay import DelayFit, measure_delay
     from scissorcal.tracking.follow import FollowedRow, PlateFollower, SeenPose
     from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
+    from scissorcal.tracking.rotation import pose_error
     from scissorcal.tracking.rows import CameraPose
     from scissorcal.tracking.settings import (
         CameraErrors,
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "clocks": ("ClockFit", "ClockWatch", "fit_clock"),
-    "consistency": ("mean_band", "nees", "pose_error", "share_held"),
     "contacts": ("TipContact", "TipContacts"),
     "delay": ("DelayFit", "measure_delay"),
     "follow": ("FollowedRow", "PlateFollower", "SeenPose"),
     "judge": ("TrackFigures", "track_figures", "track_verdicts"),
+    "rotation": ("pose_error",),
     "rows": ("CameraPose",),
     "settings": (
         "CameraErrors",
@@ -66,12 +66,9 @@ __all__ = [
     "TrackFigures",
     "TrackingSettings",
     "fit_clock",
-    "mean_band",
     "measure_delay",
-    "nees",
     "pose_error",
     "settings_of",
-    "share_held",
     "track_figures",
     "track_verdicts",
 ]

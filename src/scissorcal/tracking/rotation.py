@@ -64,6 +64,15 @@ def rotation_vector(matrix: Array) -> Array:
     return np.array([share * x, share * y, share * z])
 
 
+def pose_error(rotation: Array, place_m: Array, true_rotation: Array, true_place_m: Array) -> Array:
+    """Error (6,) of an estimated pose: rotation vector (rad) and way (m) that lead to the truth.
+
+    True rotation = Exp(error[:3]) estimated rotation, the error that the filter's covariance is of.
+    """
+    turn = rotation_vector(true_rotation @ rotation.T)
+    return np.concatenate([turn, np.subtract(true_place_m, place_m)])
+
+
 def cross(a: Array, b: Array) -> Array:
     """Cross product of two vectors (3,); ten times as fast as NumPy's on single vectors."""
     ax, ay, az = float(a[0]), float(a[1]), float(a[2])

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.tracking.consistency import pose_error
 from scissorcal.tracking.plate_pose import PlatePose
-from scissorcal.tracking.rotation import rotation_of
+from scissorcal.tracking.rotation import pose_error, rotation_of
 
 PLAY_SDS = 6.0
 """Of the noise of a picture's pose, as its six numbers have it together. With 4, 8 and 12 a plate

@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING
 
 from scissorcal.errors import InputError
 from scissorcal.files import host_name
-from scissorcal.locks import NO_LOCKS, try_lock
+from scissorcal.locks import try_lock
 
 if TYPE_CHECKING:
     from scissorcal.workday.workspace import Workspace
@@ -46,11 +46,8 @@ def writing(
         yield
         return
     with opened as file:
-        try:
-            held = try_lock(file)
-        except OSError as error:
-            if error.errno not in NO_LOCKS:
-                raise
+        held = try_lock(file)
+        if held is None:
             tell(
                 f"{path} cannot be locked on its file system: of two commands that write at once "
                 "each file is whole, and the last one written stays."

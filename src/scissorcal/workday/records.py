@@ -11,7 +11,7 @@ from scissorcal.errors import InputError
 from scissorcal.files import replacing
 from scissorcal.foreign import open_foreign, refuse_unless_regular
 from scissorcal.foreign.formats import RECORDS
-from scissorcal.locks import NO_LOCKS, try_lock
+from scissorcal.locks import try_lock
 
 FORMAT = "scissorcal-records/1"
 
@@ -91,13 +91,7 @@ class RecordFile:
         if self.path.exists():
             refuse_unless_regular(self.path, RECORDS)
         self._stream = self.path.open("a+b")
-        try:
-            free = try_lock(self._stream)
-        except OSError as error:
-            if error.errno not in NO_LOCKS:
-                raise
-            free = True
-        if not free:
+        if try_lock(self._stream) is False:
             self._stream.close()
             raise InputError(
                 f"{self.path} is being written by another run of this command: wait for it, or "

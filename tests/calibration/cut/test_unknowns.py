@@ -7,6 +7,7 @@ import pytest
 
 from scissorcal.calibration import FittedParameter
 from scissorcal.calibration.cut.unknowns import BY_EYE_M, SceneMean, with_unknowns
+from scissorcal.verdicts import TORQUE
 from tests.calibration.cut.recipes import paper
 from tests.calibration.signals.test_idle import NOISE, ZERO, recording
 from tests.package.fits import cut_fit, friction_fit
@@ -37,7 +38,7 @@ def test_four_unmeasured_quantities_give_four_bounds_and_remedies():
         "friction by load": "loaded sweeps",
     }.items():
         verdict = found[name]
-        assert verdict.bounds_torque
+        assert verdict.guards.startswith(TORQUE)
         assert verdict.limit == "at most"
         assert verdict.threshold == pytest.approx(0.07)
         assert verdict.status == ("pass" if verdict.value <= 0.07 else "not_evaluated")

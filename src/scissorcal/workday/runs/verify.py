@@ -23,7 +23,7 @@ from scissorcal.workday.workspace import FitKind, Workspace
 if TYPE_CHECKING:
     from scissorcal.calibration import FitResult
     from scissorcal.calibration.fit_model import Experiment
-    from scissorcal.calibration.verify.result import CheckKind, VerifyResult
+    from scissorcal.calibration.verify.result import VerifyResult
     from scissorcal.calibration.verify.simulator import Simulator
     from scissorcal.calibration.verify.study import Study, Task
     from scissorcal.recording import Recording
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 ALGORITHM = 6
 """Raised whenever a fit of the same inputs would give other numbers."""
-
-CHECKS: "tuple[CheckKind, ...]" = ("sbc", "halves", "prior")
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation, RotationSpline
 
 from scissorcal.aliases import Array
 
@@ -20,6 +23,8 @@ Probe = Callable[[Array], tuple[float, Array]]
 """Signed distance to the surface, positive outside, and the normal (3,) there, of a point (3,)."""
 Path = Callable[[Array, float, float], tuple[Array, Array]]
 """The parameters (n,) of a path at times (n,), with a phase (rad) and an angular rate (rad/s)."""
+Motion = Callable[[Array], tuple[Array, Array]]
+"""The plate's true rotation (n, 3, 3) and place (n, 3) at times (n,)."""
 
 CONTACT_HZ = 100.0
 CAMERA_HZ = 33.0
@@ -39,6 +44,7 @@ EXPOSURE_JITTER_S = 1e-3
 SPEED_M_PER_S, SPIN_RAD_PER_S, MOTION_S, SMOOTH_S = 0.02, math.radians(5.0), 0.5, 0.03
 DOUBTED_FLIPS, DOUBTED = 0.9, 0.1
 FINE_S, MARGIN_S, KNOTS = 2e-3, 0.1, 5
+WAVE_HEIGHT_M, WAVE_M = 1.5e-3, 0.03
 
 
 @dataclass(frozen=True)
@@ -57,7 +63,7 @@ class Scenario:
 
 
 @dataclass(frozen=True)
-class Seen:
+class Picture:
     """One picture: when it was exposed (as stamped), when it arrived, and the pose in it.
 
     ``certain`` is what the odds of both poses of a plane say: most mirrored pictures are known to
@@ -91,7 +97,7 @@ class World:
     force_N: Array
     force_vector_N: Array
     velocity_m_per_s: Array
-    pictures: tuple[Seen, ...]
+    pictures: tuple[Picture, ...]
 
 
 def plane(a: Array, b: Array) -> tuple[Array, Array]:
@@ -124,27 +130,18 @@ def sphere(radius_m: float) -> Shape:
     return shape
 
 
-def hilly(height_m: float = 1.5e-3, length_m: float = 0.03) -> Shape:
+def wavy(a: Array, b: Array) -> tuple[Array, Array]:
     """A smooth free-form face: three waves, with height and tilt 0 at the origin."""
-    waves = ((1.0, 0.3, 0.4), (-0.5, 1.1, 1.3), (0.7, -0.8, 2.2))
-
-    def height(a: Array, b: Array) -> tuple[Array, Array, Array]:
-        z, z_a, z_b = np.zeros_like(a), np.zeros_like(a), np.zeros_like(a)
-        for i, j, phase in waves:
-            k, m = 2.0 * np.pi * i / length_m / 2.0, 2.0 * np.pi * j / length_m / 2.0
-            turn = k * a + m * b + phase
-            z += (np.sin(turn) - math.sin(phase) - (k * a + m * b) * math.cos(phase)) / 3.0
-            z_a += k * (np.cos(turn) - math.cos(phase)) / 3.0
-            z_b += m * (np.cos(turn) - math.cos(phase)) / 3.0
-        return height_m * z, height_m * z_a, height_m * z_b
-
-    def shape(a: Array, b: Array) -> tuple[Array, Array]:
-        z, z_a, z_b = height(a, b)
-        normal = np.stack([-z_a, -z_b, np.ones_like(a)], axis=1)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        return np.stack([a, b, z], axis=1), normal
-
-    return shape
+    z, z_a, z_b = np.zeros_like(a), np.zeros_like(a), np.zeros_like(a)
+    for i, j, phase in ((1.0, 0.3, 0.4), (-0.5, 1.1, 1.3), (0.7, -0.8, 2.2)):
+        k, m = 2.0 * np.pi * i / WAVE_M / 2.0, 2.0 * np.pi * j / WAVE_M / 2.0
+        turn = k * a + m * b + phase
+        z += (np.sin(turn) - math.sin(phase) - (k * a + m * b) * math.cos(phase)) / 3.0
+        z_a += k * (np.cos(turn) - math.cos(phase)) / 3.0
+        z_b += m * (np.cos(turn) - math.cos(phase)) / 3.0
+    normal = np.stack([-WAVE_HEIGHT_M * z_a, -WAVE_HEIGHT_M * z_b, np.ones_like(a)], axis=1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.stack([a, b, WAVE_HEIGHT_M * z], axis=1), normal
 
 
 def probe_plane(point: Array) -> tuple[float, Array]:
@@ -206,16 +203,17 @@ def make_world(scenario: Scenario, shape: Shape, path: Path, rng: np.random.Gene
     apart = tip(times + step)[3] - tip(times - step)[3]
     sliding = apart - normal * np.sum(apart * normal, axis=1, keepdims=True)
     along = sliding / np.linalg.norm(sliding, axis=1, keepdims=True)
-    rates = [motion(times + at) for at in (-step, step)]
-    moved = [
-        p + _each(r, tip(times + at)[3]) for (r, p), at in zip(rates, (-step, step), strict=True)
-    ]
-    outward = _each(rotation, normal)
-    on_tool = outward * force[:, None] - _each(rotation, along) * (friction * force)[:, None]
+
+    def in_rig(at: Array) -> Array:
+        turn, origin = motion(at)
+        return np.asarray(origin + _rotated(turn, tip(at)[3]))
+
+    outward = _rotated(rotation, normal)
+    on_tool = outward * force[:, None] - _rotated(rotation, along) * (friction * force)[:, None]
     slow = slow_process(count, 1.0 / CONTACT_HZ, SLOW_S, rng) * SLOW_M
     aside = slow_process(3 * count, 1.0 / CONTACT_HZ, SLOW_S, rng).reshape(3, count).T * SIDEWAYS_M
     aside -= outward * np.sum(aside * outward, axis=1, keepdims=True)
-    point = place + _each(rotation, tipped) + outward * slow[:, None] + aside
+    point = place + _rotated(rotation, tipped) + outward * slow[:, None] + aside
     point = point + WHITE_M * rng.standard_normal((count, 3))
     zero = FORCE_ZERO_N * rng.standard_normal(3)
     felt = on_tool + zero + FORCE_NOISE_N * rng.standard_normal((count, 3))
@@ -223,60 +221,40 @@ def make_world(scenario: Scenario, shape: Shape, path: Path, rng: np.random.Gene
         times_s=times,
         rotation=rotation,
         place_m=place,
-        touched_m=place + _each(rotation, surface),
+        touched_m=place + _rotated(rotation, surface),
         normal=outward,
         point_m=STEP_M * np.round(point / STEP_M),
         force_N=np.sum(felt * outward, axis=1),
         force_vector_N=felt,
-        velocity_m_per_s=(moved[1] - moved[0]) / (2.0 * step),
+        velocity_m_per_s=(in_rig(times + step) - in_rig(times - step)) / (2.0 * step),
         pictures=tuple(pictures_of(scenario, motion, rng)),
     )
 
 
-def plate_motion(
-    scenario: Scenario, rng: np.random.Generator
-) -> Callable[[Array], tuple[Array, Array]]:
-    """True rotation (n, 3, 3) and place (n, 3) at times (n,): sums of two waves in each axis."""
-    from scipy.spatial.transform import Rotation
-
+def plate_motion(scenario: Scenario, rng: np.random.Generator) -> Motion:
+    """A plate at rest, or one whose six velocities are smoothed noise."""
     start = Rotation.random(random_state=rng)
     middle = np.array([0.1, 0.0, 0.0]) + 0.02 * rng.standard_normal(3)
-    speed = SPEED_M_PER_S if scenario.moving else 0.0
-    spin = SPIN_RAD_PER_S if scenario.moving else 0.0
-    from scipy.interpolate import CubicSpline
-    from scipy.spatial.transform import RotationSpline
-
     count = round((scenario.seconds + 2.0 * MARGIN_S) / FINE_S)
+    noise = [slow_process(count, FINE_S, MOTION_S, rng) for _ in range(6)]
+    if not scenario.moving:
+        return lambda times: (
+            np.tile(start.as_matrix(), (len(times), 1, 1)),
+            np.tile(middle, (len(times), 1)),
+        )
     fine = FINE_S * np.arange(count) - MARGIN_S
-    sizes = np.repeat([spin, speed], 3)
-    rates = sizes * np.stack(
-        [_smoothed(slow_process(count, FINE_S, MOTION_S, rng)) for _ in sizes], axis=1
-    )
-    ways = np.cumsum(rates, axis=0) * FINE_S
-    turns = np.diff(ways[::KNOTS, :3], axis=0)
+    sizes = np.repeat([SPIN_RAD_PER_S, SPEED_M_PER_S], 3)
+    ways = np.cumsum(sizes * np.stack([_smoothed(part) for part in noise], axis=1), axis=0) * FINE_S
     attitudes = [start.as_matrix()]
-    for turn in Rotation.from_rotvec(turns).as_matrix():
+    for turn in Rotation.from_rotvec(np.diff(ways[::KNOTS, :3], axis=0)).as_matrix():
         attitudes.append(turn @ attitudes[-1])
-    if scenario.moving:
-        turn_at = RotationSpline(fine[::KNOTS], Rotation.from_matrix(attitudes))
-        place_at = CubicSpline(fine, ways[:, 3:] - ways[0, 3:])
-
-    def at(times: Array) -> tuple[Array, Array]:
-        if not scenario.moving:
-            return np.tile(start.as_matrix(), (len(times), 1, 1)), np.tile(middle, (len(times), 1))
-        return turn_at(times).as_matrix(), middle + place_at(times)
-
-    return at
+    turn_at = RotationSpline(fine[::KNOTS], Rotation.from_matrix(attitudes))
+    place_at = CubicSpline(fine, ways[:, 3:] - ways[0, 3:])
+    return lambda times: (turn_at(times).as_matrix(), middle + place_at(times))
 
 
-def pictures_of(
-    scenario: Scenario,
-    motion: Callable[[Array], tuple[Array, Array]],
-    rng: np.random.Generator,
-) -> list[Seen]:
+def pictures_of(scenario: Scenario, motion: Motion, rng: np.random.Generator) -> list[Picture]:
     """Pictures in the order of their arrival: late, noisy, biased, dropped, mirrored in bursts."""
-    from scipy.spatial.transform import Rotation
-
     count = int(scenario.seconds * CAMERA_HZ)
     exposed = np.sort(np.arange(count) / CAMERA_HZ + rng.uniform(-2e-3, 2e-3, count) + 2e-3)
     arrives = exposed + rng.uniform(*DELAY_S, count)
@@ -290,24 +268,22 @@ def pictures_of(
     covariance = np.zeros((6, 6))
     covariance[:3, :3] = axes @ np.diag(np.square(NOISE_RAD)) @ axes.T
     covariance[3:, 3:] = axes @ np.diag(np.square(NOISE_M)) @ axes.T
-    found = []
+    bias = Rotation.from_rotvec(bias_turn)
+    pictures = []
     for index in np.flatnonzero(kept):
         turn = Rotation.from_rotvec(axes @ (np.array(NOISE_RAD) * rng.standard_normal(3)))
-        bias = Rotation.from_rotvec(bias_turn)
-        seen = (turn * bias * Rotation.from_matrix(rotation[index])).as_matrix()
+        measured = (turn * bias * Rotation.from_matrix(rotation[index])).as_matrix()
         if flipped[index]:
-            seen = _mirrored(seen, axes[:, 2])
+            measured = _mirrored(measured, axes[:, 2])
         where = place[index] + bias_place + axes @ (np.array(NOISE_M) * rng.standard_normal(3))
         stamp = float(exposed[index] + EXPOSURE_JITTER_S * rng.standard_normal())
         certain = bool(rng.random() >= (DOUBTED_FLIPS if flipped[index] else DOUBTED))
-        found.append(Seen(stamp, float(arrives[index]), seen, where, covariance, certain))
-    return sorted(found, key=lambda one: one.arrives_s)
+        pictures.append(Picture(stamp, float(arrives[index]), measured, where, covariance, certain))
+    return sorted(pictures, key=lambda picture: picture.arrives_s)
 
 
 def _mirrored(rotation: Array, sight: Array) -> Array:
     """The second pose of a plane: its normal mirrored at the line of sight."""
-    from scipy.spatial.transform import Rotation
-
     normal = rotation[:, 2]
     across = np.cross(normal, sight)
     tilt = math.atan2(float(np.linalg.norm(across)), float(normal @ sight))
@@ -328,8 +304,6 @@ def _bursts(count: int, share: float, rng: np.random.Generator) -> NDArray[np.bo
 
 def slow_process(count: int, step_s: float, time_s: float, rng: np.random.Generator) -> Array:
     """A first-order process of unit variance."""
-    from scipy.signal import lfilter
-
     keep = math.exp(-step_s / time_s)
     drawn = rng.standard_normal(count) * math.sqrt(1.0 - keep * keep)
     drawn[0] /= math.sqrt(1.0 - keep * keep)
@@ -338,11 +312,9 @@ def slow_process(count: int, step_s: float, time_s: float, rng: np.random.Genera
 
 def _smoothed(velocity: Array) -> Array:
     """Velocities behind a low-pass of SMOOTH_S, so that a plate has no jerks."""
-    from scipy.signal import lfilter
-
     keep = math.exp(-FINE_S / SMOOTH_S)
     return np.asarray(lfilter([1.0 - keep], [1.0, -keep], velocity))
 
 
-def _each(rotation: Array, vectors: Array) -> Array:
+def _rotated(rotation: Array, vectors: Array) -> Array:
     return np.asarray(np.einsum("nij,nj->ni", rotation, vectors))
