@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from scissorcal.calibration.cut import CutExperiment, cut_experiment, cutting_from, fit_cut
     from scissorcal.calibration.fit_model import Experiment
+    from scissorcal.calibration.fit_run import CutRun, FrictionRun
     from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
     from scissorcal.calibration.friction.model import FrictionExperiment
     from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
@@ -13,11 +14,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CutExperiment",
+    "CutRun",
     "Experiment",
     "FitResult",
     "FitSeries",
     "FittedParameter",
     "FrictionExperiment",
+    "FrictionRun",
     "StrokeError",
     "cut_experiment",
     "cutting_from",
@@ -36,6 +39,7 @@ _HOMES = {
     "cut.model": ("CutExperiment",),
     "cut.structure": ("cutting_from",),
     "fit_model": ("Experiment",),
+    "fit_run": ("CutRun", "FrictionRun"),
     "friction.fit": ("fit_friction", "friction_experiment"),
     "friction.model": ("FrictionExperiment",),
     "result": ("FitResult", "FitSeries", "FittedParameter", "StrokeError"),
