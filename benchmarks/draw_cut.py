@@ -20,8 +20,8 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.cut import teeth
 from scissorcal.calibration.cut.geometry import belief_geometry
 from scissorcal.calibration.cut.known import CutBasis, KnownFriction
-from scissorcal.calibration.cut.path import mean_torque, path_motion
-from scissorcal.calibration.cut.path.motion import find_runs, split
+from scissorcal.calibration.cut.path_motion import find_runs, path_motion, split
+from scissorcal.calibration.cut.path_work import mean_torque
 from scissorcal.calibration.cut.scout import Scouted, scout, tooth_periods
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.friction.fit import fit_friction

@@ -17,7 +17,7 @@ from scissorcal.calibration.critic import (
     structure_verdict,
 )
 from scissorcal.calibration.fit_candidate import fit_candidate
-from scissorcal.calibration.fit_run import FrictionRun
+from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.model.course_terms import LIBRARY
 from scissorcal.recipe.schema import FitFriction

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.fit_run import FrictionRun
+from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.verdicts import Verdict
 from tests.calibration.planted import planted

@@ -15,9 +15,9 @@ from scissorcal.inference import (
     smooth_weights,
     tails_of,
 )
+from scissorcal.inference.ascent import least_squares
 from scissorcal.inference.between import between_groups
 from scissorcal.inference.importance import sample_by_importance
-from scissorcal.inference.least_squares import least_squares
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.thorough import rank_r_hat
 

@@ -8,7 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.calibration.verify.simulation import Sheet, Unevenness, crack_law, material_torque
+from scissorcal.calibration.verify.simulated_recordings import (
+    Sheet,
+    Unevenness,
+    crack_law,
+    material_torque,
+)
 from scissorcal.kernel import CrackPath, walk_crack
 from scissorcal.model import Cutting, Edge, Response, settled_contact
 from scissorcal.model.cutting import torque_at

@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scissorcal.calibration.cut import CutExperiment, cut_experiment, cutting_from, fit_cut
-    from scissorcal.calibration.fit_model import Experiment
-    from scissorcal.calibration.fit_run import CutRun, FrictionRun
+    from scissorcal.calibration.fit_model import CutRun, Experiment, FrictionRun
     from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
     from scissorcal.calibration.friction.model import FrictionExperiment
     from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError

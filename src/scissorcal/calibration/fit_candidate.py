@@ -14,9 +14,9 @@ from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference.autocorrelation import ljung_box
 from scissorcal.inference.curvature import gradient, likelihood_information, natural_step
+from scissorcal.inference.noise import log_density
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.problem import Counter, Problem, Stop
-from scissorcal.inference.tails import log_density
 
 FOLDS = 4
 SEARCH_REACH = 8.0

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.inference.ar_noise import ArNoise, fit_ar, runs
 from scissorcal.inference.curvature import Slopes
+from scissorcal.inference.noise import ArNoise, fit_ar, runs
 from scissorcal.inference.problem import Problem
 
 RESIDUALS_A_LAG = 5

@@ -12,7 +12,8 @@ import pytest
 from scissorcal.calibration.cut.geometry import belief_geometry
 from scissorcal.calibration.cut.guess import Guess
 from scissorcal.calibration.cut.known import KnownFriction, MaterialData
-from scissorcal.calibration.cut.path import mean_torque, path_motion
+from scissorcal.calibration.cut.path_motion import path_motion
+from scissorcal.calibration.cut.path_work import mean_torque
 from scissorcal.calibration.cut.segments import cut_into_segments
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.signals.torque_noise import TorqueNoise

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult, cut_experiment, cutting_from, fit_cut
-from scissorcal.calibration.fit_run import CutRun
+from scissorcal.calibration.fit_model import CutRun
 from scissorcal.calibration.store import load_fit, save
 from scissorcal.model import Edge, EdgeBelief
 from tests.calibration.cut.recipes import friction_of, paper, pressing

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction, load_fit, save
-from scissorcal.calibration.fit_run import FrictionRun
+from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.errors import InputError
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording

@@ -11,13 +11,8 @@ from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
 from scissorcal.calibration.verify.result import Calibration
-from scissorcal.calibration.verify.simulation import (
-    CutTruth,
-    DriveTruth,
-    Unevenness,
-    motion_of,
-    simulate_cut,
-)
+from scissorcal.calibration.verify.simulated_motion import DriveTruth, motion_of
+from scissorcal.calibration.verify.simulated_recordings import CutTruth, Unevenness, simulate_cut
 from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
 from scissorcal.calibration.verify.study import Study, run
 from scissorcal.model import Cutting, Response

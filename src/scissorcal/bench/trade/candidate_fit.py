@@ -9,7 +9,7 @@ import numpy as np
 
 from scissorcal.bench.trade.case import Case
 from scissorcal.calibration.cut.fit import fit_cut
-from scissorcal.calibration.fit_run import CutRun
+from scissorcal.calibration.fit_model import CutRun
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError

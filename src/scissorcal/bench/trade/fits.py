@@ -17,7 +17,7 @@ from scissorcal.bench.trade.torque import (
     torque_errors,
 )
 from scissorcal.calibration import FitResult, fit_cut, fit_friction
-from scissorcal.calibration.fit_run import CutRun
+from scissorcal.calibration.fit_model import CutRun
 
 PROCESSOR, EVALUATIONS, MINUTES = "processor time", "evaluations", "capture"
 MEAN, SD = "posterior mean, worst parameter", "posterior sd, worst parameter"

@@ -9,8 +9,8 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.model import CutExperiment
-from scissorcal.calibration.cut.path import Material, PathMotion
-from scissorcal.calibration.cut.path.motion import find_runs
+from scissorcal.calibration.cut.path_motion import PathMotion, find_runs
+from scissorcal.calibration.cut.path_work import Material
 from scissorcal.calibration.cut.scout import Scouted
 from scissorcal.calibration.cut.teeth import COHERENT
 from scissorcal.calibration.cut.widening import Budget

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.known import KnownFriction
-from scissorcal.calibration.cut.path import path_motion
+from scissorcal.calibration.cut.path_motion import path_motion
 from scissorcal.calibration.cut.structure import cutting_from, fitted_cutting, some_draws
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError

@@ -20,7 +20,7 @@ from scissorcal.calibration.cut.guess import CoarseEncoderError, NoUnloadingErro
 from scissorcal.calibration.cut.known import CutBasis, KnownFriction
 from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws, usual_law
 from scissorcal.calibration.cut.model import CutExperiment
-from scissorcal.calibration.cut.path import PathMotion, path_motion
+from scissorcal.calibration.cut.path_motion import PathMotion, path_motion
 from scissorcal.calibration.cut.scout import (
     MisfitError,
     Scouted,
@@ -40,8 +40,7 @@ from scissorcal.calibration.cut.widening import (
     load_note,
 )
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
-from scissorcal.calibration.fit_model import Outcome
-from scissorcal.calibration.fit_run import CutRun, candidates_for, draft_note
+from scissorcal.calibration.fit_model import CutRun, Outcome, candidates_for, draft_note
 from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors

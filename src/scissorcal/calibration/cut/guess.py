@@ -8,8 +8,8 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.known import MaterialData
-from scissorcal.calibration.cut.path import Material, PathMotion, mean_torque
-from scissorcal.calibration.cut.path.motion import Run, find_runs
+from scissorcal.calibration.cut.path_motion import PathMotion, Run, find_runs
+from scissorcal.calibration.cut.path_work import Material, mean_torque
 from scissorcal.model import Response
 from scissorcal.recipe.priors import LogNormalPrior
 

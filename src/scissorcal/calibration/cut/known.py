@@ -6,10 +6,10 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.geometry import Geometry, belief_geometry
-from scissorcal.calibration.cut.path import (
+from scissorcal.calibration.cut.path_motion import PathMotion
+from scissorcal.calibration.cut.path_work import (
     FrictionDraws,
     Material,
-    PathMotion,
     material_of,
     torque_noise_of,
 )

@@ -14,14 +14,19 @@ from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess
 from scissorcal.calibration.cut.known import MaterialData
-from scissorcal.calibration.cut.path import (
-    Material,
+from scissorcal.calibration.cut.path_motion import (
+    FEWEST_SEGMENTS,
     PathMotion,
+    Run,
+    find_runs,
+    split,
+)
+from scissorcal.calibration.cut.path_work import (
+    Material,
     mean_torque,
     sums_between,
     torque_covariance,
 )
-from scissorcal.calibration.cut.path.motion import FEWEST_SEGMENTS, Run, find_runs, split
 from scissorcal.calibration.cut.rests import (
     ELASTIC_SEGMENTS,
     LEAST_RANGE_RAD,

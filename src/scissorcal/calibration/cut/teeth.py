@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.path import Material
+from scissorcal.calibration.cut.path_work import Material
 from scissorcal.calibration.cut.segments import Segments, Stretch, sledge_share
 
 Complex = NDArray[np.complex128]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from scissorcal.aliases import Mask
-from scissorcal.calibration.cut.path.motion import PathMotion
+from scissorcal.calibration.cut.path_motion import PathMotion
 from scissorcal.calibration.cut.segments import Segments
 from scissorcal.calibration.signals.usage import GAP, INVALID, Usage, count_usage
 from scissorcal.recording.recording import Recording

@@ -10,7 +10,7 @@ from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.known import CutBasis
 from scissorcal.calibration.cut.laws import CutLaw
 from scissorcal.calibration.cut.model import CutExperiment
-from scissorcal.calibration.cut.path import path_motion
+from scissorcal.calibration.cut.path_motion import path_motion
 from scissorcal.calibration.cut.scout import guess_at, make_experiment
 from scissorcal.calibration.cut.segments import cut_into_segments
 from scissorcal.calibration.friction.layout import LawChoice
@@ -18,9 +18,8 @@ from scissorcal.calibration.friction.model import FrictionExperiment, design
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.weak_form import weigh
-from scissorcal.calibration.verify.simulation import (
-    Motion,
-    SmoothPiece,
+from scissorcal.calibration.verify.simulated_motion import Motion, SmoothPiece
+from scissorcal.calibration.verify.simulated_recordings import (
     cut_truth,
     friction_truth,
     simulate_cut,

@@ -12,7 +12,7 @@ from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.known import USUAL_RATE, CutBasis, KnownFriction
 from scissorcal.calibration.cut.laws import CutLaw, allowed_laws
 from scissorcal.calibration.cut.model import CutExperiment
-from scissorcal.calibration.cut.path import torque_noise_of
+from scissorcal.calibration.cut.path_work import torque_noise_of
 from scissorcal.calibration.cut.scout import cut_prior
 from scissorcal.calibration.cut.structure import geometry_of
 from scissorcal.calibration.cut.widening import error_shares

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from scissorcal.aliases import Array, Integers, Mask
-from scissorcal.calibration.fit_run import FrictionRun
+from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.friction.refusals import FEWEST_BINS
 from scissorcal.calibration.result import Effort, FitResult, Proposal

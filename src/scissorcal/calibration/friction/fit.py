@@ -16,8 +16,7 @@ from scissorcal.calibration.between import (
     widened,
 )
 from scissorcal.calibration.fit_candidate import FittedCandidate
-from scissorcal.calibration.fit_model import Outcome
-from scissorcal.calibration.fit_run import FrictionRun, candidates_for, draft_note
+from scissorcal.calibration.fit_model import FrictionRun, Outcome, candidates_for, draft_note
 from scissorcal.calibration.friction.checks import (
     BANDWIDTH,
     bandwidth_verdict,

@@ -16,7 +16,7 @@ import numpy as np
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.friction.columns import SCALES, Cell, FrictionBasis, coupled_nodes
 from scissorcal.calibration.parameters import Layout
-from scissorcal.inference.ar_noise import runs
+from scissorcal.inference.noise import runs
 from scissorcal.model.transforms import IDENTITY, Transform
 
 Block = tuple[str, int, int]

@@ -9,7 +9,7 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.fit_candidate import CandidateProblem
 from scissorcal.calibration.friction.columns import Cell
 from scissorcal.calibration.friction.moments import ReducedLaw
-from scissorcal.inference.least_squares import least_squares
+from scissorcal.inference.ascent import least_squares
 from scissorcal.inference.optimise import Cluster, Optimum, is_rounded
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import SearchStatus, about, picked

@@ -10,17 +10,16 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.comparison import names_of_contenders
 from scissorcal.calibration.cut import fit_cut
 from scissorcal.calibration.cut.known import KnownFriction
-from scissorcal.calibration.cut.path import torque_noise_of
-from scissorcal.calibration.fit_run import CutRun, FrictionRun
+from scissorcal.calibration.cut.path_work import torque_noise_of
+from scissorcal.calibration.fit_model import CutRun, FrictionRun
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.parameters import Layout, StatedPrior
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
-from scissorcal.calibration.verify.simulation import (
-    Motion,
+from scissorcal.calibration.verify.simulated_motion import Motion, motion_of
+from scissorcal.calibration.verify.simulated_recordings import (
     cut_truth,
     friction_truth,
-    motion_of,
     simulate_cut,
     simulate_friction,
 )

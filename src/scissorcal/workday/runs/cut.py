@@ -21,7 +21,7 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     import numpy as np
 
     from scissorcal.calibration.cut.fit import fit_cut
-    from scissorcal.calibration.fit_run import CutRun
+    from scissorcal.calibration.fit_model import CutRun
     from scissorcal.workday.runs.fit import Made, load_result
 
     request.progress(0.0, "cut: reading recordings")

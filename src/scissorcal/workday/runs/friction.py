@@ -36,7 +36,7 @@ def fitted(
     """Fit an axis by its function and settings to the used recordings of a kind."""
     import numpy as np
 
-    from scissorcal.calibration.fit_run import FrictionRun
+    from scissorcal.calibration.fit_model import FrictionRun
     from scissorcal.workday.runs.fit import Made
 
     request.progress(0.0, f"{kind}: reading recordings")

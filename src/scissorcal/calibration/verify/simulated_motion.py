@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.aliases import Array, Integers, Mask
-from scissorcal.calibration.cut.path import PathMotion, built_friction, built_up, path_motion
+from scissorcal.calibration.cut.path_motion import PathMotion, path_motion
+from scissorcal.calibration.cut.path_work import built_friction, built_up
 from scissorcal.calibration.signals.segments import bridge
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.weak_form import HELD
@@ -87,7 +88,7 @@ class Motion:
 def motion_of(
     recordings: tuple[Recording, ...], inertia: float, unseen_Nm: float
 ) -> tuple[Motion, ...]:
-    """The smooth motion of recordings, from :func:`~scissorcal.calibration.cut.path.path_motion`.
+    """The smooth motion of recordings (:func:`~scissorcal.calibration.cut.path_motion.path_motion`).
 
     ``inertia`` (kg m^2) is used to smooth the path. The most probable path keeps errors of the
     encoder's size, step / sqrt(12). Their accelerations times the inertia would be a torque that

@@ -11,7 +11,7 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
-from scissorcal.calibration.verify.simulation.motion import DriveTruth, Motion, measured_drive
+from scissorcal.calibration.verify.simulated_motion import DriveTruth, Motion, measured_drive
 from scissorcal.kernel import CrackLaw, CrackPath, Curve, walk_crack
 from scissorcal.model import Cutting, Edge, FrictionLaw, Response
 from scissorcal.recording.recording import Recording
