@@ -88,7 +88,7 @@ class Motion:
 def motion_of(
     recordings: tuple[Recording, ...], inertia: float, unseen_Nm: float
 ) -> tuple[Motion, ...]:
-    """The smooth motion of recordings (:func:`~scissorcal.calibration.cut.path_motion.path_motion`).
+    """The smooth motion of recordings, as :func:`~.cut.path_motion.path_motion` finds it.
 
     ``inertia`` (kg m^2) is used to smooth the path. The most probable path keeps errors of the
     encoder's size, step / sqrt(12). Their accelerations times the inertia would be a torque that
