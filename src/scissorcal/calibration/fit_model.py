@@ -144,16 +144,16 @@ class Named(Protocol):
         ...
 
 
-Candidate = TypeVar("Candidate", bound=Named)
+Law = TypeVar("Law", bound=Named)
 
 
 def candidates_for(
     effort: Effort,
-    candidates: Sequence[Candidate],
-    usual: Callable[[Sequence[Candidate]], Candidate],
+    candidates: Sequence[Law],
+    usual: Callable[[Sequence[Law]], Law],
     last_chosen: str | None = None,
     among: Container[str] = (),
-) -> tuple[Candidate, ...]:
+) -> tuple[Law, ...]:
     """The candidates that are fitted at an effort, simplest first.
 
     Draft fits one: the only one that the recipe leaves, else the one that the last fit of the

@@ -17,7 +17,7 @@ from scissorcal.identity import VERSION, bytes_digest
 from scissorcal.package.archive import member_of, write_archive
 from scissorcal.package.compile import scene_ranges
 from scissorcal.package.drawn_plate import piece_records
-from scissorcal.package.exact import FitDraws, central_model
+from scissorcal.package.exact import FitDraws, central_model, pick_draws
 from scissorcal.package.friction_tables import cut_left_out, left_out
 from scissorcal.package.manifest import (
     CutRecord,
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import LayerPiece
     from scissorcal.package.simplest.model import Simplified
 
-MOST_DRAWS = 200
 SAME_M = 1e-9
 """Curves that are closer than this are one: solved on other computers they differ by rounding."""
 UNHASHED = "0" * 64
@@ -360,29 +359,6 @@ def _record(fit: FitResult) -> dict[str, Any]:
 
 def _warnings(verdicts: tuple[Verdict, ...]) -> tuple[str, ...]:
     return tuple(f"{verdict.scope}, {verdict.check}: {verdict.why}" for verdict in failed(verdicts))
-
-
-def pick_draws(
-    cut: FitResult, friction: FitResult | None, rng: np.random.Generator
-) -> dict[str, NDArray[Any]]:
-    """Equally many draws of each fit, at most 200.
-
-    A cut's fit draws friction's parameters jointly with its own, so those draws are used: torque
-    that a draw attributes to the material is then not attributed to friction too. Parameters that
-    it did not draw (the inertia, or all of them) are paired at random.
-    """
-    count = min(MOST_DRAWS, len(cut.draws), *([len(friction.draws)] if friction else []))
-    rows = rng.permutation(len(cut.draws))[:count]
-    picked = {"draws/cut.npy": np.asarray(cut.draws[rows], dtype=np.float64)}
-    if friction is None:
-        return picked
-    own = friction.draws[rng.permutation(len(friction.draws))[:count]].astype(np.float64)
-    if cut.nuisance_draws is not None:
-        names = [parameter.name for parameter in cut.nuisance]
-        for column, parameter in enumerate(friction.parameters):
-            if parameter.name in names:
-                own[:, column] = cut.nuisance_draws[rows, names.index(parameter.name)]
-    return {**picked, "draws/friction.npy": own}
 
 
 def _hashed(manifest: Manifest) -> Manifest:
