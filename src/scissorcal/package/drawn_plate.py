@@ -100,7 +100,7 @@ def kernel_pieces(records: Sequence[PieceRecord]) -> tuple[Piece, ...]:
                 record.begin_m,
                 record.upper_face_m,
                 record.scale,
-                tuple(Strip(one.end_m, one.fracture_energy_J_per_m) for one in record.strips),
+                tuple(Strip(strip.end_m, strip.fracture_energy_J_per_m) for strip in record.strips),
             )
             for record in records
         )

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scissorcal.calibration.plateau import LEAST_PLATEAU, Plateau
-from scissorcal.calibration.stroke_intervals import Interval
+from scissorcal.calibration.stroke_intervals import LEAST_PLATEAU, Interval, Plateau
 from scissorcal.report.html import made_line, panel_section, parts_nav, prose, whole_page
 from scissorcal.report.panel import (
     Axis,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.camera.checks import CameraThere
 from scissorcal.calibration.camera.result import PixelMap
-from scissorcal.calibration.camera.there import CameraThere
 from scissorcal.calibration.plate.checks import plate_verdicts
 from scissorcal.calibration.plate.result import Halves, PlateFit, PlateView
 from scissorcal.errors import InputError, MissingError, VerdictError
@@ -43,7 +43,6 @@ def fit_plate(
     plate_target: Pose = UNMOVED,
     rig: RigPose | None = None,
     places: PixelMap | None = None,
-    inputs_hash: str = "",
 ) -> PlateFit:
     """Fit one pose of the plate to all photographs of it, corners and photographs together.
 
@@ -77,8 +76,8 @@ def fit_plate(
     halves = _halves(corners, camera, priors)
     back = plate_target.inverse()
     views = tuple(
-        _view(photo, found, whole, corners.frame == i)
-        for i, (photo, found) in enumerate(zip(photos, alone, strict=True))
+        _view(photo, located, whole, corners.frame == i)
+        for i, (photo, located) in enumerate(zip(photos, alone, strict=True))
     )
     pose = whole.pose.after(back)
     in_rig = rig.holds(whole, camera).after(back) if rig else None
@@ -94,7 +93,7 @@ def fit_plate(
         rms_px=whole.rms_px,
         noise_px=whole.sd_px,
         verdicts=plate_verdicts(whole, views, halves, camera, _there(photos, places), rig),
-        inputs_hash=inputs_hash,
+        inputs_hash="",
         sources=tuple(photo.name for photo in photos),
     )
 
@@ -138,8 +137,8 @@ def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> Halves | N
     """
     across = corners.points[:, 0]
     ways = ((corners.corner // 4) % 2 == 1, across < np.median(across))
-    found = [halves for way in ways if (halves := _half_and_half(corners, camera, priors, way))]
-    return max(found, key=lambda halves: halves.square, default=None)
+    pairs = [halves for way in ways if (halves := _half_and_half(corners, camera, priors, way))]
+    return max(pairs, key=lambda halves: halves.square, default=None)
 
 
 def _half_and_half(
@@ -167,23 +166,23 @@ def _half_and_half(
 
 
 def _view(
-    photo: PlatePhoto, found: BoardPose, whole: BoardPose, here: NDArray[np.bool_]
+    photo: PlatePhoto, located: BoardPose, whole: BoardPose, here: NDArray[np.bool_]
 ) -> PlateView:
-    normal = found.pose.matrix[:, 2]
-    to_target = found.pose.apply([photo.detection.points.mean(axis=0)])[0]
-    away = difference(found.pose, whole.pose)
-    own = whole.residuals_px[here][found.used]
+    normal = located.pose.matrix[:, 2]
+    to_target = located.pose.apply([photo.detection.points.mean(axis=0)])[0]
+    away = difference(located.pose, whole.pose)
+    own = whole.residuals_px[here][located.used]
     slant = abs(normal @ to_target) / np.linalg.norm(to_target)
     return PlateView(
         name=photo.name,
         corners=len(photo.detection.ids),
         used=int(np.sum(whole.used[here])),
         rms_px=float(np.sqrt(np.mean(np.sum(own**2, axis=1)))),
-        rms_alone_px=found.rms_px,
+        rms_alone_px=located.rms_px,
         side_px=photo.detection.square_px,
         distance_m=float(np.linalg.norm(to_target)),
         tilt_deg=float(np.degrees(np.arccos(np.clip(slant, 0.0, 1.0)))),
-        ambiguity=found.ambiguity,
+        ambiguity=located.ambiguity,
         away_deg=float(np.degrees(np.linalg.norm(away[:3]))),
         away_mm=float(1e3 * np.linalg.norm(away[3:])),
     )

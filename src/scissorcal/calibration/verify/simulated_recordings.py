@@ -1,13 +1,134 @@
-"""The material's torque along a motion: exact crack growth through varying toughness."""
+"""Simulated recordings: friction, cracks and what sensors measure of them."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
+from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.structure import cutting_from
+from scissorcal.calibration.signals.torque_noise import TorqueNoise
+from scissorcal.calibration.verify.simulated_motion import DriveTruth, Motion, measured_drive
 from scissorcal.kernel import CrackLaw, CrackPath, Curve, walk_crack
-from scissorcal.model import Cutting, Edge, Response
+from scissorcal.model import Cutting, Edge, FrictionLaw, Response
+from scissorcal.recording.recording import Recording
+
+
+@dataclass(frozen=True)
+class CutTruth:
+    """A material, and the rig that cuts it."""
+
+    cutting: Cutting
+    uneven: "Unevenness"
+    drive: DriveTruth
+
+
+def friction_truth(
+    values: Mapping[str, float],
+    structure: Mapping[str, Any],
+    noise: TorqueNoise,
+    stroke_sd: float = 0.0,
+) -> DriveTruth:
+    """The rig that parameters of a friction fit, by name, and its structure describe.
+
+    ``noise`` and ``stroke_sd`` (N m) are by sample and by stroke.
+    """
+    return DriveTruth(
+        inertia=float(values["inertia"]),
+        friction=FrictionLaw.of_fit(values, float(structure["angle_center"])),
+        noise=noise,
+        offset=float(values.get("offset", 0.0)),
+        cogging=(
+            float(values.get("cogging_cos", 0.0)),
+            float(values.get("cogging_sin", 0.0)),
+            float(structure.get("cogging_periods_per_turn", 0.0)),
+        ),
+        stroke_sd=stroke_sd,
+        delay_s=float(values.get("delay", 0.0)),
+    )
+
+
+def cut_truth(
+    values: Mapping[str, float], structure: Mapping[str, Any], known: KnownFriction, tick_s: float
+) -> CutTruth:
+    """The material and the rig that parameters of a cut's fit, by name, and its structure describe.
+
+    Friction, inertia and cogging are those of the empty sweeps; their uncertainty is in the
+    offsets among ``values``. Unevenness counts only where something is cut.
+    """
+    cutting = cutting_from(structure, {n: np.asarray(v) for n, v in values.items()})
+    scale = float(values.get("noise_scale", 1.0))
+    noise = replace(
+        known.noise,
+        white_Nm=scale * known.noise.white_Nm,
+        slow_Nm=scale * known.noise.slow_Nm,
+    )
+    cosine, sine, number = known.cogging
+    return CutTruth(
+        cutting=cutting,
+        uneven=Unevenness(
+            float(values.get("variation", 0.0)),
+            float(values.get("variation_length", 1e-3)),
+            float(values.get("sheet_variation", 0.0)),
+        ),
+        drive=DriveTruth(
+            inertia=known.inertia,
+            friction=known.law,
+            fine_rad=known.fine_rad,
+            noise=noise,
+            offset=known.offset,
+            cogging=(-cosine, -sine, number),
+            load_share=float(values.get("load_share", 0.0)),
+            closing_offset=float(values.get("offset_closing", 0.0)),
+            opening_offset=float(values.get("offset_opening", 0.0)),
+            stroke_sd=known.stroke_sd,
+            delay_s=float(values.get("torque_delay", 0.0)) * tick_s,
+        ),
+    )
+
+
+def simulate_friction(
+    motions: tuple[Motion, ...], truth: DriveTruth, rng: np.random.Generator
+) -> tuple[Recording, ...]:
+    """Recordings of empty motion, raw samples with the truth's noise."""
+    return tuple(
+        motion.with_drive(
+            [measured_drive(p, truth, np.zeros(len(p.opening) - 1), rng) for p in motion.pieces],
+            rng,
+        )
+        for motion in motions
+    )
+
+
+def simulate_cut(
+    motions: tuple[Motion, ...], truth: CutTruth, rng: np.random.Generator
+) -> tuple[Recording, ...]:
+    """Recordings of cuts (or presses), raw samples; every sheet is a new draw.
+
+    A sheet that lies in two pieces of a recording, with a gap between them, is walked as one.
+    """
+    return tuple(motion.with_drive(_cut_drives(motion, truth, rng), rng) for motion in motions)
+
+
+def _cut_drives(motion: Motion, truth: CutTruth, rng: np.random.Generator) -> list[Array]:
+    if not motion.pieces:
+        return []
+    lengths = [len(piece.opening) for piece in motion.pieces]
+    opening, advance, sheet = (
+        np.concatenate([getattr(piece, name) for piece in motion.pieces])
+        for name in ("opening", "advance", "sheet")
+    )
+    tick_s = motion.pieces[0].tick_s
+    torque, _ = material_torque(truth.cutting, truth.uneven, (opening, advance, sheet), tick_s, rng)
+    first = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+    return [
+        measured_drive(piece, truth.drive, torque[low : low + length - 1], rng)
+        for piece, low, length in zip(motion.pieces, first.tolist(), lengths, strict=True)
+    ]
+
 
 EDGE_KNOTS = 385
 EDGE_FROM, EDGE_TO = -1.0, 3.0
@@ -90,17 +211,16 @@ def crack_law(cutting: Cutting, tick_s: float, sheet: Sheet | None = None) -> Cr
 def material_torque(
     cutting: Cutting,
     uneven: Unevenness,
-    opening: Array,
-    advance: Array,
-    sheets: NDArray[np.int64],
+    motion: tuple[Array, Array, NDArray[np.int64]],
     tick_s: float,
     rng: np.random.Generator,
 ) -> tuple[Array, tuple[CrackPath, ...]]:
     """Mean torque (n - 1,) of the material over each tick, and the walk through each sheet.
 
-    ``opening``, ``advance`` and ``sheets`` (n,) are by sample; a sheet that is put in (a change of
+    ``motion`` is opening, advance and sheet (n,) by sample; a sheet that is put in (a change of
     its number, -1 for none) is cut from its near edge on. Torque in N m, positive as it opens.
     """
+    opening, advance, sheets = motion
     torque = np.zeros(len(opening) - 1)
     bounds = np.concatenate([[0], np.flatnonzero(np.diff(sheets)) + 1, [len(sheets)]])
     paths = []

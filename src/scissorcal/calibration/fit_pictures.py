@@ -1,15 +1,18 @@
-"""Pictures of a camera's fit: what is left at each corner, and how far its projection is known."""
+"""Pictures that are drawn for the fits of photographs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.camera.bundle import SeenBoard, seen
 from scissorcal.calibration.camera.result import CameraFit, PixelMap, ViewError
+from scissorcal.calibration.edge.result import BladeFit
 from scissorcal.files import replacing
+from scissorcal.vision.blade.photo import BladePhoto, NickMark, blade_picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -107,3 +110,28 @@ def _saved(figure: "Figure", path: Path) -> Path:
     with replacing(path) as part:
         figure.savefig(part, format="png", dpi=110)
     return path
+
+
+def edge_picture(photo: BladePhoto, fits: Mapping[str, BladeFit]) -> NDArray[np.uint8]:
+    """Draw fitted edges over a photograph; ``fits`` by blade's name, as `BladePhoto.names`."""
+    edges, marks = [], []
+    for name, measured in zip(photo.names, photo.measured, strict=True):
+        fit = fits[name]
+        unit = measured.length / fit.belief.edge.length_m if not measured.metric else 1.0
+        edges.append(_scaled_edge(fit, unit))
+        marks.append(
+            [
+                NickMark(nick.station_m * unit, _nick_words(nick.depth_m, fit.metric))
+                for nick in fit.nicks
+            ]
+        )
+    return blade_picture(photo, edges, marks)
+
+
+def _scaled_edge(fit: BladeFit, unit: float) -> Callable[[Array], Array]:
+    edge = fit.belief.edge
+    return lambda station: edge.offset_at(station / unit) * unit
+
+
+def _nick_words(depth: float, metric: bool) -> str:
+    return f"nick {1e3 * depth:.2f} mm" if metric else f"nick {100 * depth:.1f} %"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.calibration.cut.path.motion import PathMotion, turning_points
+from scissorcal.calibration.cut.path_motion import PathMotion, turning_points
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.model import FrictionLaw, friction_torque, presliding_state
 
