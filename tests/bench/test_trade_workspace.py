@@ -123,7 +123,7 @@ def test_each_measurement_names_the_computer_that_made_it(
     found = run(workspace)
     assert found.trade.machine == "one computer; another computer"
     page = found.html.read_text(encoding="utf-8")
-    assert "<dt>Computer</dt><dd>one computer; another computer</dd>" in page
+    assert "computer</th><td>one computer; another computer</td>" in page
 
 
 def test_a_cluster_measures_no_photographs_and_says_why(

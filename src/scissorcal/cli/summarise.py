@@ -149,7 +149,7 @@ def summarise(
         notes=notes,
     )
     panels = summary_panels(shown)
-    page = summary_page(shown)
+    page = summary_page(shown, panels)
     with replacing(output) as part:
         part.write_text(page, encoding="utf-8")
     seen = [
