@@ -10,7 +10,7 @@ from scissorcal.report.panel import Panel, columns
 from scissorcal.verdicts import Verdict
 
 MARKS = {"pass": "pass", "fail": "FAIL", "not_evaluated": "----"}
-MOST_ROWS = 20
+MOST_ROWS = 40
 LARGEST_WIDTH = 120
 """Characters of a table without the notes of its rows; columns beyond it are left to the page."""
 

@@ -114,8 +114,8 @@ def _measured(trade: Trade) -> Panel:
 def _knob(knob: Curve, trade: Trade) -> Panel:
     """One knob: its sentence, its diagram and the table of its settings, main figures first."""
     if knob.missing or not knob.points:
-        notes = (knob.missing,) if knob.missing else knob.sentences
-        return Panel(knob.knob, "trade", knob.title, notes=notes)
+        why = (knob.missing,) if knob.missing else knob.sentences
+        return Panel(knob.knob, "trade", knob.title, notes=why)
     sentence, *notes = knob.sentences or ("",)
     chart = trade_chart(knob, trade)
     return Panel(
@@ -218,7 +218,8 @@ def _lines(placed: Sequence[tuple[Point, float, float]]) -> list[Series]:
     for method in dict.fromkeys(point.setting.method for point, _, _ in placed):
         line = sorted((x, y) for point, x, y in placed if point.setting.method == method)
         if len(line) > 1:
-            lines.append(curve(method or "settings", *zip(*line, strict=True), "muted"))
+            x, y = zip(*line, strict=True)
+            lines.append(curve(method or "settings", x, y, "muted"))
     return lines
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.verify.result import Calibration, VerifyResult
+from scissorcal.calibration.verify.result import Calibration, Halves, Sensitivity, VerifyResult
 from scissorcal.report.numbers import percent, short, significant
 from scissorcal.report.panel import (
     Axis,
@@ -33,21 +33,26 @@ LARGE_Z = 3.0
 
 
 def trust_panels(fit: FitResult, check: VerifyResult | None, part: str) -> tuple[Panel, ...]:
-    """Panels on simulated data, halves and prior sensitivity, as far as they were made."""
-    title, id_ = "Trust check", f"{part}-verify"
+    """The trust check of a fit in the report; how to make it where it was not made."""
     if check is None:
         why = f"It has not been made for this fit: run `scissorcal verify {fit.words}`."
-        return (absent(id_, part, title, why),)
+        return (absent(f"{part}-verify", part, "Trust check", why),)
+    return check_panels(check, part)
+
+
+def check_panels(check: VerifyResult, part: str) -> tuple[Panel, ...]:
+    """Panels on simulated data, halves and prior sensitivity, as far as they were made."""
+    id_ = f"{part}-verify"
     panels = []
     if check.calibration is not None:
         panels.append(_calibration(check.calibration, part, id_))
     if check.halves is not None:
-        panels.append(_halves(check, part, id_))
+        panels.append(_halves(check.halves, part, id_))
     if check.sensitivity is not None:
-        panels.append(_sensitivity(check, part, id_))
-    if check.not_done or not panels:
-        why = " ".join(check.not_done) or f"Run `scissorcal verify {fit.words}`."
-        panels.append(absent(f"{id_}-open", part, f"{title}: not done", why))
+        panels.append(_sensitivity(check.sensitivity, part, id_))
+    if check.not_done:
+        why = " ".join(check.not_done)
+        panels.append(absent(f"{id_}-open", part, "Trust check: not done", why))
     return tuple(panels)
 
 
@@ -129,9 +134,7 @@ def _ranks(found: Calibration, id_: str) -> Chart:
     return Chart(id_, "Ranks of the truth among the draws", x, y, tuple(series), caption)
 
 
-def _halves(check: VerifyResult, part: str, id_: str) -> Panel:
-    halves = check.halves
-    assert halves is not None
+def _halves(halves: Halves, part: str, id_: str) -> Panel:
     rows = tuple(
         Row(
             row.name,
@@ -157,9 +160,7 @@ def _halves(check: VerifyResult, part: str, id_: str) -> Panel:
     return Panel(f"{id_}-halves", part, title, sentence, rows, notes=(note,), caption=caption)
 
 
-def _sensitivity(check: VerifyResult, part: str, id_: str) -> Panel:
-    found = check.sensitivity
-    assert found is not None
+def _sensitivity(sensitivity: Sensitivity, part: str, id_: str) -> Panel:
     rows = tuple(
         Row(
             row.name,
@@ -170,7 +171,7 @@ def _sensitivity(check: VerifyResult, part: str, id_: str) -> Panel:
             ),
             marked=row.diagnosis != "fine",
         )
-        for row in found.rows
+        for row in sensitivity.rows
     )
     odd = [row.name for row in rows if row.marked]
     sentence = (
@@ -180,7 +181,7 @@ def _sensitivity(check: VerifyResult, part: str, id_: str) -> Panel:
     )
     caption = (
         "How far the posterior moves when prior or data count slightly more (power scaling); above "
-        f"{short(found.threshold)} it matters."
+        f"{short(sensitivity.threshold)} it matters."
     )
     title = "Trust check: prior sensitivity"
     return Panel(f"{id_}-sensitivity", part, title, sentence, rows, caption=caption)
