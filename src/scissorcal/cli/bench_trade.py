@@ -101,7 +101,7 @@ def trade(
         began = time.time()
     settings = TradeSettings(tuple(options.knob or ()), allowed, options.seed, options.force)
     with progress() as tell:
-        found = trade_workspace(
+        outcome = trade_workspace(
             workspace,
             settings,
             workers=processes.workers,
@@ -109,9 +109,9 @@ def trade(
             progress=tell,
             began=began,
         )
-    for sentence in found.notes:
+    for sentence in outcome.notes:
         note(sentence)
-    return _answer(found.trade, (found.html, found.json))
+    return _answer(outcome.trade, (outcome.html, outcome.json))
 
 
 def seconds_of(words: str) -> float:
@@ -121,12 +121,12 @@ def seconds_of(words: str) -> float:
     (180.0, 5400.0, 90.0)
     """
     parts = _DURATION.findall(words)
-    found = sum(float(number) * _SECONDS[unit] for number, unit in parts)
-    if not found or _DURATION.sub("", words).strip():
+    seconds = sum(float(number) * _SECONDS[unit] for number, unit in parts)
+    if not seconds or _DURATION.sub("", words).strip():
         raise InputError(
             f'--budget {words}: give a time above zero with its unit, such as "3 min" or "90 s".'
         )
-    return found
+    return seconds
 
 
 def _day(name: str, seed: int) -> "Workspace":

@@ -65,49 +65,47 @@ def demo(
     recipe_path(recipe)
     made = demo_folder(folder)
     with progress() as tell:
-        found = run_demo(
-            made, recipe_name=recipe, seed=seed, effort=effort, fits=fits, progress=tell
-        )
-    panel = _panel(found)
+        day = run_demo(made, recipe_name=recipe, seed=seed, effort=effort, fits=fits, progress=tell)
+    panel = _panel(day)
     result = {
-        "workspace": found.workspace,
-        "specimen": found.specimen,
+        "workspace": day.workspace,
+        "specimen": day.specimen,
         "seed": seed,
-        "rungs": found.rungs,
+        "rungs": day.rungs,
         "panels": [panel],
-        "share_inside": found.share_inside,
-        "torque_error": found.torque_error,
-        "rendering": found.rendering,
+        "share_inside": day.share_inside,
+        "torque_error": day.torque_error,
+        "rendering": day.rendering,
     }
-    report = _shown(found.workspace / "report" / "report.html")
-    text = "\n".join([*found.rungs, "", panel_text(panel), "", f"report: {report}"])
-    return Answer(result, text, found.verdicts, found.files)
+    report = _shown(day.workspace / "report" / "report.html")
+    text = "\n".join([*day.rungs, "", panel_text(panel), "", f"report: {report}"])
+    return Answer(result, text, day.verdicts, day.files)
 
 
-def _panel(found: "DemoResult") -> "Panel":
+def _panel(day: "DemoResult") -> "Panel":
     """Each estimate beside the truth, then what came of checks, package and rendering."""
     from scissorcal.report.panel import Panel, Row, number, words
     from scissorcal.report.subjects.trust import coverage_found
 
     rows = []
-    for estimate in found.judged:
+    for estimate in day.judged:
         unit, ends = estimate.unit, {"low": estimate.low, "high": estimate.high}
         values = [number("estimate", estimate.estimate, unit, **ends)]
         if estimate.truth is not None:
             inside = words("inside?", "yes" if estimate.inside else "no")
             values += [number("truth", estimate.truth, unit, digits=4), inside]
         rows.append(Row(estimate.name, tuple(values), marked=estimate.inside is False))
-    known = [estimate.inside for estimate in found.judged if estimate.inside is not None]
+    known = [estimate.inside for estimate in day.judged if estimate.inside is not None]
     notes = []
-    for check in found.verified:
+    for check in day.verified:
         failed = [verdict.check for verdict in check.verdicts if verdict.status == "fail"]
         outcome = f"failed: {', '.join(failed)}" if failed else "passed"
         coverage = coverage_found(check)
         notes.append(f"{check.what}: trust check {outcome}{coverage and f'; {coverage}'}.")
     notes += [
-        f"Torque error of the package: {100 * found.torque_error:.2f} % (rms over the scene).",
-        f"Rendered {found.rendering.strokes} strokes in {found.rendering.seconds:.1f} s.",
-        found.rendering.admission.summary,
+        f"Torque error of the package: {100 * day.torque_error:.2f} % (rms over the scene).",
+        f"Rendered {day.rendering.strokes} strokes in {day.rendering.seconds:.1f} s.",
+        day.rendering.admission.summary,
     ]
     sentence = f"{sum(known)} of {len(known)} intervals (90 %) contain the truth."
     title = "Estimates beside the truth"

@@ -45,9 +45,8 @@ def limit_text(verdict: Verdict) -> str:
 
 def verdict_line(verdict: Verdict) -> str:
     """One verdict: outcome, check, value with its limit, reason."""
-    value = "" if verdict.value is None else short(verdict.value)
-    judged = ", ".join(part for part in (value, limit_text(verdict)) if part)
-    parts = (f"  {MARKS[verdict.status]}", f"{verdict.scope} {verdict.check}", judged, verdict.why)
+    check = f"{verdict.scope} {verdict.check}"
+    parts = (f"  {MARKS[verdict.status]}", check, verdict.limited, verdict.why)
     return "  ".join(part for part in parts if part)
 
 

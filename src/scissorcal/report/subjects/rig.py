@@ -76,6 +76,6 @@ def _charts(probe: ProbeResult) -> tuple[Chart, ...]:
 def _series(place: int, swing: Swing, look: Look) -> tuple[Series, Series]:
     times = [1e3 * value for value in swing.times_s]
     name = f"{place}: {1e3 * swing.torque_Nm:+.3g} mN m"
-    seen = [1e3 * value for value in swing.places_rad]
+    places = [1e3 * value for value in swing.places_rad]
     goes = [1e3 * value for value in swing.model_rad]
-    return points(name, times, seen, look), curve(f"{name}, model", times, goes, look)
+    return points(name, times, places, look), curve(f"{name}, model", times, goes, look)
