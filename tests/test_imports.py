@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -60,11 +61,13 @@ def module_of(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def imports_of(source: str, package: str) -> Iterator[tuple[int, str, str | None]]:
+def imports_of(
+    source: str, package: str, *, by_name: bool = True
+) -> Iterator[tuple[int, str, str | None]]:
     """Yield line, module and name of every import at any depth of the code, functions included.
 
     ``package`` is what relative imports start from. A module named in a string of the form
-    "module:name" (as lazily loaded commands are) counts as imported.
+    "module:name" (as lazily loaded commands are) counts as imported, unless ``by_name`` is false.
     """
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
@@ -78,7 +81,7 @@ def imports_of(source: str, package: str) -> Iterator[tuple[int, str, str | None
                     yield node.lineno, f"scissorcal.{alias.name}", None
                 else:
                     yield node.lineno, ".".join(parts), alias.name
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+        elif by_name and isinstance(node, ast.Constant) and isinstance(node.value, str):
             module, colon, name = node.value.partition(":")
             if colon and module.startswith("scissorcal.") and name.isidentifier():
                 yield node.lineno, module, name
@@ -138,6 +141,23 @@ def test_the_checker_sees_imports_inside_functions_relative_ones_and_strings() -
         (5, "scissorcal.report", "build_report"),
         (6, "scissorcal.workday.plan", "plan"),
     ]
+
+
+def test_no_module_imports_in_a_circle() -> None:
+    """Imports inside functions and for types count; those of a package's contract do not."""
+    names = {module_of(path) for path in MODULES}
+    graph: dict[str, set[str]] = {}
+    for path in MODULES:
+        module, source = module_of(path), path.read_text(encoding="utf-8")
+        if path.name == "__init__.py":
+            source = source.partition("if TYPE_CHECKING:")[0]
+        package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+        targets = set()
+        for _, target, name in imports_of(source, package, by_name=False):
+            inner = f"{target}.{name}"
+            targets.add(inner if inner in names else target)
+        graph[module] = (targets & names) - {"scissorcal", module}
+    TopologicalSorter(graph).prepare()
 
 
 HEAVY = {"numpy", "scipy", "pydantic", "rich", "mcap", "matplotlib", "cffi", "serial", "cv2"}

@@ -27,6 +27,7 @@ from tests.second_rig.simulate import BRAKE, HAND, OFF, SERVO
 
 HERE = Path(__file__).parent
 ALLOWED = {
+    "scissorcal.aliases",
     "scissorcal.device.advance_trajectory",
     "scissorcal.device.rig_record",
     "scissorcal.device.cut_trajectory",
