@@ -12,8 +12,9 @@ from scissorcal.recipe.euler_angles import quaternion_words
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, ControlOptions, RigOptions
 from scissorcal.workday.runs.at_rig import RigRun, RigTask, run_at_rig
-from scissorcal.workday.runs.cut import edge_of_photographs
+from scissorcal.workday.runs.cut import blade_edge
 from scissorcal.workday.runs.fit import load_result
+from scissorcal.workday.runs.friction import angle_centre, axis_of_fit
 from scissorcal.workday.tracking.stated_pose import stated_pose
 from scissorcal.workday.workspace import Workspace
 
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
     from scissorcal.device.session import Operator, RigSession
     from scissorcal.model.edge import Edge
     from scissorcal.model.friction import FrictionLaw
-    from scissorcal.model.mechanism import AxisLaw
-    from scissorcal.recipe.schema import Recipe
     from scissorcal.recording import RecordingWriter
     from scissorcal.tracking.plate_pose import PoseSource
     from scissorcal.workday.tracking.plate_camera import PlateCamera
@@ -196,14 +195,6 @@ def _fits(engine: Engine) -> "tuple[FitResult, FitResult]":
     return load_result(engine, "friction"), load_result(engine, "friction-advance")
 
 
-def blade_edge(engine: Engine, recipe: "Recipe") -> "Edge":
-    """The edge of photographs, else the recipe's."""
-    from scissorcal.calibration.cut.structure import edge_of
-
-    belief, _ = edge_of_photographs(engine)
-    return (belief or edge_of(recipe)).edge
-
-
 def _mechanics(
     fits: "tuple[FitResult, FitResult]", edge: "Edge", session: "RigSession"
 ) -> "RigMechanics":
@@ -227,26 +218,6 @@ def _mechanics(
     )
 
 
-def axis_of_fit(fit: "FitResult", unit: str) -> "AxisLaw":
-    """One axis from its fit of friction, at the medians of the posterior; ``unit`` of inertia."""
-    from scissorcal.model.mechanism import AxisLaw
-
-    values = {p.name: p.q50 for p in (*fit.parameters, *fit.nuisance)}
-    if not values.get("inertia", 0.0) > 0.0:
-        raise MissingError(
-            f"The fit of {fit.what} has no inertia in {unit}: capture friction with an excitation "
-            f"('scissorcal capture {fit.words}'), then 'scissorcal fit {fit.words}'."
-        )
-    return AxisLaw.of_fit(values, _centre(fit), 0.0)
-
-
-def _centre(fit: "FitResult") -> float:
-    import numpy as np
-
-    centre = float(fit.structure.get("angle_center", float("nan")))
-    return centre if math.isfinite(centre) else float(np.nanmedian(fit.series.opening))
-
-
 def _sliding_sd(fit: "FitResult", law: "FrictionLaw") -> float:
     """Standard deviation of the opening's friction while it slides slowly, N m."""
     import numpy as np
@@ -254,7 +225,7 @@ def _sliding_sd(fit: "FitResult", law: "FrictionLaw") -> float:
     from scissorcal.control.mechanics import FASTEST_rad_per_s
     from scissorcal.model.friction import FrictionLaw, friction_torque
 
-    rates, centre = SLOW * FASTEST_rad_per_s * np.array([-1.0, 1.0]), _centre(fit)
+    rates, centre = SLOW * FASTEST_rad_per_s * np.array([-1.0, 1.0]), angle_centre(fit)
     drawn = {p.name: fit.draws[:, [i]] for i, p in enumerate(fit.parameters)}
     sliding = friction_torque(FrictionLaw.of_fit(drawn, centre), centre, rates)
     level = float(np.abs(friction_torque(law, centre, rates)).max())

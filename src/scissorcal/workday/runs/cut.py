@@ -10,6 +10,8 @@ from scissorcal.workday.runs.friction import finished
 if TYPE_CHECKING:
     from scissorcal.calibration.result import FitResult
     from scissorcal.model import EdgeBelief
+    from scissorcal.model.edge import Edge
+    from scissorcal.recipe.schema import Recipe
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.runs.fit import Made, Request
 
@@ -59,3 +61,11 @@ def edge_of_photographs(engine: "Engine") -> "tuple[EdgeBelief | None, tuple[Ver
         return None, ()
     blade = load_result(engine, "blade")
     return blade.belief, blade.verdicts
+
+
+def blade_edge(engine: "Engine", recipe: "Recipe") -> "Edge":
+    """The edge of photographs, else the recipe's."""
+    from scissorcal.calibration.cut.structure import edge_of
+
+    belief, _ = edge_of_photographs(engine)
+    return (belief or edge_of(recipe)).edge

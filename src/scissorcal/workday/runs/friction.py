@@ -1,8 +1,10 @@
-"""The fit of friction: its run in a workspace."""
+"""The fit of friction: its run in a workspace, and the axis that it identifies."""
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from scissorcal.errors import MissingError
 from scissorcal.workday.facts import UNFINISHED
 from scissorcal.workday.recordings import used_recordings
 
@@ -10,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from scissorcal.calibration.result import FitResult
+    from scissorcal.model.mechanism import AxisLaw
     from scissorcal.recipe.requirements import CaptureKind
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.runs.fit import Made, Request
@@ -64,3 +67,24 @@ def finished(result: "FitResult", request: "Request") -> "FitResult":
     )
     marked = f"{UNFINISHED}{request.inputs_hash}"
     return replace(result, inputs_hash=marked, notes=(*result.notes, note))
+
+
+def axis_of_fit(fit: "FitResult", unit: str) -> "AxisLaw":
+    """One axis from its fit of friction, at the medians of the posterior; ``unit`` of inertia."""
+    from scissorcal.model.mechanism import AxisLaw
+
+    values = {p.name: p.q50 for p in (*fit.parameters, *fit.nuisance)}
+    if not values.get("inertia", 0.0) > 0.0:
+        raise MissingError(
+            f"The fit of {fit.what} has no inertia in {unit}: capture friction with an excitation "
+            f"('scissorcal capture {fit.words}'), then 'scissorcal fit {fit.words}'."
+        )
+    return AxisLaw.of_fit(values, angle_centre(fit), 0.0)
+
+
+def angle_centre(fit: "FitResult") -> float:
+    """The angle (rad) about which a fit's friction changes along the stroke."""
+    import numpy as np
+
+    centre = float(fit.structure.get("angle_center", float("nan")))
+    return centre if math.isfinite(centre) else float(np.nanmedian(fit.series.opening))

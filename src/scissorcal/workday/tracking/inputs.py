@@ -107,7 +107,8 @@ def tip_contacts(engine: Engine, recipe: "Recipe") -> "tuple[TipContacts, bool]"
     """Contacts of the upper blade's tip, and whether friction of the opening was fitted."""
     from scissorcal.model.blade_point import BladePoint
     from scissorcal.tracking.contacts import TipContacts
-    from scissorcal.workday.runs.control import axis_of_fit, blade_edge
+    from scissorcal.workday.runs.cut import blade_edge
+    from scissorcal.workday.runs.friction import axis_of_fit
 
     edge = blade_edge(engine, recipe)
     tip = BladePoint.on_edge(edge, edge.length_m, recipe.rig.moving_blades)
