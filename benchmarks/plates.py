@@ -19,7 +19,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate
+from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
 from scissorcal.errors import ScissorcalError
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
@@ -132,7 +132,7 @@ def measured(view: View) -> dict[str, Any]:
     """Find and fit one view, and compare it with the true pose."""
     start = time.perf_counter()
     try:
-        found = PlatePhoto("rendered.jpg", find_board(view.photo, view.board))
+        found = PosePhoto("rendered.jpg", find_board(view.photo, view.board))
         fit = fit_plate([found], view.camera)
     except ScissorcalError as error:
         return {"refused": str(error)}

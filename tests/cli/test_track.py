@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scissorcal.calibration.plate.track import PoseRecord, TrackHead, TrackRow
+from scissorcal.calibration.plate.track_lines import TrackHead, TrackPose, TrackRow
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording, read_telemetry
@@ -277,7 +277,7 @@ def test_tracks_of_lines_stay_readable(cli: Cli, workspace: Path) -> None:
     head = TrackHead(
         source="0", started_utc="2026-01-01T00:00:00Z", frame="rig", camera_inputs_hash="ab"
     )
-    pose = PoseRecord(quaternion=(1.0, 0.0, 0.0, 0.0), translation_m=(0.1, 0.2, 0.3))
+    pose = TrackPose(quaternion=(1.0, 0.0, 0.0, 0.0), translation_m=(0.1, 0.2, 0.3))
     rows = [
         TrackRow(number=0, time_s=0.0, state="seen", corners=24, odds=9.0, pose=pose),
         TrackRow(number=1, time_s=0.1, state="blank"),

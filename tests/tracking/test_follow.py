@@ -15,7 +15,7 @@ from scissorcal.aliases import Array
 from scissorcal.errors import DeviceError
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
-from scissorcal.tracking.follow import PlateFollower, SeenPose
+from scissorcal.tracking.follow import PoseFollower, SeenPose
 from scissorcal.tracking.rotation import pose_error
 from scissorcal.tracking.tracker import Outcome
 
@@ -51,10 +51,10 @@ def followed(
     camera: tuple[float, float] = CAMERA,
     delay_s: float = SHORTEST_S,
     seed: int = 0,
-) -> PlateFollower:
+) -> PoseFollower:
     """Feed samples in blocks of 50 ms and pictures as they arrive, on the clocks of each."""
     rng = np.random.default_rng(seed)
-    follower = PlateFollower(
+    follower = PoseFollower(
         Plane(), settings_for(MOVING), camera_delay_s=delay_s, rig=True, contacts=Given(world, RIG)
     )
     waiting = [(p.exposed_s + SHORTEST_S + 0.04 * rng.random(), p) for p in world.pictures]
@@ -118,7 +118,7 @@ def test_tracks_are_consistent_on_drifting_clocks(plates: Iterable[int], limit: 
 
 def test_rows_tell_what_the_pose_rests_on() -> None:
     world = a_world(3)
-    follower = PlateFollower(Plane(), settings_for(MOVING), rig=True, contacts=Given(world, RIG))
+    follower = PoseFollower(Plane(), settings_for(MOVING), rig=True, contacts=Given(world, RIG))
     assert follower.state == "waiting"
     picture = world.pictures[0]
     early = SeenPose(0.0, 0.06, picture.rotation, picture.place_m, picture.covariance)
@@ -153,7 +153,7 @@ def test_a_contact_away_from_the_surface_is_told_in_mm_against_its_sd() -> None:
 
 
 def test_a_camera_alone_keeps_its_own_time() -> None:
-    follower = PlateFollower(Plane(), settings_for(MOVING), camera_delay_s=0.05)
+    follower = PoseFollower(Plane(), settings_for(MOVING), camera_delay_s=0.05)
     for number in range(60):
         at = number / 30.0
         picture = SeenPose(100.0 + at, 5.0 + at + 0.05, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
@@ -168,7 +168,7 @@ def test_a_camera_alone_keeps_its_own_time() -> None:
 
 def test_pictures_without_a_pose_let_it_age() -> None:
     """The target is hidden: the pose coasts, and is known less and less."""
-    follower = PlateFollower(Plane(), settings_for(MOVING))
+    follower = PoseFollower(Plane(), settings_for(MOVING))
     for number in range(30):
         at = number / 30.0
         follower.picture(SeenPose(at, at, np.eye(3), np.zeros(3), 1e-7 * np.eye(6)))
@@ -186,7 +186,7 @@ def test_pictures_without_a_pose_let_it_age() -> None:
 
 @pytest.mark.parametrize("jump_s", [-60.0, 60.0])
 def test_a_camera_alone_whose_clock_jumps_is_followed_on(jump_s: float) -> None:
-    follower = PlateFollower(Plane(), settings_for(MOVING))
+    follower = PoseFollower(Plane(), settings_for(MOVING))
     outcomes = []
     for number in range(120):
         at = number / 30.0
@@ -201,7 +201,7 @@ def test_a_camera_alone_whose_clock_jumps_is_followed_on(jump_s: float) -> None:
 
 
 def test_a_camera_whose_clock_stands_ends_it() -> None:
-    follower = PlateFollower(Plane(), settings_for(MOVING))
+    follower = PoseFollower(Plane(), settings_for(MOVING))
     picture = SeenPose(1.0, 0.0, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
     for number in range(30):
         follower.picture(replace(picture, arrived_s=number / 30.0))
@@ -210,7 +210,7 @@ def test_a_camera_whose_clock_stands_ends_it() -> None:
 
 
 def test_a_turned_plate_gives_the_normal_of_its_face() -> None:
-    follower = PlateFollower(
+    follower = PoseFollower(
         Plane(), settings_for(MOVING), rig=True, contacts=Given(a_world(0), RIG)
     )
     assert follower._normal(0.3, 0.0) == pytest.approx([0.0, 1.0, 0.0])
@@ -226,7 +226,7 @@ def test_a_rig_whose_clock_begins_anew_keeps_the_pose(expected: bool) -> None:
     """As by a new motion: the filter's times go along, so that no picture is too late or early."""
     world = a_world(1)
     rng = np.random.default_rng(0)
-    follower = PlateFollower(
+    follower = PoseFollower(
         Plane(), settings_for(MOVING), camera_delay_s=SHORTEST_S, rig=True, contacts=None
     )
     waiting = [(p.exposed_s + SHORTEST_S + 0.04 * rng.random(), p) for p in world.pictures]

@@ -10,7 +10,7 @@ from benchmarks.control.world import Scenario
 
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
-from scissorcal.tracking.follow import PlateFollower, SeenPose
+from scissorcal.tracking.follow import PoseFollower, SeenPose
 from scissorcal.tracking.judge import RowCounts, TrackFigures, track_figures, track_verdicts
 
 COUNTS = RowCounts(used=100, refused=2, late=0, waiting=0, mean_nis=6.1, freedom=6)
@@ -60,7 +60,7 @@ def test_errors_larger_than_stated_fail_the_consistency() -> None:
 
 def test_figures_are_those_of_what_was_given() -> None:
     settings = settings_for(Scenario("fixed"))
-    follower = PlateFollower(Plane(), settings, rig=True)
+    follower = PoseFollower(Plane(), settings, rig=True)
     time = 1e-3 * np.arange(1, 1001)
     follower.samples(5.0 + time, time, *[np.zeros(1000)] * 3)
     rng = np.random.default_rng(0)

@@ -4,7 +4,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scissorcal.workday.tracking.plate_camera import TrackedRun
+    from scissorcal.workday.tracking.tracking_camera import TrackedRun
 
 
 def tracked_facts(tracked: "TrackedRun | None") -> dict[str, Any] | None:

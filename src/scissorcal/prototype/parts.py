@@ -1,6 +1,44 @@
-"""Parts of what a page is told: rows of tables, sliders, draws, bands, strokes, hands, pieces."""
+"""Parts of what a page is told: rows of tables, sliders, draws, bands, strokes, hands, layers."""
 
-from scissorcal.prototype.arrays import Numbers, Part
+import base64
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BaseModel, ConfigDict
+
+from scissorcal.model.plate_pieces import Layer, Outline
+
+DECIMALS = 4
+"""Of a place in mm: as the page reads outlines of a file."""
+
+Contours = tuple[tuple[tuple[float, float], ...], ...]
+"""Closed contours; inside is what lies within an odd number of them."""
+
+
+class Part(BaseModel):
+    """Base of everything that a page is told: frozen, and without numbers that JSON lacks."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Numbers(Part):
+    """An array of float32, little-endian, row by row."""
+
+    shape: tuple[int, ...]
+    base64: str
+
+    @classmethod
+    def of(cls, values: ArrayLike) -> "Numbers":
+        """Pack an array; ValueError where a number is not finite in float32.
+
+        >>> Numbers.of([1.0, 2.0])
+        Numbers(shape=(2,), base64='AACAPwAAAEA=')
+        """
+        array = np.asarray(values, dtype="<f4")
+        if not np.isfinite(array).all():
+            raise ValueError("a page shows finite numbers only")
+        return cls(shape=array.shape, base64=base64.b64encode(array.tobytes()).decode())
 
 
 class Rows(Part):
@@ -71,23 +109,7 @@ class Stroke(Part):
     torque: Numbers
 
 
-class StripPart(Part):
-    """Material of a piece that is bonded to the one before it, up to an end along the cut."""
-
-    end_m: float
-    fracture_energy_J_per_m: float
-
-
-class PiecePart(Part):
-    """A stretch of material without a gap, see :mod:`scissorcal.kernel.pieces`."""
-
-    begin_m: float
-    upper_face_m: float
-    scale: float
-    strips: tuple[StripPart, ...]
-
-
-class PlatePose(Part):
+class PosePart(Part):
     """Where the plate stands, in the rig's frame."""
 
     position_m: tuple[float, float, float]
@@ -101,3 +123,59 @@ class Hand(Part):
     time: Numbers
     opening: Numbers
     advance: Numbers
+
+
+class RegionPart(Part):
+    """A part of a layer with another toughness."""
+
+    toughness_ratio: float
+    outline: Contours
+
+
+class LayerPart(Part):
+    """One layer; ``holes`` are taken off its ``outline``."""
+
+    name: str
+    thickness_mm: float
+    toughness_ratio: float
+    outline: Contours
+    holes: tuple[Contours, ...]
+    regions: tuple[RegionPart, ...]
+
+
+class LayersPart(Part):
+    """All layers of a plate, and where its line of the cut is."""
+
+    cut_line_mm: float
+    layers: tuple[LayerPart, ...]
+
+
+def layers_part(cut_line_mm: float, layers: Sequence[Layer]) -> LayersPart:
+    """What the page is told of a plate whose outlines its recipe does not hold itself.
+
+    >>> layer = Layer("sheet", 1e-4, 1.0, Outline((np.array([[0, 0], [0.08, 0], [0, 0.02]]),)))
+    >>> layers_part(5.0, [layer]).layers[0].outline
+    (((0.0, 0.0), (80.0, 0.0), (0.0, 20.0)),)
+    """
+    return LayersPart(cut_line_mm=cut_line_mm, layers=tuple(_layer_part(layer) for layer in layers))
+
+
+def _layer_part(layer: Layer) -> LayerPart:
+    return LayerPart(
+        name=layer.name,
+        thickness_mm=round(1e3 * layer.thickness_m, 9),
+        toughness_ratio=layer.toughness_ratio,
+        outline=_contours(layer.outline),
+        holes=tuple(_contours(hole) for hole in layer.holes),
+        regions=tuple(
+            RegionPart(toughness_ratio=region.toughness_ratio, outline=_contours(region.outline))
+            for region in layer.regions
+        ),
+    )
+
+
+def _contours(outline: Outline) -> Contours:
+    return tuple(
+        tuple((x, y) for x, y in np.round(1e3 * contour, DECIMALS).tolist())
+        for contour in outline.contours
+    )

@@ -13,17 +13,18 @@ from scissorcal.kernel.web_module import web_numbers
 from scissorcal.package.average import energy_levels
 from scissorcal.package.compile import table_file
 from scissorcal.package.exact import FitDraws, exact_model, torque_quantiles
-from scissorcal.package.manifest import Manifest, Parameter, PlateRecord
+from scissorcal.package.layer_pieces import PieceRecord
+from scissorcal.package.manifest import Parameter, PoseRecord
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.variations import Variations, central_values, variations
-from scissorcal.prototype.arrays import Numbers, Part
-from scissorcal.prototype.drawn_plate import DrawnPlate
 from scissorcal.prototype.parts import (
     Band,
     Draws,
     Hand,
-    PiecePart,
-    PlatePose,
+    LayersPart,
+    Numbers,
+    Part,
+    PosePart,
     Rows,
     Slider,
     Stroke,
@@ -89,10 +90,10 @@ class Scene(Part):
     bands: tuple[Band, ...]
     strokes: tuple[Stroke, ...] = ()
     hands: tuple[Hand, ...] = ()
-    pieces: tuple[PiecePart, ...] | None = None
+    pieces: tuple[PieceRecord, ...] | None = None
     recipe: str | None = None
-    drawn_plate: DrawnPlate | None = None
-    plate_pose: PlatePose | None = None
+    drawn_plate: LayersPart | None = None
+    plate_pose: PosePart | None = None
 
 
 def scene_of(
@@ -103,14 +104,12 @@ def scene_of(
     fits: Sequence[FitResult] = (),
     hands: Sequence[Hand] = (),
     warnings: Sequence[str] = (),
-    notes: Sequence[str] = (),
-    recipe: str | None = None,
-    drawn_plate: DrawnPlate | None = None,
 ) -> Scene:
     """What a page shows of a package; ``fits`` add measured strokes and meanings.
 
     A fit that the package was not built from adds nothing: its inputs hash is another.
-    ``warnings`` stand before those of the package.
+    ``warnings`` stand before those of the package. What a workspace adds to it, ``recipe`` and
+    ``drawn_plate``, is put in by ``model_copy``.
     """
     manifest = package.manifest
     own = set(manifest.fit_hashes.values())
@@ -123,7 +122,6 @@ def scene_of(
         made_utc=made_utc,
         version=version,
         warnings=(*warnings, *package.warnings),
-        notes=tuple(notes),
         bound_Nm=manifest.bound.stated_Nm,
         torque_limit_Nm=manifest.limits.torque_Nm,
         opening_rad=ranges.opening_rad,
@@ -144,10 +142,8 @@ def scene_of(
         bands=tuple(_bands(package)),
         strokes=tuple(stroke for fit in fits if fit.what == "cut" for stroke in _strokes(fit)),
         hands=tuple(hands),
-        pieces=_pieces(manifest),
-        recipe=recipe,
-        drawn_plate=drawn_plate,
-        plate_pose=_plate_pose(manifest.plate),
+        pieces=manifest.pieces,
+        plate_pose=_pose_part(manifest.plate),
     )
 
 
@@ -286,13 +282,7 @@ def _cut_draws(package: ModelPackage) -> FitDraws:
     return FitDraws(record.structure.model_dump(), names, package.arrays["draws/cut.npy"])
 
 
-def _pieces(manifest: Manifest) -> tuple[PiecePart, ...] | None:
-    if manifest.pieces is None:
-        return None
-    return tuple(PiecePart.model_validate(piece.model_dump()) for piece in manifest.pieces)
-
-
-def _plate_pose(plate: PlateRecord | None) -> PlatePose | None:
+def _pose_part(plate: PoseRecord | None) -> PosePart | None:
     """None where the plate was seen from the camera alone: where the rig is, is not known then."""
     if plate is None or plate.frame != "rig":
         return None
@@ -300,7 +290,7 @@ def _plate_pose(plate: PlateRecord | None) -> PlatePose | None:
     sine = math.hypot(*axis)
     turn = 2.0 * math.atan2(sine, w) / sine if sine else 2.0
     x, y, z = (turn * part for part in axis)
-    return PlatePose(position_m=plate.translation_m, rotation_vector_rad=(x, y, z))
+    return PosePart(position_m=plate.translation_m, rotation_vector_rad=(x, y, z))
 
 
 def _strokes(fit: FitResult) -> "list[Stroke]":

@@ -55,7 +55,7 @@ def measure_delay(
 ) -> DelayFit:
     """Find the shift of the pictures' times at which pictures and contacts agree best.
 
-    ``pictures`` and ``contacts`` are those that a `PlateFollower` was given, at the times that it
+    ``pictures`` and ``contacts`` are those that a `PoseFollower` was given, at the times that it
     took them for. Costs some seventeen replays of the last `MOST_CONTACTS` contacts, and of the
     pictures from the first to the last of them.
     """

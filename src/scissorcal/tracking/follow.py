@@ -66,7 +66,7 @@ class ContactSource(Protocol):
     ) -> list[TipContact]: ...
 
 
-class PlateFollower:
+class PoseFollower:
     """Feeds a `PoseTracker` from a camera and a rig whose clocks are measured while it runs.
 
     The filter's time is the rig's, where there is one, else the camera's. ``camera_delay_s`` passes

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.camera.result import PixelMap
 from scissorcal.calibration.camera.there import CameraThere
 from scissorcal.calibration.plate.checks import plate_verdicts
-from scissorcal.calibration.plate.result import Halves, PlateFit, PlateView
+from scissorcal.calibration.plate.result import Halves, PlateFit, PoseView
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
@@ -28,7 +28,7 @@ _EXACT_PRINT = {"print_scale_sd_percent": 0.0}
 
 
 @dataclass(frozen=True)
-class PlatePhoto:
+class PosePhoto:
     """The plate's target as one photograph shows it."""
 
     name: str
@@ -36,7 +36,7 @@ class PlatePhoto:
 
 
 def fit_plate(
-    photos: Sequence[PlatePhoto],
+    photos: Sequence[PosePhoto],
     camera: Camera,
     *,
     priors: PlatePriors = PlatePriors(),
@@ -99,7 +99,7 @@ def fit_plate(
     )
 
 
-def _there(photos: Sequence[PlatePhoto], places: PixelMap | None) -> CameraThere | None:
+def _there(photos: Sequence[PosePhoto], places: PixelMap | None) -> CameraThere | None:
     if places is None:
         return None
     pixels = np.concatenate([photo.detection.pixels for photo in photos])
@@ -116,7 +116,7 @@ def plate_target(recipe: "Recipe") -> Pose:
 
 
 def _located(
-    corners: Corners, camera: Camera, priors: PlatePriors, *photos: PlatePhoto
+    corners: Corners, camera: Camera, priors: PlatePriors, *photos: PosePhoto
 ) -> BoardPose:
     try:
         return locate_board(corners, camera, priors)
@@ -167,14 +167,14 @@ def _half_and_half(
 
 
 def _view(
-    photo: PlatePhoto, found: BoardPose, whole: BoardPose, here: NDArray[np.bool_]
-) -> PlateView:
+    photo: PosePhoto, found: BoardPose, whole: BoardPose, here: NDArray[np.bool_]
+) -> PoseView:
     normal = found.pose.matrix[:, 2]
     to_target = found.pose.apply([photo.detection.points.mean(axis=0)])[0]
     away = difference(found.pose, whole.pose)
     own = whole.residuals_px[here][found.used]
     slant = abs(normal @ to_target) / np.linalg.norm(to_target)
-    return PlateView(
+    return PoseView(
         name=photo.name,
         corners=len(photo.detection.ids),
         used=int(np.sum(whole.used[here])),

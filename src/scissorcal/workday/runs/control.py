@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from scissorcal.model.friction import FrictionLaw
     from scissorcal.recording import RecordingWriter
     from scissorcal.tracking.plate_pose import PoseSource
-    from scissorcal.workday.tracking.plate_camera import PlateCamera
+    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
 LATE_TICKS = 2.0
 """Where no probe measured the delay: one tick for line and host, one for the motor."""
@@ -156,15 +156,15 @@ class _ControlTask(RigTask["ControlResult"]):
         return f"as it was stated, ({place}) mm, {turn}"
 
 
-def _camera(engine: Engine, rig: RigOptions, options: ControlOptions) -> "PlateCamera | None":
+def _camera(engine: Engine, rig: RigOptions, options: ControlOptions) -> "TrackingCamera | None":
     """The camera that follows the plate; None without one."""
-    from scissorcal.workday.tracking.plate_camera import PlateCamera
+    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
     if options.camera == NONE:
         return None
     if options.pose is not None:
         raise InputError("The plate stands where --pose or where --camera has it: give one.")
-    return PlateCamera(engine, options.camera, rig)
+    return TrackingCamera(engine, options.camera, rig)
 
 
 def _pose_source(engine: Engine, pose: str | None) -> "PoseSource":

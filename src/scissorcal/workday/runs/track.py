@@ -16,14 +16,14 @@ from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdict
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.live import camera_number, frames_of, timed
-from scissorcal.vision.track import STATES, State
+from scissorcal.vision.located_frames import STATES, State
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, TrackOptions
 from scissorcal.workday.rigs import SIM, open_session
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.feeds import Feed
-from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
+from scissorcal.workday.tracking.pictures import PoseFinder, TrackPicture
 from scissorcal.workday.tracking.session import Tell, TrackSession
 from scissorcal.workday.tracking.sim_world import SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackRecorder, read_track
@@ -116,7 +116,7 @@ class _Opened:
 
     recipe: "Recipe"
     feed: Feed
-    eye: PlateEye | None
+    eye: PoseFinder | None
     link: "Link | None"
     default_s: float | None
 
@@ -129,7 +129,7 @@ def _opened(engine: Engine, recipe: "Recipe", options: TrackOptions) -> Iterator
     camera, device = options.camera, options.device
     eye = None
     if camera != NONE:
-        eye = inputs.plate_eye(engine, recipe, camera, needs_rig=device != NONE)
+        eye = inputs.pose_finder(engine, recipe, camera, needs_rig=device != NONE)
     with ExitStack() as stack:
         if SIM in (camera, device):
             world = SimWorld(recipe, options.seed, rig=device == SIM)
@@ -213,7 +213,7 @@ def _feed(
     first = math.nan
     with suppress(KeyboardInterrupt):
         for event in feed.events:
-            if isinstance(event, PlatePicture):
+            if isinstance(event, TrackPicture):
                 first = event.arrived_s if math.isnan(first) else first
                 if seconds is not None and event.arrived_s - first >= seconds:
                     break

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
 from scissorcal.vision.live import Frame
-from scissorcal.vision.track import Tracked
+from scissorcal.vision.located_frames import LocatedFrame
 
 CLOSE_S = 2.0
 
@@ -20,7 +20,7 @@ class CameraThread:
     """
 
     def __init__(
-        self, frames: Iterable[Frame], locate: Callable[[Iterable[Frame]], Iterator[Tracked]]
+        self, frames: Iterable[Frame], locate: Callable[[Iterable[Frame]], Iterator[LocatedFrame]]
     ) -> None:
         self.left_out = 0
         self._newest: Frame | None = None
@@ -28,7 +28,7 @@ class CameraThread:
         self._closing = False
         self._error: BaseException | None = None
         self._news = threading.Condition()
-        self._found: queue.SimpleQueue[Tracked] = queue.SimpleQueue()
+        self._found: queue.SimpleQueue[LocatedFrame] = queue.SimpleQueue()
         self._threads = [
             threading.Thread(target=self._run, args=(self._read, frames), daemon=True),
             threading.Thread(target=self._run, args=(self._locate, locate), daemon=True),
@@ -41,12 +41,12 @@ class CameraThread:
         """Whether no picture will come any more, and all were handed out."""
         return self._found.empty() and not self._threads[1].is_alive()
 
-    def due(self, wait_s: float = 0.0) -> list[Tracked]:
+    def due(self, wait_s: float = 0.0) -> list[LocatedFrame]:
         """Located pictures since the last call, oldest first; waits so long for the first one.
 
         Raises what ended the camera.
         """
-        found: list[Tracked] = []
+        found: list[LocatedFrame] = []
         with suppress(queue.Empty):
             found.append(self._found.get(timeout=wait_s) if wait_s else self._found.get_nowait())
             while True:
@@ -82,7 +82,7 @@ class CameraThread:
                 self._newest = frame
                 self._news.notify_all()
 
-    def _locate(self, locate: Callable[[Iterable[Frame]], Iterator[Tracked]]) -> None:
+    def _locate(self, locate: Callable[[Iterable[Frame]], Iterator[LocatedFrame]]) -> None:
         for found in locate(self._fresh()):
             self._found.put(found)
 

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from scissorcal.recipe.photograph_priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.rig_frame import RigPose
-from scissorcal.vision.geometry.seen_plate import SeenPlate, seen_plate
+from scissorcal.vision.geometry.rig_frame import PicturePose, RigPose, picture_pose
 from scissorcal.vision.live import Frame
+from scissorcal.vision.located_frames import LocatedFrame, State, track
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
-from scissorcal.vision.track import State, Tracked, track
 
 TARGETS = ("", PLATE_BOARD.name, PLATE_STRIP.name)
 """Names of targets, in the order of their numbers in a recording."""
 
 
 @dataclass(frozen=True, eq=False)
-class PlatePicture:
+class TrackPicture:
     """One picture: its number, times and state, and the plate's pose in it, if there is one.
 
     ``stamp_s`` is by the camera's clock, NaN where it states none; ``arrived_s`` by the host's;
@@ -33,12 +32,12 @@ class PlatePicture:
     target: str = ""
     odds: float = math.nan
     rms_px: float = math.nan
-    seen: SeenPlate | None = None
+    seen: PicturePose | None = None
     done: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
-class PlateEye:
+class PoseFinder:
     """What turns a camera's pictures into poses of the plate.
 
     ``back`` is T_target_plate; ``rig`` takes poses into the rig's frame, None where that is not
@@ -50,15 +49,15 @@ class PlateEye:
     rig: RigPose | None
     priors: PlatePriors
 
-    def locate(self, frames: Iterable[Frame]) -> Iterator[Tracked]:
+    def locate(self, frames: Iterable[Frame]) -> Iterator[LocatedFrame]:
         """Find the plate's target in every picture."""
         return track(frames, (PLATE_BOARD, PLATE_STRIP), self.camera, self.priors)
 
-    def picture(self, found: Tracked) -> PlatePicture:
+    def picture(self, found: LocatedFrame) -> TrackPicture:
         """The picture as a track takes it; a video's arrives when it is stamped."""
         frame, board = found.frame, found.found
         live = not math.isnan(frame.arrived_s)
-        return PlatePicture(
+        return TrackPicture(
             number=frame.number,
             stamp_s=frame.stamp_s if live else frame.time_s,
             arrived_s=frame.arrived_s if live else frame.time_s,
@@ -67,9 +66,9 @@ class PlateEye:
             target=found.board.name if found.board else "",
             odds=min(board.odds, 1e12) if board and board.other else math.nan,
             rms_px=board.rms_px if board else math.nan,
-            seen=seen_plate(board, self.camera, self.back, self.rig) if board else None,
+            seen=picture_pose(board, self.camera, self.back, self.rig) if board else None,
             done=frame.number / frame.count if frame.count else math.nan,
         )
 
 
-Locate = Callable[[Iterable[Frame]], Iterator[Tracked]]
+Locate = Callable[[Iterable[Frame]], Iterator[LocatedFrame]]

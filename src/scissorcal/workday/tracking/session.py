@@ -12,11 +12,11 @@ from scissorcal.aliases import Array
 from scissorcal.model.surface import Surface
 from scissorcal.recipe.schema import Recipe
 from scissorcal.tracking.delay import DelayFit, measure_delay
-from scissorcal.tracking.follow import ContactSource, FollowedRow, PlateFollower, SeenPose
+from scissorcal.tracking.follow import ContactSource, FollowedRow, PoseFollower, SeenPose
 from scissorcal.tracking.settings import CameraErrors, TrackingSettings, settings_of
 from scissorcal.tracking.tracker import Outcome, PoseEstimate
-from scissorcal.vision.track import STATES, State
-from scissorcal.workday.tracking.pictures import PlatePicture
+from scissorcal.vision.located_frames import STATES, State
+from scissorcal.workday.tracking.pictures import TrackPicture
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackChannels
 
 UNKNOWN_FRICTION_N = 1.0
@@ -74,7 +74,7 @@ class TrackFacts:
 
 
 class TrackSession:
-    """Feeds a `PlateFollower` with pictures and samples, and keeps books of what came of them.
+    """Feeds a `PoseFollower` with pictures and samples, and keeps books of what came of them.
 
     ``about`` is completed by the first picture with a pose: what all pictures share is known from
     then on. ``base_ns`` is the computer's clock at 0 s of the times of pictures.
@@ -110,7 +110,7 @@ class TrackSession:
         self._first: Array | None = None
         self._surface = facts.surface
         self._used = self._settings(None)
-        self.follower = PlateFollower(
+        self.follower = PoseFollower(
             facts.surface,
             self._used,
             camera_delay_s=1e-3 * about.camera_delay_ms,
@@ -142,7 +142,7 @@ class TrackSession:
             self._keep(row, float(host[-1]))
         self._say(math.nan)
 
-    def take_picture(self, picture: PlatePicture) -> None:
+    def take_picture(self, picture: TrackPicture) -> None:
         """Record a picture, and follow the pose in it."""
         self._pass(picture.arrived_s)
         self.states[picture.state] += 1
@@ -208,7 +208,7 @@ class TrackSession:
             f"None of {count} pictures gave a pose of the plate's target to start from ({causes})."
         )
 
-    def _look(self, picture: PlatePicture) -> None:
+    def _look(self, picture: TrackPicture) -> None:
         """Take from the first picture with a pose what all pictures share."""
         sighting = picture.seen
         if sighting is None or self.started or self.about.shared is not None:

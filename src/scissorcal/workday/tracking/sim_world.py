@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.sim.hand import minimum_jerk
-from scissorcal.device.sim.plate import plate_pose
+from scissorcal.device.sim.plate_contact import plate_pose
 from scissorcal.device.sim.specimen import Specimen, TouchedPlate, load_specimen
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey

@@ -26,8 +26,8 @@ from scissorcal.recording.plate_channels import (
 )
 from scissorcal.tracking.follow import FollowedRow
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.seen_plate import SeenPlate
-from scissorcal.workday.tracking.pictures import TARGETS, PlatePicture
+from scissorcal.vision.geometry.rig_frame import PicturePose
+from scissorcal.workday.tracking.pictures import TARGETS, TrackPicture
 
 TRACK_MARK = "track"
 
@@ -69,7 +69,7 @@ class TrackChannels:
     def samples(self, samples: NDArray[np.void]) -> None:
         """Samples of the rig are recorded by the run itself."""
 
-    def picture(self, picture: PlatePicture, time_s: float) -> None:
+    def picture(self, picture: TrackPicture, time_s: float) -> None:
         """Add a picture, exposed at ``time_s`` of the filter's clock."""
         row = np.zeros(1, dtype=PICTURE.dtype)
         row["sequence"], row["corners"] = picture.number, picture.corners
@@ -158,7 +158,7 @@ class RecordedTrack:
     """What a track was given: its pictures, the rig's samples (none without a rig), and facts."""
 
     about: TrackAbout
-    pictures: tuple[PlatePicture, ...]
+    pictures: tuple[TrackPicture, ...]
     samples: NDArray[np.void]
     device: Mapping[str, Any]
     handle_radius_m: float
@@ -199,7 +199,7 @@ def read_track(path: Path) -> RecordedTrack:
     )
 
 
-def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> PlatePicture:
+def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> TrackPicture:
     seen = None
     if np.isfinite(row["quaternion"]).all():
         noise = row["noise"].reshape(6, 6)
@@ -208,11 +208,11 @@ def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> PlatePict
         if np.isfinite(row["other_quaternion"]).all():
             turned = tuple(row["other_quaternion"].tolist())
             other = Pose(turned, tuple(row["other_translation"].tolist()))
-        seen = SeenPlate(
+        seen = PicturePose(
             Pose(pose.quaternion, pose.translation_m, noise + shared), other, noise, shared
         )
     number = int(row["sequence"])
-    return PlatePicture(
+    return TrackPicture(
         number=number,
         stamp_s=float(row["camera_time_s"]),
         arrived_s=1e-9 * (int(row["host_time_ns"]) - base_ns),

@@ -1,14 +1,18 @@
-"""A camera that follows the plate while the rig controls or renders."""
+"""A camera that follows the plate while the rig controls or renders, as a source of poses."""
 
 import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
+from scissorcal.tracking.plate_pose import PlatePose, SteadyPose
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.live import frames_of
 from scissorcal.workday.engine import Engine
@@ -16,8 +20,7 @@ from scissorcal.workday.options import RigOptions
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.camera_thread import CameraThread
-from scissorcal.workday.tracking.pictures import PlatePicture
-from scissorcal.workday.tracking.pose_source import Due, TrackedPose
+from scissorcal.workday.tracking.pictures import TrackPicture
 from scissorcal.workday.tracking.session import TrackSession
 from scissorcal.workday.tracking.sim_world import CARRY_S, SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackChannels
@@ -39,6 +42,9 @@ TAP = (
     "Motors off: tap the plate with the blade's tip at several places for {:g} s, then bring it to "
     "where it is cut."
 )
+
+Due = Callable[[float], Iterable[TrackPicture]]
+"""Pictures that have come until a time of the clock that the source is asked with."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,7 @@ class TrackedRun:
         )
 
 
-class PlateCamera:
+class TrackingCamera:
     """The camera that a run names, with the simulated world that it shows where that is "sim".
 
     ``cut`` says that the run renders: nothing real is between the blades then, so contacts are
@@ -97,7 +103,7 @@ class PlateCamera:
         without = "state the pose with --pose"
         if cut:
             without = 'set plate_pose = "known" in [scene], and build the package again'
-        self._eye = inputs.plate_eye(engine, recipe, camera, needs_rig=True, otherwise=without)
+        self._eye = inputs.pose_finder(engine, recipe, camera, needs_rig=True, otherwise=without)
         self._about = inputs.track_about(engine, recipe, camera, self._eye)
         world = camera == SIM
         self._world = SimWorld(recipe, rig.seed, rig=True, cut=cut) if world else None
@@ -116,7 +122,7 @@ class PlateCamera:
         *,
         taps_s: float = 0.0,
         held_N: float = 0.0,
-    ) -> Iterator[TrackedPose]:
+    ) -> "Iterator[TrackedPose]":
         """Start the camera, look until there is a pose, and yield the source of poses.
 
         The motors are off meanwhile. For ``taps_s`` a person taps the plate with the blade's tip
@@ -174,7 +180,7 @@ class PlateCamera:
         thread = CameraThread(frames_of(self._camera), eye.locate)
         stack.enter_context(closing(thread))
 
-        def due(now_s: float) -> Iterable[PlatePicture]:
+        def due(now_s: float) -> Iterable[TrackPicture]:
             for located in thread.due()[-MOST_AT_ONCE:]:
                 picture = eye.picture(located)
                 yield replace(picture, arrived_s=picture.arrived_s - begun_s)
@@ -182,7 +188,7 @@ class PlateCamera:
         return due
 
     def _look(
-        self, motion: "Motion", source: TrackedPose, track: TrackSession, taps_s: float
+        self, motion: "Motion", source: "TrackedPose", track: TrackSession, taps_s: float
     ) -> None:
         """Feed the source with the motors off: through the taps, and until there is a pose."""
         world = self._world
@@ -205,6 +211,63 @@ class PlateCamera:
                 f"{track.why_waiting()} Check that the camera sees the plate's target."
             )
         _feed(motion, source, motion.now_s + SETTLE_S)
+
+
+class TrackedPose:
+    """A `scissorcal.tracking.plate_pose.PoseSource`: call it with the time (s) and new samples.
+
+    It feeds the session with both samples and pictures, and answers with the pose predicted for
+    that time, None while there is none. ``failed`` is the sentence of what ended the camera, empty
+    while it runs. ``begun_s`` is that clock's time at 0 s of the session's.
+    A pose that rests on neither pictures nor contacts any more is not ``tracked``, and says why;
+    so is one whose camera or camera's clock has failed, whatever contacts still come. With
+    ``steady`` the pose rests while only the noise of pictures moves it (`SteadyPose`), as a
+    rendering needs it.
+    """
+
+    def __init__(
+        self, session: TrackSession, due: Due, begun_s: float = 0.0, *, steady: bool = False
+    ) -> None:
+        self._session = session
+        self._due = due
+        self._begun_s = begun_s
+        self._steady = SteadyPose() if steady else None
+        self.failed = ""
+
+    def __call__(self, now_s: float, samples: NDArray[np.void]) -> PlatePose | None:
+        """The plate's pose at ``now_s``. Raises DeviceError where the rig's clock fails."""
+        session = self._session
+        session.take_samples(samples)
+        self._look(now_s)
+        found = session.follower.estimate(now_s - self._begun_s)
+        if found is None:
+            return None
+        old = min(found.picture_age_s, found.contact_age_s)
+        tracked = not self.failed and session.follower.state != "coasting"
+        why = self.failed or f"neither pictures nor contacts came for {old:.1f} s"
+        pose = PlatePose(
+            time=now_s,
+            rotation=found.rotation,
+            translation=found.place_m,
+            covariance=found.covariance,
+            velocity=found.rates[3:],
+            turn_rate=found.rates[:3],
+            tracked=tracked,
+            why="" if tracked else why,
+        )
+        if self._steady is not None and session.follower.pictures:
+            return self._steady.held(pose, session.follower.picture_noise)
+        return pose
+
+    def _look(self, now_s: float) -> None:
+        """Take what is due; a camera that fails is a plate that is lost, not a rig that fails."""
+        if self.failed:
+            return
+        try:
+            for picture in self._due(now_s):
+                self._session.take_picture(picture)
+        except DeviceError as error:
+            self.failed = str(error)
 
 
 def _feed(motion: "Motion", source: TrackedPose, until_s: float) -> None:

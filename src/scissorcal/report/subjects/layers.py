@@ -15,7 +15,7 @@ ID, PART, TITLE = "scene-plate", "scene", "The plate as drawn"
 LOOKS: tuple[Look, ...] = ("blue", "vermillion", "green", "purple", "orange", "ink")
 
 
-def drawn_plate_panel(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> Panel:
+def layers_panel(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> Panel:
     """Piece by piece, in a table and in a picture of the line of the cut."""
     return Panel(
         ID,

@@ -29,7 +29,7 @@ STATES: dict[State, str] = {
 
 
 @dataclass(frozen=True)
-class Tracked:
+class LocatedFrame:
     """One picture and its state, and the target's pose if there is one."""
 
     frame: Frame
@@ -44,7 +44,7 @@ def track(
     boards: Sequence[MarkedBoard],
     camera: Camera,
     priors: PlatePriors = PlatePriors(),
-) -> Iterator[Tracked]:
+) -> Iterator[LocatedFrame]:
     """Locate a target in every picture independently; the first board that is seen is the target.
 
     Raises InputError where pictures are of another size than the camera was fitted at.
@@ -59,17 +59,17 @@ def track(
         seen = look(frame.image, boards, f"picture {frame.number}")
         if seen is None:
             state: State = "blank" if _is_blank(frame) else "no target"
-            yield Tracked(_without_image(frame), state, None, 0, None)
+            yield LocatedFrame(_without_image(frame), state, None, 0, None)
             continue
         boards = tuple(board for board in boards if board == seen.board)
         try:
             found = locate_board(Corners.of(seen), camera, priors)
         except ValueError:
             count = len(seen.ids)
-            yield Tracked(_without_image(frame), "no pose", boards[0], count, None)
+            yield LocatedFrame(_without_image(frame), "no pose", boards[0], count, None)
             continue
         state = "seen" if found.odds >= ODDS else "ambiguous"
-        yield Tracked(_without_image(frame), state, boards[0], len(seen.ids), found)
+        yield LocatedFrame(_without_image(frame), state, boards[0], len(seen.ids), found)
 
 
 def _without_image(frame: Frame) -> Frame:
