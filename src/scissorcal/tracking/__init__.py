@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from scissorcal.tracking.clocks import ClockFit, ClockWatch, fit_clock
     from scissorcal.tracking.contacts import TipContact, TipContacts
     from scissorcal.tracking.delay import DelayFit, measure_delay
-    from scissorcal.tracking.follow import FollowedRow, PoseFollower, SeenPose
+    from scissorcal.tracking.follow import FollowedRow, PoseFollower
     from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
     from scissorcal.tracking.rotation import pose_error
     from scissorcal.tracking.rows import CameraPose
@@ -30,7 +30,7 @@ _HOMES = {
     "clocks": ("ClockFit", "ClockWatch", "fit_clock"),
     "contacts": ("TipContact", "TipContacts"),
     "delay": ("DelayFit", "measure_delay"),
-    "follow": ("FollowedRow", "PoseFollower", "SeenPose"),
+    "follow": ("FollowedRow", "PoseFollower"),
     "judge": ("TrackFigures", "track_figures", "track_verdicts"),
     "rotation": ("pose_error",),
     "rows": ("CameraPose",),
@@ -60,7 +60,6 @@ __all__ = [
     "PoseEstimate",
     "PoseFollower",
     "PoseTracker",
-    "SeenPose",
     "TipContact",
     "TipContacts",
     "TrackFigures",

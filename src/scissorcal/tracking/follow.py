@@ -24,21 +24,6 @@ _MOST_ROWS = 30_000
 
 
 @dataclass(frozen=True, eq=False)
-class SeenPose:
-    """A picture's pose as it arrives: its stamp by the camera's clock, its arrival by the host's.
-
-    ``rotation``, ``place_m``, ``noise`` (6, 6) and ``certain`` as in `CameraPose`.
-    """
-
-    stamp_s: float
-    arrived_s: float
-    rotation: Array
-    place_m: Array
-    noise: Array
-    certain: bool = True
-
-
-@dataclass(frozen=True, eq=False)
 class FollowedRow:
     """One row that the filter was given, and what it knew after it.
 
@@ -146,21 +131,23 @@ class PoseFollower:
         found = self._tip.take(device_s, opening, advance, drive, normal)
         return [self._contact(contact) for contact in found]
 
-    def picture(self, seen: SeenPose) -> FollowedRow | None:
-        """Take a picture's pose; None while the rig has sent no time to put it at."""
+    def picture(self, pose: CameraPose, arrived_s: float) -> FollowedRow | None:
+        """Take a picture's pose; None while the rig has sent no time to put it at.
+
+        Its ``time_s`` is the camera's stamp, ``arrived_s`` the host's time of its arrival.
+        """
+        stamp_s = pose.time_s
         begun = self.camera.begun_anew
         before = self.camera.fit if self.tracker.started else None
-        self.camera.add([seen.stamp_s], [seen.arrived_s])
+        self.camera.add([stamp_s], [arrived_s])
         if self.rig is None and before is not None and self.camera.begun_anew > begun:
-            self._shift(self.camera.fit.own(seen.arrived_s) - before.own(seen.arrived_s))
-        time, sd = self.exposed(seen.stamp_s)
+            self._shift(self.camera.fit.own(arrived_s) - before.own(arrived_s))
+        time, sd = self.exposed(stamp_s)
         if math.isnan(time):
             return None
         plate = self._settings.plate
         moved = np.repeat([plate.spin_rad_per_s, plate.speed_m_per_s], 3) * sd
-        pose = CameraPose(
-            time, seen.rotation, seen.place_m, seen.noise + np.diag(moved**2), seen.certain
-        )
+        pose = replace(pose, time_s=time, covariance=pose.covariance + np.diag(moved**2))
         self.pictures.append(pose)
         outcome, nis = self.tracker.picture(pose)
         self._now_s = max(self._now_s, time)

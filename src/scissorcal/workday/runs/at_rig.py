@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from scissorcal.device.session import Operator, RigSession
     from scissorcal.recording import Kind, RecordingWriter
     from scissorcal.tracking.plate_pose import PoseSource
-    from scissorcal.workday.tracking.tracking_camera import TrackedRun, TrackingCamera
+    from scissorcal.workday.tracking.session import TrackedRun
+    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
 Result = TypeVar("Result")
 

@@ -12,8 +12,6 @@ import numpy as np
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.recipe.plate_tracking import LONGEST_DELAY_MS
-from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
-from scissorcal.verdicts import Verdict
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.live import camera_number, frames_of, timed
 from scissorcal.vision.located_frames import STATES, State
@@ -24,7 +22,7 @@ from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.feeds import Feed
 from scissorcal.workday.tracking.pictures import PoseFinder, TrackPicture
-from scissorcal.workday.tracking.session import Tell, TrackSession
+from scissorcal.workday.tracking.session import Tell, TrackedRun, TrackSession, tracked_run
 from scissorcal.workday.tracking.sim_world import SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackRecorder, read_track
 from scissorcal.workday.workspace import Workspace
@@ -40,7 +38,7 @@ SIM_CAMERA_S, SIM_RIG_S = 2.4, 6.0
 
 
 @dataclass(frozen=True)
-class TrackResult:
+class TrackResult(TrackedRun):
     """A finished track: its recording (None where one was followed again), its pose at the end, and
     what became of pictures and contacts.
 
@@ -50,23 +48,15 @@ class TrackResult:
     """
 
     path: Path | None
-    source: str
     frame: Literal["rig", "camera"]
     rig: str
     seconds: float
-    pictures: int
-    poses: int
     states: dict[State, int]
     longest_gap_s: float
     travel_mm: float
-    state: str
     quaternion: tuple[float, float, float, float]
     translation_m: tuple[float, float, float]
     covariance: tuple[tuple[float, ...], ...]
-    sd_mm: float
-    sd_deg: float
-    figures: TrackFigures
-    verdicts: tuple[Verdict, ...]
     notes: tuple[str, ...]
 
     @property
@@ -229,34 +219,21 @@ def _feed(
 
 
 def _result(session: TrackSession, path: Path | None, rig: str) -> TrackResult:
-
-    follower = session.follower
-    delay = session.delay
-    figures = track_figures(follower, delay)
-    estimate = follower.now()
+    estimate = session.follower.now()
     assert estimate is not None
     pose = Pose.from_matrix(estimate.rotation, estimate.place_m)
-    sds = np.sqrt(np.diag(estimate.covariance))
-    pictures = sum(session.states.values())
     return TrackResult(
+        **vars(tracked_run(session, session.about.source)),
         path=path,
-        source=session.about.source,
         frame=session.about.frame,
         rig=rig,
         seconds=session.elapsed_s,
-        pictures=pictures,
-        poses=session.states["seen"] + session.states["ambiguous"],
         states={state: session.states[state] for state in STATES},
         longest_gap_s=max(session.gaps, default=0.0),
         travel_mm=1e3 * session.travel_m,
-        state=follower.state,
         quaternion=pose.quaternion,
         translation_m=pose.translation_m,
         covariance=tuple(tuple(row) for row in estimate.covariance.tolist()),
-        sd_mm=float(1e3 * sds[3:].max()),
-        sd_deg=float(np.degrees(sds[:3].max())),
-        figures=figures,
-        verdicts=track_verdicts(figures),
         notes=_notes(session),
     )
 

@@ -1,19 +1,16 @@
 """A camera that follows the plate while the rig controls or renders, as a source of poses."""
 
-import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
 from scissorcal.tracking.plate_pose import PlatePose, SteadyPose
-from scissorcal.verdicts import Verdict
 from scissorcal.vision.live import frames_of
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import RigOptions
@@ -21,7 +18,7 @@ from scissorcal.workday.rigs import SIM
 from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.camera_thread import CameraThread
 from scissorcal.workday.tracking.pictures import TrackPicture
-from scissorcal.workday.tracking.session import TrackSession
+from scissorcal.workday.tracking.session import TrackedRun, TrackSession, tracked_run
 from scissorcal.workday.tracking.sim_world import CARRY_S, SimWorld
 from scissorcal.workday.tracking.track_recorder import TrackChannels
 
@@ -45,35 +42,6 @@ TAP = (
 
 Due = Callable[[float], Iterable[TrackPicture]]
 """Pictures that have come until a time of the clock that the source is asked with."""
-
-
-@dataclass(frozen=True)
-class TrackedRun:
-    """What became of pictures and contacts in a run, with the pose's state at its end.
-
-    ``poses`` of ``pictures`` had one; ``sd_mm`` and ``sd_deg`` are those of the pose's worst axis,
-    NaN without a pose.
-    """
-
-    source: str
-    state: str
-    pictures: int
-    poses: int
-    sd_mm: float
-    sd_deg: float
-    figures: TrackFigures
-    verdicts: tuple[Verdict, ...]
-
-    @property
-    def sentence(self) -> str:
-        """The pictures and contacts in one line."""
-        counts = self.figures.contacts
-        return (
-            f"tracked by {self.source}: {self.poses} poses in {self.pictures} pictures, "
-            f"{self.figures.pictures.refused} refused; {counts.used} contacts used, "
-            f"{counts.refused} refused; {self.figures.restarts} restarts; the plate is known to "
-            f"{self.sd_mm:.2g} mm and {self.sd_deg:.2g} deg"
-        )
 
 
 class TrackingCamera:
@@ -154,24 +122,8 @@ class TrackingCamera:
 
     def tracked(self) -> TrackedRun:
         """What became of it; after `follow`."""
-        track = self._track
-        assert track is not None
-        figures = track_figures(track.follower, track.delay)
-        sd_mm = sd_deg = math.nan
-        if track.started:
-            variances = track.follower.tracker.estimate().covariance.diagonal()
-            sd_mm = 1e3 * math.sqrt(float(variances[3:].max()))
-            sd_deg = math.degrees(math.sqrt(float(variances[:3].max())))
-        return TrackedRun(
-            source=f"camera {self._about.source}",
-            state=track.follower.state,
-            pictures=track.states.total(),
-            poses=track.states["seen"] + track.states["ambiguous"],
-            sd_mm=sd_mm,
-            sd_deg=sd_deg,
-            figures=figures,
-            verdicts=track_verdicts(figures),
-        )
+        assert self._track is not None
+        return tracked_run(self._track, f"camera {self._about.source}")
 
     def _pictures(self, stack: ExitStack, begun_s: float) -> Due:
         eye, world = self._eye, self._world
