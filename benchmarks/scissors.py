@@ -27,9 +27,9 @@ from scissorcal.vision.sim import (
     BladeShape,
     CastShadow,
     Lamp,
-    Layer,
     Lens,
-    Pose,
+    PaintLayer,
+    SimPose,
     as_jpeg,
     random_looks,
     render,
@@ -100,7 +100,7 @@ def photographed(
     px_per_mm = rng.uniform(0.8, 0.95) * height / 200.0
     turn = rng.uniform(0.0, 2.0 * np.pi)
     middle = 0.012 * np.array([np.cos(turn), np.sin(turn)])
-    pose = Pose.looking_at(
+    pose = SimPose.looking_at(
         (-float(middle[0]), -float(middle[1])),
         focal / px_per_mm * 1e-3,
         tilt=np.radians(tilt),
@@ -128,7 +128,7 @@ def photographed(
 
     white = rng.uniform(0.7, 0.9)
     far = 0.3 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    sheet = Layer(
+    sheet = PaintLayer(
         [far],
         pose,
         white,

@@ -4,9 +4,9 @@ Nothing here is used by a fit, and nothing of a fit is used here except the prin
 """
 
 from scissorcal.vision.sim.blades import BladeShape, Nick, blade_layer, scissors_layers
-from scissorcal.vision.sim.lens import Lens, Pose
+from scissorcal.vision.sim.lens import Lens, SimPose
 from scissorcal.vision.sim.looks import Looks, as_jpeg, random_looks
-from scissorcal.vision.sim.photograph import Glare, Layer, render
+from scissorcal.vision.sim.photograph import Glare, PaintLayer, render
 from scissorcal.vision.sim.plate_scene import PlateScene, chained, plate_scene
 from scissorcal.vision.sim.shadows import CastShadow, Lamp
 from scissorcal.vision.sim.targets import target_layers
@@ -16,12 +16,12 @@ __all__ = [
     "CastShadow",
     "Glare",
     "Lamp",
-    "Layer",
     "Lens",
     "Looks",
     "Nick",
+    "PaintLayer",
     "PlateScene",
-    "Pose",
+    "SimPose",
     "as_jpeg",
     "blade_layer",
     "chained",

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scissorcal.aliases import Array
-from scissorcal.vision.sim.lens import Pose
-from scissorcal.vision.sim.photograph import Layer
+from scissorcal.vision.sim.lens import SimPose
+from scissorcal.vision.sim.photograph import PaintLayer
 
 STEEL = 0.28
 _SCREW = 0.12
@@ -112,32 +112,32 @@ class BladeShape:
 
 def blade_layer(
     shape: BladeShape,
-    pose: Pose,
+    pose: SimPose,
     pivot_m: tuple[float, float],
     turn: float = 0.0,
     **look: Any,
-) -> Layer:
+) -> PaintLayer:
     """One blade on a sheet: its pivot at ``pivot_m`` of the sheet's frame, turned by ``turn``.
 
     Unturned, it points along the sheet's x axis with its edge towards +y, which is downward in
-    print. ``look`` are fields of `Layer`.
+    print. ``look`` are fields of `PaintLayer`.
     """
     look = {"reflectance": STEEL, "brushed": 0.04, "grain": turn, **look}
     outlines = [on_sheet(outline, pivot_m, turn) for outline in shape.outlines()]
-    return Layer(outlines, pose, **look)
+    return PaintLayer(outlines, pose, **look)
 
 
 def scissors_layers(
     upper: BladeShape,
     lower: BladeShape,
     opening: float,
-    pose: Pose,
+    pose: SimPose,
     pivot_m: tuple[float, float],
     turn: float = 0.0,
     *,
     rings: bool = True,
     **look: Any,
-) -> list[Layer]:
+) -> list[PaintLayer]:
     """Both blades, open by ``opening`` about one pivot, with ring handles behind it.
 
     Each blade is turned away from the common axis by half the opening; its handle lies beyond the
@@ -155,9 +155,9 @@ def scissors_layers(
             mirrored = outline * (1.0, side)
             mirrored = mirrored if side > 0 else mirrored[::-1]
             placed.append(on_sheet(mirrored, pivot_m, turn - 0.5 * side * opening))
-        layers.append(Layer(placed, pose, **{"grain": turn - 0.5 * side * opening, **look}))
+        layers.append(PaintLayer(placed, pose, **{"grain": turn - 0.5 * side * opening, **look}))
     screw = 0.9 * upper.hole_m * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
-    layers.append(Layer([screw + np.asarray(pivot_m)], pose, _SCREW))
+    layers.append(PaintLayer([screw + np.asarray(pivot_m)], pose, _SCREW))
     return layers
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.vision.sim.coverage import coverage
-from scissorcal.vision.sim.lens import Lens, Pose
+from scissorcal.vision.sim.lens import Lens, SimPose
 from scissorcal.vision.sim.looks import Bytes, Looks, Picture, develop
 from scissorcal.vision.sim.shadows import CastShadow, cast
 
@@ -29,7 +29,7 @@ class Glare:
 
 
 @dataclass(frozen=True)
-class Layer:
+class PaintLayer:
     """Flat shapes of one material in one plane.
 
     ``outlines_m`` are closed polygons (n, 2) in the plane of ``pose``, those that run the other
@@ -41,7 +41,7 @@ class Layer:
     """
 
     outlines_m: Sequence[Array]
-    pose: Pose
+    pose: SimPose
     reflectance: float
     shading: tuple[float, float] = (0.0, 0.0)
     brushed: float = 0.0
@@ -55,7 +55,7 @@ class Layer:
 
 
 def render(
-    layers: Sequence[Layer | CastShadow],
+    layers: Sequence[PaintLayer | CastShadow],
     lens: Lens,
     looks: Looks,
     rng: np.random.Generator,
@@ -76,7 +76,7 @@ def render(
     return develop(radiance, looks, rng)
 
 
-def _lay(radiance: Picture, layer: Layer, lens: Lens, rng: np.random.Generator) -> None:
+def _lay(radiance: Picture, layer: PaintLayer, lens: Lens, rng: np.random.Generator) -> None:
     if layer.shadow > 0.0:
         _cast_shadow(radiance, layer, lens)
     seen = _seen(layer.outlines_m, layer, lens)
@@ -92,7 +92,7 @@ def _lay(radiance: Picture, layer: Layer, lens: Lens, rng: np.random.Generator) 
     part += share * (shade - part)
 
 
-def _cast_shadow(radiance: Picture, layer: Layer, lens: Lens) -> None:
+def _cast_shadow(radiance: Picture, layer: PaintLayer, lens: Lens) -> None:
     import cv2
 
     moved = [np.asarray(outline) + layer.shadow_m for outline in layer.outlines_m]
@@ -116,7 +116,7 @@ def _cast_shadow(radiance: Picture, layer: Layer, lens: Lens) -> None:
 
 
 def _shade(
-    layer: Layer, lens: Lens, box: tuple[int, int, int, int], rng: np.random.Generator
+    layer: PaintLayer, lens: Lens, box: tuple[int, int, int, int], rng: np.random.Generator
 ) -> Picture | np.float32:
     """Reflectance over a box of pixels; metal's changes slowly, so every fourth pixel is enough."""
     import cv2
@@ -146,7 +146,9 @@ def _shade(
     )
 
 
-def _texture(layer: Layer, lens: Lens, shape: tuple[int, int], rng: np.random.Generator) -> Picture:
+def _texture(
+    layer: PaintLayer, lens: Lens, shape: tuple[int, int], rng: np.random.Generator
+) -> Picture:
     """Relative light of a rough material over a box of pixels, about 1."""
     import cv2
 
@@ -156,7 +158,7 @@ def _texture(layer: Layer, lens: Lens, shape: tuple[int, int], rng: np.random.Ge
     return np.asarray(1.0 + layer.texture * rough / max(float(rough.std()), 1e-9), np.float32)
 
 
-def _on_plane(pixels: Array, lens: Lens, pose: Pose) -> Array:
+def _on_plane(pixels: Array, lens: Lens, pose: SimPose) -> Array:
     """Place in the plane that pixels show; a few fixed-point steps, good enough for shading."""
     target = (pixels - lens.centre_px) / lens.focal_px
     direction = target.copy()
@@ -170,7 +172,7 @@ def _on_plane(pixels: Array, lens: Lens, pose: Pose) -> Array:
     return np.asarray(np.nan_to_num(where))
 
 
-def _seen(outlines: Sequence[Array], layer: Layer, lens: Lens) -> list[Array]:
+def _seen(outlines: Sequence[Array], layer: PaintLayer, lens: Lens) -> list[Array]:
     """Pixels of each outline, every side cut so short that its projection is straight.
 
     All outlines at once: a target has hundreds of short ones.

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.vision.sim.lens import Pose, about
-from scissorcal.vision.sim.photograph import Layer
+from scissorcal.vision.sim.lens import SimPose, about
+from scissorcal.vision.sim.photograph import PaintLayer
 from scissorcal.vision.sim.targets import target_layers
 from scissorcal.vision.targets.boards import RIG_MARKERS, MarkedBoard
 
@@ -19,21 +19,21 @@ class PlateScene:
     """True poses. The card moves with a blade; ``rig_card`` is its pose at no advance and blade
     angle zero. The target is on the plate's upper face at ``plate_target``."""
 
-    camera_rig: Pose
-    rig_card: Pose
-    rig_plate: Pose
-    plate_target: Pose
+    camera_rig: SimPose
+    rig_card: SimPose
+    rig_plate: SimPose
+    plate_target: SimPose
 
     @property
-    def camera_plate(self) -> Pose:
+    def camera_plate(self) -> SimPose:
         """The plate as the camera has it."""
         return chained(self.camera_rig, self.rig_plate)
 
     def layers(
         self, target: MarkedBoard, advance_m: float = 0.0, blade_angle: float = 0.0
-    ) -> list[Layer]:
+    ) -> list[PaintLayer]:
         """The target on the plate, and the card at the rig's stance."""
-        stance = Pose(about(2, blade_angle), np.array([advance_m, 0.0, 0.0]))
+        stance = SimPose(about(2, blade_angle), np.array([advance_m, 0.0, 0.0]))
         card = chained(self.camera_rig, stance, self.rig_card)
         lying = chained(self.camera_plate, self.plate_target)
         return [*target_layers(RIG_MARKERS, card), *target_layers(target, lying)]
@@ -50,7 +50,7 @@ def plate_scene(
     eye = np.array([0.15, 0.7, 0.75]) + rng.normal(0.0, 0.05, 3)
     to_rig = _looking(eye / np.linalg.norm(eye))
     middle = np.array([0.09, 0.03, 0.04])
-    camera_rig = Pose(to_rig, np.array([0.0, 0.0, rng.uniform(0.4, 0.46)]) - to_rig @ middle)
+    camera_rig = SimPose(to_rig, np.array([0.0, 0.0, rng.uniform(0.4, 0.46)]) - to_rig @ middle)
     facing = np.diag([1.0, -1.0, -1.0]) @ _leaned(rng, 0.05)
     centre = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])
     card = np.array([0.03, 0.075, 0.0]) + np.append(rng.normal(0.0, 2e-3, 2), 0.0)
@@ -59,18 +59,18 @@ def plate_scene(
     pattern = about(2, turn) @ np.diag([1.0, -1.0, -1.0])
     return PlateScene(
         camera_rig,
-        Pose(facing, card - facing @ centre),
-        Pose(lying, near_edge),
-        Pose(pattern, np.array([*place_m, 0.0])),
+        SimPose(facing, card - facing @ centre),
+        SimPose(lying, near_edge),
+        SimPose(pattern, np.array([*place_m, 0.0])),
     )
 
 
-def chained(*poses: Pose) -> Pose:
+def chained(*poses: SimPose) -> SimPose:
     """One pose after the other, the outermost first."""
     rotation, shift = np.eye(3), np.zeros(3)
     for pose in reversed(poses):
         rotation, shift = pose.rotation @ rotation, pose.rotation @ shift + pose.shift_m
-    return Pose(rotation, shift)
+    return SimPose(rotation, shift)
 
 
 def _looking(towards_eye: Array) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.vision.sim.coverage import coverage
-from scissorcal.vision.sim.lens import Lens, Pose
+from scissorcal.vision.sim.lens import Lens, SimPose
 from scissorcal.vision.sim.looks import Picture
 
 _SAMPLES = 24
@@ -35,7 +35,7 @@ class CastShadow:
 
     outlines_m: Sequence[Array]
     heights_m: Sequence[Array]
-    pose: Pose
+    pose: SimPose
     lamp: Lamp
 
     @classmethod
@@ -43,7 +43,7 @@ class CastShadow:
         cls,
         outlines_m: Sequence[Array],
         height_m: Callable[[Array], Array],
-        pose: Pose,
+        pose: SimPose,
         lamp: Lamp,
     ) -> "CastShadow":
         """The common shadow of outlines in one plane; ``height_m`` of points (n, 2)."""

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.vision.sim.lens import Pose
-from scissorcal.vision.sim.photograph import Layer
+from scissorcal.vision.sim.lens import SimPose
+from scissorcal.vision.sim.photograph import PaintLayer
 from scissorcal.vision.targets.boards import Board, Chessboard
 from scissorcal.vision.targets.sheet import board_ink
 
@@ -15,18 +15,18 @@ PAPER, INK = 0.85, 0.04
 
 def target_layers(
     board: Board,
-    pose: Pose,
+    pose: SimPose,
     *,
     margin_m: float = 0.012,
     print_scale: tuple[float, float] = (1.0, 1.0),
     ids: Sequence[int] | None = None,
-) -> list[Layer]:
+) -> list[PaintLayer]:
     """The sheet and its ink. ``print_scale`` is the printer's scale error by axis; ``ids`` leaves
     out all other markers."""
     scale = np.asarray(print_scale)
     sheet = _rectangle(-margin_m, -margin_m, board.width_m + margin_m, board.height_m + margin_m)
     ink = [outline * scale for outline in _ink(board, ids)]
-    return [Layer([sheet], pose, PAPER), Layer(ink, pose, INK)]
+    return [PaintLayer([sheet], pose, PAPER), PaintLayer(ink, pose, INK)]
 
 
 def _ink(board: Board, ids: Sequence[int] | None) -> list[Array]:
