@@ -112,8 +112,8 @@ def scene_of(
     ``drawn_plate``, is put in by ``model_copy``.
     """
     manifest = package.manifest
-    own = set(manifest.fit_hashes.values())
-    fits = [fit for fit in fits if fit.inputs_hash in own]
+    fit_hashes = set(manifest.fit_hashes.values())
+    fits = [fit for fit in fits if fit.inputs_hash in fit_hashes]
     meanings = {p.name: p.meaning for fit in fits for p in fit.parameters}
     mean = package.arrays.get(table_file("mean_energy"))
     ranges, mechanics = manifest.ranges, manifest.mechanics
@@ -135,7 +135,7 @@ def scene_of(
         tables={name: _table(package, name) for name in TABLE_NAMES},
         numbers=web_numbers(package.tables),
         mean_energy=None if mean is None else Numbers.of(mean),
-        levels=() if mean is None else tuple(float(one) for one in energy_levels(mean[1])),
+        levels=() if mean is None else tuple(float(level) for level in energy_levels(mean[1])),
         centre=_centre(package),
         sliders=tuple(_sliders(package, meanings)),
         draws=_draws(package),
@@ -184,22 +184,22 @@ def _centre(package: ModelPackage) -> Rows:
 def _sliders(package: ModelPackage, meanings: Mapping[str, str]) -> "list[Slider]":
     record = package.manifest.provenance
     cut, friction = central_values(package)
-    found = []
+    sliders = []
     for index, parameter in enumerate(record.cut.parameters):
         nodes = slider_nodes(parameter.name, parameter.value, parameter.sd)
         varied = np.tile(cut, (NODES, 1))
         varied[:, index] = nodes
         same = None if friction is None else np.tile(friction, (NODES, 1))
         law = variations(package, varied, same)
-        found.append(_slider(parameter, index, nodes, law, meanings))
+        sliders.append(_slider(parameter, index, nodes, law, meanings))
     for index, parameter in enumerate(record.friction.parameters if record.friction else ()):
         assert friction is not None
         nodes = slider_nodes(parameter.name, parameter.value, parameter.sd)
         varied = np.tile(friction, (NODES, 1))
         varied[:, index] = nodes
         law = variations(package, np.tile(cut, (NODES, 1)), varied)
-        found.append(_slider(parameter, len(cut) + index, nodes, law, meanings))
-    return [slider for slider in found if slider is not None]
+        sliders.append(_slider(parameter, len(cut) + index, nodes, law, meanings))
+    return [slider for slider in sliders if slider is not None]
 
 
 def _slider(
@@ -259,10 +259,10 @@ def _bands(package: ModelPackage) -> "list[Band]":
     limit = manifest.limits.torque_Nm
     drawn = exact_model(_cut_draws(package), None)
     alone = np.clip(torque_quantiles(drawn, *place, (0.05, 0.95)), -limit, limit)
-    found = [(-rate, False, alone)]
+    bands = [(-rate, False, alone)]
     if manifest.provenance.friction:
         closing, opens = package.band(*place), package.band(place[0], rate, place[2])
-        found += [(-rate, True, np.stack(closing)), (rate, True, np.stack(opens))]
+        bands += [(-rate, True, np.stack(closing)), (rate, True, np.stack(opens))]
     return [
         Band(
             rate=signed,
@@ -272,7 +272,7 @@ def _bands(package: ModelPackage) -> "list[Band]":
             low=Numbers.of(low),
             high=Numbers.of(high),
         )
-        for signed, with_friction, (low, high) in found
+        for signed, with_friction, (low, high) in bands
     ]
 
 
@@ -294,25 +294,25 @@ def _pose_part(plate: PoseRecord | None) -> PosePart | None:
 
 
 def _strokes(fit: FitResult) -> "list[Stroke]":
-    series, found = fit.series, []
+    series, strokes = fit.series, []
     for number in np.unique(series.stroke)[:MOST_STROKES]:
-        own = np.flatnonzero(
+        points = np.flatnonzero(
             (series.stroke == number) & np.isfinite(series.measured) & np.isfinite(series.contact)
         )
-        own = own[:: max(1, -(-len(own) // MOST_POINTS))]
-        if len(own) < 2:
+        points = points[:: max(1, -(-len(points) // MOST_POINTS))]
+        if len(points) < 2:
             continue
-        closes = series.opening[own[-1]] < series.opening[own[0]]
-        found.append(
+        closes = series.opening[points[-1]] < series.opening[points[0]]
+        strokes.append(
             Stroke(
-                recording=_file_of(fit.sources[int(series.recording[own[0]])]),
+                recording=_file_of(fit.sources[int(series.recording[points[0]])]),
                 kind="closing" if closes else "opening",
-                opening=Numbers.of(series.opening[own]),
-                contact=Numbers.of(series.contact[own]),
-                torque=Numbers.of(series.measured[own]),
+                opening=Numbers.of(series.opening[points]),
+                contact=Numbers.of(series.contact[points]),
+                torque=Numbers.of(series.measured[points]),
             )
         )
-    return found
+    return strokes
 
 
 def _file_of(source: str) -> str:

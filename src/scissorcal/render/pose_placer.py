@@ -193,15 +193,15 @@ class PosePlacer:
         self._time = estimate.time
         self._estimates += 1
         age = now - estimate.time
-        found = self._judge(estimate)
-        if not found.kind and age > STALE_S:
-            found = replace(found, kind="late", sentence=sentences.late(age))
-        section = found.placed.section if found.placed else Section(0.0, 0.0)
-        motion.place(section, not found.kind, age)
-        if found.placed and self._record:
-            self._record.add(estimate.time, found.placed, not found.kind)
-        self._refused[found.kind] += 1
-        self._become(found.kind, found.sentence, now)
+        judged = self._judge(estimate)
+        if not judged.kind and age > STALE_S:
+            judged = replace(judged, kind="late", sentence=sentences.late(age))
+        section = judged.placed.section if judged.placed else Section(0.0, 0.0)
+        motion.place(section, not judged.kind, age)
+        if judged.placed and self._record:
+            self._record.add(estimate.time, judged.placed, not judged.kind)
+        self._refused[judged.kind] += 1
+        self._become(judged.kind, judged.sentence, now)
 
     def report(self, seconds: float, out_s: float) -> PoseReport:
         """What came and what was done in a rendering; ``out_s`` of it were below the force."""

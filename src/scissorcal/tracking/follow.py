@@ -27,8 +27,7 @@ _MOST_ROWS = 30_000
 class FollowedRow:
     """One row that the filter was given, and what it knew after it.
 
-    ``source`` is "picture" or "contact". ``away_m`` is how far a refused contact was from where the
-    surface was expected, along its normal. ``estimate`` is None while there is no pose.
+    ``source`` is "picture" or "contact". ``estimate`` is None while there is no pose.
     """
 
     source: str
@@ -38,7 +37,6 @@ class FollowedRow:
     state: str
     estimate: PoseEstimate | None
     contact: TipContact | None = None
-    away_m: float = math.nan
 
 
 class ContactSource(Protocol):
@@ -128,8 +126,8 @@ class PoseFollower:
         if self._tip is None or not self.touching:
             return []
         normal = self._normal(float(opening[-1]), float(advance[-1]))
-        found = self._tip.take(device_s, opening, advance, drive, normal)
-        return [self._contact(contact) for contact in found]
+        contacts = self._tip.take(device_s, opening, advance, drive, normal)
+        return [self._contact(contact) for contact in contacts]
 
     def picture(self, pose: CameraPose, arrived_s: float) -> FollowedRow | None:
         """Take a picture's pose; None while the rig has sent no time to put it at.
@@ -224,7 +222,6 @@ class PoseFollower:
         if outcome is Outcome.REFUSED and row.estimate is not None:
             away = self._away(contact, row.estimate)
             self.away = away, abs(away) / math.sqrt(nis)
-            row = replace(row, away_m=away)
         return row
 
     def _row(
@@ -248,16 +245,16 @@ class PoseFollower:
         """The plate's normal under the tip, in the rig's frame; the rig's y without a pose."""
         if self._tip is None or not self.tracker.started:
             return np.array([0.0, 1.0, 0.0])
-        found = self.tracker.estimate()
-        local = (self._tip.place(opening, advance) - found.place_m) @ found.rotation
+        estimate = self.tracker.estimate()
+        local = (self._tip.place(opening, advance) - estimate.place_m) @ estimate.rotation
         gradient = self._surface.at(local).gradient
-        return np.asarray(found.rotation @ (gradient / np.linalg.norm(gradient)))
+        return np.asarray(estimate.rotation @ (gradient / np.linalg.norm(gradient)))
 
-    def _away(self, contact: TipContact, found: PoseEstimate) -> float:
+    def _away(self, contact: TipContact, estimate: PoseEstimate) -> float:
         """How far a contact is outside of where the pressed surface is expected, in m."""
-        here = self._surface.at((contact.point_m - found.place_m) @ found.rotation)
+        here = self._surface.at((contact.point_m - estimate.place_m) @ estimate.rotation)
         gap = here.level / float(np.linalg.norm(here.gradient))
-        return gap + found.compliance_m_per_N * contact.force_N - found.contact_offset_m
+        return gap + estimate.compliance_m_per_N * contact.force_N - estimate.contact_offset_m
 
 
 def _rig_clock() -> ClockWatch:

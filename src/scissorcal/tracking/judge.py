@@ -163,13 +163,13 @@ def _counts(follower: PoseFollower, source: str) -> RowCounts:
     def count(*outcomes: Outcome) -> int:
         return sum(follower.outcomes[source, outcome] for outcome in outcomes)
 
-    found = follower.nis[source]
+    nis = follower.nis[source]
     return RowCounts(
         used=count(Outcome.USED, Outcome.RESTARTED),
         refused=count(Outcome.REFUSED),
         late=count(Outcome.TOO_LATE),
         waiting=count(Outcome.WAITING),
-        mean_nis=float(np.mean(found)) if found else math.nan,
+        mean_nis=float(np.mean(nis)) if nis else math.nan,
         freedom=_FREEDOM[source],
     )
 

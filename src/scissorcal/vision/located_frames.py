@@ -36,10 +36,10 @@ class LocatedFrame:
     state: State
     board: MarkedBoard | None
     corners: int
-    found: BoardPose | None
+    pose: BoardPose | None
 
 
-def track(
+def located_frames(
     frames: Iterable[Frame],
     boards: Sequence[MarkedBoard],
     camera: Camera,
@@ -56,20 +56,20 @@ def track(
                 f"The pictures are {width} x {height} pixels, the camera was fitted at "
                 f"{camera.width} x {camera.height}: use the same camera, size, focus and zoom."
             )
-        seen = look(frame.image, boards, f"picture {frame.number}")
-        if seen is None:
+        detection = look(frame.image, boards, f"picture {frame.number}")
+        if detection is None:
             state: State = "blank" if _is_blank(frame) else "no target"
             yield LocatedFrame(_without_image(frame), state, None, 0, None)
             continue
-        boards = tuple(board for board in boards if board == seen.board)
+        boards = tuple(board for board in boards if board == detection.board)
         try:
-            found = locate_board(Corners.of(seen), camera, priors)
+            pose = locate_board(Corners.of(detection), camera, priors)
         except ValueError:
-            count = len(seen.ids)
+            count = len(detection.ids)
             yield LocatedFrame(_without_image(frame), "no pose", boards[0], count, None)
             continue
-        state = "seen" if found.odds >= ODDS else "ambiguous"
-        yield LocatedFrame(_without_image(frame), state, boards[0], len(seen.ids), found)
+        state = "seen" if pose.odds >= ODDS else "ambiguous"
+        yield LocatedFrame(_without_image(frame), state, boards[0], len(detection.ids), pose)
 
 
 def _without_image(frame: Frame) -> Frame:

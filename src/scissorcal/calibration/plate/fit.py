@@ -138,8 +138,8 @@ def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> Halves | N
     """
     across = corners.points[:, 0]
     ways = ((corners.corner // 4) % 2 == 1, across < np.median(across))
-    found = [halves for way in ways if (halves := _half_and_half(corners, camera, priors, way))]
-    return max(found, key=lambda halves: halves.square, default=None)
+    splits = [halves for way in ways if (halves := _half_and_half(corners, camera, priors, way))]
+    return max(splits, key=lambda halves: halves.square, default=None)
 
 
 def _half_and_half(
@@ -167,23 +167,23 @@ def _half_and_half(
 
 
 def _view(
-    photo: PosePhoto, found: BoardPose, whole: BoardPose, here: NDArray[np.bool_]
+    photo: PosePhoto, alone: BoardPose, whole: BoardPose, here: NDArray[np.bool_]
 ) -> PoseView:
-    normal = found.pose.matrix[:, 2]
-    to_target = found.pose.apply([photo.detection.points.mean(axis=0)])[0]
-    away = difference(found.pose, whole.pose)
-    own = whole.residuals_px[here][found.used]
+    normal = alone.pose.matrix[:, 2]
+    to_target = alone.pose.apply([photo.detection.points.mean(axis=0)])[0]
+    away = difference(alone.pose, whole.pose)
+    residuals_px = whole.residuals_px[here][alone.used]
     slant = abs(normal @ to_target) / np.linalg.norm(to_target)
     return PoseView(
         name=photo.name,
         corners=len(photo.detection.ids),
         used=int(np.sum(whole.used[here])),
-        rms_px=float(np.sqrt(np.mean(np.sum(own**2, axis=1)))),
-        rms_alone_px=found.rms_px,
+        rms_px=float(np.sqrt(np.mean(np.sum(residuals_px**2, axis=1)))),
+        rms_alone_px=alone.rms_px,
         side_px=photo.detection.square_px,
         distance_m=float(np.linalg.norm(to_target)),
         tilt_deg=float(np.degrees(np.arccos(np.clip(slant, 0.0, 1.0)))),
-        ambiguity=found.ambiguity,
+        ambiguity=alone.ambiguity,
         away_deg=float(np.degrees(np.linalg.norm(away[:3]))),
         away_mm=float(1e3 * np.linalg.norm(away[3:])),
     )

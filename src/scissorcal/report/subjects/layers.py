@@ -34,7 +34,7 @@ def layers_panel(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> Panel:
 
 def _row(index: int, piece: LayerPiece) -> Row:
     stretches = [
-        f"{one.toughness_ratio:g} (up to {one.end_m * 1e3:.4g} mm)" for one in piece.strips
+        f"{strip.toughness_ratio:g} (up to {strip.end_m * 1e3:.4g} mm)" for strip in piece.strips
     ]
     return Row(
         f"piece {index}",

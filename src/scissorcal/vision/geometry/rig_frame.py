@@ -294,26 +294,26 @@ class PicturePose:
     shared: Array
 
 
-def picture_pose(found: BoardPose, camera: Camera, back: Pose, rig: RigPose | None) -> PicturePose:
+def picture_pose(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | None) -> PicturePose:
     """The plate of a target that was found; ``back`` is T_target_plate.
 
     ``rig`` takes it into the rig's frame, with the errors of the camera that both share. A filter
     over many pictures takes ``noise`` for each and ``shared`` once, as its bias: counted in each
     picture, the shared errors would seem to average out.
     """
-    pose = (rig.holds(found, camera) if rig else found.pose).after(back)
+    pose = (rig.holds(board, camera) if rig else board.pose).after(back)
     exact = replace(rig.camera_rig, covariance=None).inverse() if rig else None
 
     def placed(seen: Pose) -> Pose:
         return (exact.after(seen) if exact else seen).after(back)
 
-    alone = placed(replace(found.pose, covariance=found.noise))
+    alone = placed(replace(board.pose, covariance=board.noise))
     assert pose.covariance is not None
     assert alone.covariance is not None
     shared = pose.covariance - alone.covariance
     return PicturePose(
         pose=pose,
-        other=placed(found.other) if found.other else None,
+        other=placed(board.other) if board.other else None,
         noise=alone.covariance,
         shared=0.5 * (shared + shared.T),
     )

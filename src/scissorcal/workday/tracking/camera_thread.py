@@ -46,14 +46,14 @@ class CameraThread:
 
         Raises what ended the camera.
         """
-        found: list[LocatedFrame] = []
+        located: list[LocatedFrame] = []
         with suppress(queue.Empty):
-            found.append(self._found.get(timeout=wait_s) if wait_s else self._found.get_nowait())
+            located.append(self._found.get(timeout=wait_s) if wait_s else self._found.get_nowait())
             while True:
-                found.append(self._found.get_nowait())
-        if not found and self._error is not None and self.ended:
+                located.append(self._found.get_nowait())
+        if not located and self._error is not None and self.ended:
             raise self._error
-        return found
+        return located
 
     def close(self) -> None:
         """Stop reading; a camera that hangs is left to end with the process."""
@@ -83,8 +83,8 @@ class CameraThread:
                 self._news.notify_all()
 
     def _locate(self, locate: Callable[[Iterable[Frame]], Iterator[LocatedFrame]]) -> None:
-        for found in locate(self._fresh()):
-            self._found.put(found)
+        for located in locate(self._fresh()):
+            self._found.put(located)
 
     def _fresh(self) -> Iterator[Frame]:
         while True:

@@ -43,14 +43,14 @@ def recorded_feed(track: RecordedTrack) -> Feed:
 
 def video_feed(frames: Iterator[object], eye: PoseFinder) -> Feed:
     """The pictures of a video, one after the other."""
-    found = (eye.picture(one) for one in eye.locate(frames))  # type: ignore[arg-type]
-    return Feed(found, time.time_ns())
+    pictures = (eye.picture(located) for located in eye.locate(frames))  # type: ignore[arg-type]
+    return Feed(pictures, time.time_ns())
 
 
 def sim_feed(world: SimWorld, eye: PoseFinder) -> Feed:
     """What the rendered camera of a simulated world sees, without a rig."""
-    found = (eye.picture(one) for one in eye.locate(world.frames()))
-    return Feed(found, time.time_ns())
+    pictures = (eye.picture(located) for located in eye.locate(world.frames()))
+    return Feed(pictures, time.time_ns())
 
 
 def sim_rig_feed(world: SimWorld, motion: "Motion", eye: PoseFinder | None) -> Feed:
@@ -131,8 +131,8 @@ def _sim_rig(world: SimWorld, motion: "Motion", eye: PoseFinder | None) -> Itera
     while True:
         yield motion.step()
         if eye is not None:
-            for found in eye.locate(world.frames(world.link.virtual_time)):
-                yield eye.picture(found)
+            for located in eye.locate(world.frames(world.link.virtual_time)):
+                yield eye.picture(located)
 
 
 def _live(
@@ -144,12 +144,12 @@ def _live(
             yield motion.step()
         if camera is None or eye is None:
             continue
-        found = camera.due(0.0 if motion is not None else BLOCK_S)
-        last = time.monotonic() if found else last
-        for one in found:
-            picture = eye.picture(one)
+        due = camera.due(0.0 if motion is not None else BLOCK_S)
+        last = time.monotonic() if due else last
+        for located in due:
+            picture = eye.picture(located)
             yield replace(picture, arrived_s=picture.arrived_s - begun)
-        if not found and camera.ended and motion is None:
+        if not due and camera.ended and motion is None:
             return  # `due` has raised what ended the camera, if anything did
         if time.monotonic() - last > NO_PICTURE_S:
             raise DeviceError(

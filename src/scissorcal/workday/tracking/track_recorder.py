@@ -80,31 +80,31 @@ class TrackChannels:
         for name in ("quaternion", "translation", "noise", "other_quaternion", "other_translation"):
             row[name] = np.nan
         if picture.seen is not None:
-            seen = picture.seen
-            row["quaternion"], row["translation"] = seen.pose.quaternion, seen.pose.translation_m
-            row["noise"] = seen.noise.ravel()
-            if seen.other is not None:
-                row["other_quaternion"] = seen.other.quaternion
-                row["other_translation"] = seen.other.translation_m
+            pose = picture.seen
+            row["quaternion"], row["translation"] = pose.pose.quaternion, pose.pose.translation_m
+            row["noise"] = pose.noise.ravel()
+            if pose.other is not None:
+                row["other_quaternion"] = pose.other.quaternion
+                row["other_translation"] = pose.other.translation_m
         self._writer.append_telemetry(PICTURE, row, self._times(picture.arrived_s))
 
     def estimate(self, followed: FollowedRow, host_s: float) -> None:
         """Add what the filter knows after a row that came at ``host_s``; nothing without a pose."""
-        found = followed.estimate
-        if found is None:
+        estimate = followed.estimate
+        if estimate is None:
             return
         row = np.zeros(1, dtype=POSE.dtype)
         row["sequence"] = self._rows
         row["source"] = SOURCES.index(followed.source)
         row["outcome"] = OUTCOMES.index(followed.outcome.name.lower().replace("_", " "))
         row["state"] = STATES.index(followed.state)
-        row["time_s"], row["row_time_s"] = found.time_s, followed.time_s
-        pose = Pose.from_matrix(found.rotation, found.place_m)
+        row["time_s"], row["row_time_s"] = estimate.time_s, followed.time_s
+        pose = Pose.from_matrix(estimate.rotation, estimate.place_m)
         row["quaternion"], row["translation"] = pose.quaternion, pose.translation_m
-        row["covariance"], row["rates"] = found.covariance.ravel(), found.rates
-        row["nis"], row["contact_offset"] = followed.nis, found.contact_offset_m
-        row["compliance"] = found.compliance_m_per_N
-        row["compliance_sd"] = found.compliance_sd_m_per_N
+        row["covariance"], row["rates"] = estimate.covariance.ravel(), estimate.rates
+        row["nis"], row["contact_offset"] = followed.nis, estimate.contact_offset_m
+        row["compliance"] = estimate.compliance_m_per_N
+        row["compliance_sd"] = estimate.compliance_sd_m_per_N
         row["contact_point"], row["contact_force"] = np.nan, np.nan
         if followed.contact is not None:
             row["contact_point"] = followed.contact.point_m
@@ -200,7 +200,7 @@ def read_track(path: Path) -> RecordedTrack:
 
 
 def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> TrackPicture:
-    seen = None
+    in_picture = None
     if np.isfinite(row["quaternion"]).all():
         noise = row["noise"].reshape(6, 6)
         pose = Pose(tuple(row["quaternion"].tolist()), tuple(row["translation"].tolist()))
@@ -208,7 +208,7 @@ def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> TrackPict
         if np.isfinite(row["other_quaternion"]).all():
             turned = tuple(row["other_quaternion"].tolist())
             other = Pose(turned, tuple(row["other_translation"].tolist()))
-        seen = PicturePose(
+        in_picture = PicturePose(
             Pose(pose.quaternion, pose.translation_m, noise + shared), other, noise, shared
         )
     number = int(row["sequence"])
@@ -221,6 +221,6 @@ def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> TrackPict
         target=TARGETS[int(row["target"])],
         odds=float(row["odds"]),
         rms_px=float(row["rms_px"]),
-        seen=seen,
+        in_picture=in_picture,
         done=number / max(count, 1),
     )

@@ -191,19 +191,19 @@ class TrackedPose:
         session = self._session
         session.take_samples(samples)
         self._look(now_s)
-        found = session.follower.estimate(now_s - self._begun_s)
-        if found is None:
+        estimate = session.follower.estimate(now_s - self._begun_s)
+        if estimate is None:
             return None
-        old = min(found.picture_age_s, found.contact_age_s)
+        old = min(estimate.picture_age_s, estimate.contact_age_s)
         tracked = not self.failed and session.follower.state != "coasting"
         why = self.failed or f"neither pictures nor contacts came for {old:.1f} s"
         pose = PlatePose(
             time=now_s,
-            rotation=found.rotation,
-            translation=found.place_m,
-            covariance=found.covariance,
-            velocity=found.rates[3:],
-            turn_rate=found.rates[:3],
+            rotation=estimate.rotation,
+            translation=estimate.place_m,
+            covariance=estimate.covariance,
+            velocity=estimate.rates[3:],
+            turn_rate=estimate.rates[:3],
             tracked=tracked,
             why="" if tracked else why,
         )
