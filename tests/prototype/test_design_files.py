@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser, expect
 
 from scissorcal.model.plate_pieces import Layer, Outline
-from scissorcal.prototype.parts import layers_part
+from scissorcal.prototype.page_parts import layers_part
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.plate_layers import plate_pieces
 from scissorcal.workday.runs.prototype import workspace_plate

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scissorcal.package import ModelPackage, PackageSummary, build_package, open_package
 from scissorcal.package.compile import table_file
 from scissorcal.package.variations import Variations, central_values, variations
-from scissorcal.prototype.parts import Numbers, Slider
+from scissorcal.prototype.page_parts import Numbers, Slider
 from scissorcal.prototype.scene import NODES, Scene, scene_of, slider_nodes
 from tests.package.conftest import pad
 from tests.package.fits import cut_fit, friction_fit, recipe

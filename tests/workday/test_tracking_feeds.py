@@ -21,7 +21,7 @@ from scissorcal.workday.tracking.feeds import (
     refuse_strange_pairs,
     refuse_without_sledge,
 )
-from scissorcal.workday.tracking.pictures import TrackPicture
+from scissorcal.workday.tracking.track_pictures import TrackPicture
 from tests.guard import GUARD_S
 
 

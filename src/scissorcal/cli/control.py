@@ -19,7 +19,7 @@ from scissorcal.cli.output import Answer, command, table
 from scissorcal.workday.options import ControlOptions, RigOptions
 
 if TYPE_CHECKING:
-    from scissorcal.control.result import ControlResult
+    from scissorcal.control.control_result import ControlResult
     from scissorcal.workday.runs.at_rig import RigRun
 
 

@@ -17,7 +17,7 @@ from scissorcal.package.layer_pieces import PieceRecord
 from scissorcal.package.manifest import Parameter, PoseRecord
 from scissorcal.package.model_package import ModelPackage
 from scissorcal.package.variations import Variations, central_values, variations
-from scissorcal.prototype.parts import (
+from scissorcal.prototype.page_parts import (
     Band,
     Draws,
     Hand,

@@ -20,9 +20,9 @@ from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from scissorcal.calibration.result import FitResult
+    from scissorcal.control.control_result import ControlResult
     from scissorcal.control.mechanics import RigMechanics
     from scissorcal.control.path_file import SurfacePoints
-    from scissorcal.control.result import ControlResult
     from scissorcal.device.session import Operator, RigSession
     from scissorcal.model.edge import Edge
     from scissorcal.model.friction import FrictionLaw

@@ -18,7 +18,7 @@ from scissorcal.workday.runs.render import package_warnings
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.prototype.parts import Hand, LayersPart
+    from scissorcal.prototype.page_parts import Hand, LayersPart
     from scissorcal.prototype.rig_commands import RigCommand
     from scissorcal.prototype.scene import Scene
     from scissorcal.prototype.server import PrototypeServer
@@ -84,7 +84,7 @@ def workspace_plate(workspace: Workspace) -> "LayersPart | None":
 
     None, too, where a file is gone or wrong: the page then says what it cannot draw.
     """
-    from scissorcal.prototype.parts import layers_part
+    from scissorcal.prototype.page_parts import layers_part
     from scissorcal.recipe.plate_layers import drawn_layers
 
     recipe = workspace.recipe()
@@ -139,7 +139,7 @@ def workspace_hands(workspace: Workspace) -> "tuple[Hand, ...]":
 
 
 def _hand(recording: "Recording") -> "Hand | None":
-    from scissorcal.prototype.parts import Hand, Numbers
+    from scissorcal.prototype.page_parts import Hand, Numbers
 
     samples = recording.samples
     numbers = [stroke.index for stroke in recording.strokes if stroke.sheet <= 0]

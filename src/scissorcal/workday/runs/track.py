@@ -21,9 +21,9 @@ from scissorcal.workday.rigs import SIM, open_session
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.feeds import Feed
-from scissorcal.workday.tracking.pictures import PoseFinder, TrackPicture
 from scissorcal.workday.tracking.session import Tell, TrackedRun, TrackSession, tracked_run
 from scissorcal.workday.tracking.sim_world import SimWorld
+from scissorcal.workday.tracking.track_pictures import PoseFinder, TrackPicture
 from scissorcal.workday.tracking.track_recorder import TrackRecorder, read_track
 from scissorcal.workday.workspace import Workspace
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.workday.tracking.camera_thread import CameraThread
-from scissorcal.workday.tracking.pictures import PoseFinder, TrackPicture
 from scissorcal.workday.tracking.sim_world import SimWorld
+from scissorcal.workday.tracking.track_pictures import PoseFinder, TrackPicture
 from scissorcal.workday.tracking.track_recorder import RecordedTrack
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from scissorcal.tracking.settings import CameraErrors, TrackingSettings, setting
 from scissorcal.tracking.tracker import Outcome, PoseEstimate
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.located_frames import STATES, State
-from scissorcal.workday.tracking.pictures import TrackPicture
+from scissorcal.workday.tracking.track_pictures import TrackPicture
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackChannels
 
 UNKNOWN_FRICTION_N = 1.0

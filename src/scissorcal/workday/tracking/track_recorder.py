@@ -27,7 +27,7 @@ from scissorcal.recording.plate_channels import (
 from scissorcal.tracking.follow import FollowedRow
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import PicturePose
-from scissorcal.workday.tracking.pictures import TARGETS, TrackPicture
+from scissorcal.workday.tracking.track_pictures import TARGETS, TrackPicture
 
 TRACK_MARK = "track"
 
