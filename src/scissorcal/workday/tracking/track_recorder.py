@@ -221,6 +221,6 @@ def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> TrackPict
         target=TARGETS[int(row["target"])],
         odds=float(row["odds"]),
         rms_px=float(row["rms_px"]),
-        in_picture=in_picture,
+        seen=in_picture,
         done=number / max(count, 1),
     )
