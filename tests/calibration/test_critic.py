@@ -202,6 +202,6 @@ def test_what_is_proposed_is_worth_the_torque_that_was_added(template):
     ],
 )
 def test_structure_is_judged_by_its_interval(structure, status):
-    verdict = structure_verdict("fit.friction", Critique((), "It.", structure), 0.02, "N m", 0.07)
+    verdict = structure_verdict(Critique((), "It.", structure), 0.02, "N m", 0.07)
     assert verdict.status == status
     assert verdict.threshold == 0.07

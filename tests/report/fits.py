@@ -63,11 +63,27 @@ def friction_fit(seed: int = 1) -> FitResult:
         _rung("stribeck + angle, symmetric", -51901.9, 0.00118),
     )
     verdicts = (
-        Verdict("fit.friction", "k-hat", "pass", 0.21, 0.7, "Importance weights are well behaved."),
         Verdict(
-            "fit.friction", "whiteness", "pass", 0.19, 0.01, "Residuals look like white noise."
+            "fit.friction",
+            "k-hat",
+            "pass",
+            0.21,
+            0.7,
+            "Importance weights are well behaved.",
+            "at most",
         ),
-        Verdict("fit.friction", "hold-out", "pass", 0.048, 0.07, "New strokes are predicted."),
+        Verdict(
+            "fit.friction",
+            "whiteness",
+            "pass",
+            0.19,
+            0.01,
+            "Residuals look like white noise.",
+            "at least",
+        ),
+        Verdict(
+            "fit.friction", "hold-out", "pass", 0.048, 0.07, "New strokes are predicted.", "at most"
+        ),
         Verdict("fit.friction", "trust check", "not_evaluated", None, None, "Each speed ran once."),
     )
     return _fit("friction", "stribeck, symmetric", parameters, pieces, rungs, verdicts, rng)
@@ -98,7 +114,9 @@ def cut_fit(seed: int = 2) -> FitResult:
         _rung("exponential, rippled", -20429.9, float("nan")),
     )
     verdicts = (
-        Verdict("fit.cut", "k-hat", "pass", 0.44, 0.7, "Importance weights are well behaved."),
+        Verdict(
+            "fit.cut", "k-hat", "pass", 0.44, 0.7, "Importance weights are well behaved.", "at most"
+        ),
         Verdict(
             "fit.cut",
             "whiteness",
@@ -106,8 +124,11 @@ def cut_fit(seed: int = 2) -> FitResult:
             2e-9,
             0.01,
             "Residuals repeat over 0.02 rad: the ripple's phase is not modelled.",
+            "at least",
         ),
-        Verdict("fit.cut", "hold-out", "pass", 0.066, 0.07, "New strokes are predicted."),
+        Verdict(
+            "fit.cut", "hold-out", "pass", 0.066, 0.07, "New strokes are predicted.", "at most"
+        ),
     )
     return _fit("cut", "power, rippled, work closure", parameters, pieces, rungs, verdicts, rng)
 
@@ -129,7 +150,9 @@ def linear_fit(seed: int = 3) -> FitResult:
         _parameter("coulomb_neg", "N", 19.1, 0.5, 0.03, "dry friction, negative rate"),
         _parameter("viscous", "N s/m", 203.5, 2.7, 0.01, "grows with the rate"),
     )
-    verdicts = (Verdict("fit.friction", "k-hat", "pass", 0.1, 0.7, "Weights are well behaved."),)
+    verdicts = (
+        Verdict("fit.friction", "k-hat", "pass", 0.1, 0.7, "Weights are well behaved.", "at most"),
+    )
     fit = _fit("friction", "coulomb + viscous, asymmetric", parameters, pieces, (), verdicts, rng)
     return replace(
         fit,

@@ -275,7 +275,7 @@ def _explained(diagnostics: Mapping[str, Any]) -> Verdict:
     r2 = diagnostics["r_squared"]
     good = f"The model explains {r2:.1%} of the variance of what was measured."
     bad = "The model is no better than a constant: check signs, units and what was recorded."
-    return R_SQUARED.judge(r2, good, bad)
+    return R_SQUARED.verdict("pass" if r2 > 0.0 else "fail", r2, good if r2 > 0.0 else bad)
 
 
 def _unseen(held_out: tuple[StrokeError, ...]) -> Verdict:

@@ -117,8 +117,10 @@ def friction(
     from scissorcal.workday.runs.capture import capture_into
 
     kind: CaptureKind = "friction" if axis == "opening" else "friction-advance"
-    with _at_rig(open_workspace(folder), kind, options, yes) as (workspace, operator):
-        return _answer(workspace, kind, capture_into(workspace, kind, rig, options, operator))
+    workspace = open_workspace(folder)
+    with _at_rig(workspace, kind, options, yes) as operator:
+        captured = capture_into(workspace, kind, rig, options, operator)
+    return _answer(workspace, kind, captured)
 
 
 @command
@@ -145,21 +147,23 @@ def cut(
     """
     from scissorcal.workday.runs.capture import capture_into
 
-    with _at_rig(open_workspace(folder), "cut", options, yes) as (workspace, operator):
-        return _answer(workspace, "cut", capture_into(workspace, "cut", rig, options, operator))
+    workspace = open_workspace(folder)
+    with _at_rig(workspace, "cut", options, yes) as operator:
+        captured = capture_into(workspace, "cut", rig, options, operator)
+    return _answer(workspace, "cut", captured)
 
 
 @contextmanager
 def _at_rig(
     workspace: "Workspace", kind: "CaptureKind", options: CaptureOptions, yes: bool
-) -> "Iterator[tuple[Workspace, Operator]]":
+) -> "Iterator[Operator]":
     """Show a capture to the person at the terminal; say what was kept where it fails."""
     from scissorcal.cli.live_view import LiveView
 
     before = set(workspace.recordings(kind))
     try:
         with LiveView(ask=not yes, listed=not options.until_tolerance) as view:
-            yield workspace, view.operator
+            yield view.operator
     except BaseException as error:
         kept = sorted(set(workspace.recordings(kind)) - before)
         for path in kept:

@@ -73,7 +73,6 @@ PLATE_CAMERA = typer.Option(
     help="A camera by its number that follows the plate while it runs, sim: a rendered plate "
     "(with --device sim), or none.",
 )
-PlateCamera = Annotated[str, PLATE_CAMERA]
 NO_RECORD = typer.Option("--no-record", help="Keep no recording.")
 
 

@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.options import Folder, PlateCamera
+from scissorcal.cli.options import PLATE_CAMERA, Folder, options_of
 from scissorcal.cli.output import Answer, command, note
+from scissorcal.workday.options import PrototypeOptions
 
 ADDRESS_FILE = "prototype-address.html"
 _OPENED_s = 1.0
@@ -20,26 +21,27 @@ _LEADS_TO = (
 )
 
 
+_OPTIONS = {
+    "device": typer.Option(
+        "--device",
+        metavar="PORT|sim|none",
+        help="The rig that the page may start: its serial port, or sim for a virtual one in "
+        "real time. Whatever runs in another terminal is shown without it, too.",
+    ),
+    "camera": PLATE_CAMERA,
+    "package_path": typer.Option(
+        "--package", help="The package to show; the workspace's if not given."
+    ),
+    "port": typer.Option(
+        min=0, max=65535, help="Port of the page on this computer; 0: a free one."
+    ),
+}
+
+
 @command
+@options_of(_OPTIONS)
 def prototype(
-    device: Annotated[
-        str,
-        typer.Option(
-            "--device",
-            metavar="PORT|sim|none",
-            help="The rig that the page may start: its serial port, or sim for a virtual one in "
-            "real time. Whatever runs in another terminal is shown without it, too.",
-        ),
-    ] = "none",
-    camera: PlateCamera = "none",
-    package_path: Annotated[
-        Path | None,
-        typer.Option("--package", help="The package to show; the workspace's if not given."),
-    ] = None,
-    port: Annotated[
-        int,
-        typer.Option(min=0, max=65535, help="Port of the page on this computer; 0: a free one."),
-    ] = 0,
+    options: PrototypeOptions,
     no_open: Annotated[
         bool, typer.Option("--no-open", help="Print the address, and open no browser.")
     ] = False,
@@ -60,9 +62,7 @@ def prototype(
     from scissorcal.workday.runs.prototype import prototype_server, serve
 
     workspace = open_workspace(folder)
-    server = prototype_server(
-        workspace, device=device, camera=camera, package_path=package_path, port=port
-    )
+    server = prototype_server(workspace, options)
 
     opener = workspace.root / ADDRESS_FILE
     opening: list[threading.Thread] = []
@@ -79,7 +79,7 @@ def prototype(
         for thread in opening:
             thread.join(_OPENED_s)
             opener.unlink(missing_ok=True)
-    return Answer({"address": address, "device": device}, "the page is closed")
+    return Answer({"address": address, "device": options.device}, "the page is closed")
 
 
 def _open(url: str, opener: Path) -> None:

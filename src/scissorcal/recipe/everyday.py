@@ -1,8 +1,8 @@
 """The everyday range of each quantity: what rigs, materials and hands of this kind usually have.
 
 The one home of these ranges. A recipe's numbers are held against them
-(:mod:`scissorcal.recipe.unlikely`), and ``scissorcal bench extremes`` calls a state everyday by
-them. All are in SI units and radians; a share is a number between 0 and 1.
+(:mod:`scissorcal.recipe.unlikely`), and ``benchmarks/extremes`` calls a state everyday by them. All
+are in SI units and radians; a share is a number between 0 and 1.
 """
 
 from collections.abc import Mapping

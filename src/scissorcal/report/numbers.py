@@ -12,6 +12,9 @@ Scalar = float | int | str | bool | None
 NOT_AVAILABLE = "not available"
 SMALLEST_PLAIN = 1e-4
 LARGEST_PLAIN = 1e5
+ROUNDING = 16.0 * 2.0**-52
+"""Share of a number that a mean of equal doubles, summed in pairs, may be off by rounding."""
+
 MOST_DECIMALS = 6
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -124,15 +127,15 @@ def with_decimals(value: Number, decimals: int) -> str:
 def decimals_for(sd: Number, value: Number) -> int:
     """Place after the point that two significant digits of ``sd`` reach.
 
-    Without a usable ``sd`` it is the place of the fourth significant digit of ``value``.
+    Without a usable ``sd`` it is the place of the fourth significant digit of ``value``; one that
+    is but the rounding of sums of equal samples is not usable.
 
-    >>> decimals_for(0.0123, 1.0), decimals_for(None, 1.0)
-    (3, 3)
+    >>> decimals_for(0.0123, 1.0), decimals_for(None, 1.0), decimals_for(1e-17, 1.0)
+    (3, 3, 3)
     """
-    spread = finite(sd)
-    if spread:
+    spread, number = finite(sd), finite(value)
+    if spread and spread > ROUNDING * abs(number or 0.0):
         return 1 - _exponent(_round(spread, 2))
-    number = finite(value)
     return 3 - _exponent(number) if number else 3
 
 

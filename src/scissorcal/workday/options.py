@@ -151,3 +151,17 @@ class VerifySettings:
     prior: Literal["local", "recipe"] = "local"
     spread: float = 3.0
     seed: int = 0
+
+
+@dataclass(frozen=True)
+class PrototypeOptions:
+    """What the page of a package shows, and which rig it may start commands on.
+
+    With a ``camera`` it may start a track, too. ``package_path`` is the workspace's own if None,
+    ``port`` that of the page on this computer, 0 a free one.
+    """
+
+    device: str = NONE
+    camera: str = NONE
+    package_path: Path | None = None
+    port: int = 0

@@ -19,7 +19,6 @@ SOURCES: Mapping[str, str] = {
     "command.schema.json": "scissorcal.workday.envelope:Envelope",
     "capture-design.schema.json": "scissorcal.workday.runs.design:CaptureDesign",
     "comparison.schema.json": "scissorcal.report.twin:comparison_schema_text",
-    "extremes.schema.json": "scissorcal.bench.extremes.result:Extremes",
     "manifest.schema.json": "scissorcal.package:manifest_schema_text",
     "photographs.schema.json": "scissorcal.workday.photographs:PhotoIndex",
     "probe.schema.json": "scissorcal.recording.probe:ProbeResult",

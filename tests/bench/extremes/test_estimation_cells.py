@@ -1,10 +1,9 @@
 """The longest cells of estimation: none is wrong; and a cell can find something wrong."""
 
 import pytest
-
-from scissorcal.bench.extremes import cut_cells, vision_cells
-from scissorcal.bench.extremes.cells import try_cell
-from scissorcal.bench.extremes.inference_cells import cells as inference
+from benchmarks.extremes import cut_cells, vision_cells
+from benchmarks.extremes.cells import try_cell
+from benchmarks.extremes.inference_cells import cells as inference
 
 FITTED = [cell for module in (cut_cells, vision_cells) for cell in module.cells() if cell.slow]
 """The longest cells of these two rooms; test_page tries all cells that are not slow."""
@@ -20,7 +19,7 @@ def test_no_fitted_cell_is_wrong(cell) -> None:
 
 def test_a_silent_error_is_found(monkeypatch) -> None:
     """Draws shifted by a standard deviation are wrong, whatever their status says."""
-    from scissorcal.bench.extremes import inference_cells
+    from benchmarks.extremes import inference_cells
 
     honest = inference_cells.infer
 

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from scissorcal.bench.extremes.made_friction import (
+from benchmarks.extremes.made_friction import (
     HIGH,
     LOW,
     RAMP,

@@ -21,6 +21,7 @@ from scissorcal.calibration.camera.uncertainty import (
     halves,
     pixel_map,
 )
+from scissorcal.calibration.plate.checks import CAMERA
 from scissorcal.errors import MissingError, VerdictError
 from scissorcal.vision.geometry.camera import Camera, usual_camera
 from scissorcal.vision.sim import Lens, SimPose
@@ -191,8 +192,8 @@ def test_a_picture_that_is_covered_in_part_is_judged_where_a_thing_stands() -> N
     assert places is not None
     middle = np.array([[600.0, 300.0], [700.0, 400.0]])
     corner = np.array([[20.0, 20.0], [60.0, 90.0]])
-    assert CameraThere.of(places, middle, 1000.0).verdict("fit.plate").status == "pass"
-    refused = CameraThere.of(places, corner, 1000.0).verdict("fit.plate")
+    assert CameraThere.of(places, middle, 1000.0).verdict(CAMERA).status == "pass"
+    refused = CameraThere.of(places, corner, 1000.0).verdict(CAMERA)
     assert refused.status == "fail"
     assert "scissorcal fit camera" in refused.why
 

@@ -77,7 +77,7 @@ def test_one_end_leaves_the_drift_open(ends: tuple[bool, bool]) -> None:
     assert zero is not None
     assert np.isnan(zero.drift)
     assert zero.sd == pytest.approx(4e-3 / np.sqrt(12), rel=0.05)
-    verdict = zero_verdicts("fit.friction", zero, (recording(),), 0.02)[1]
+    verdict = zero_verdicts(zero, (recording(),), 0.02)[1]
     assert verdict.check == "zero drift"
     assert verdict.status == "fail"
     assert "warm up" in verdict.why
@@ -89,7 +89,7 @@ def test_without_idle_time_the_zero_has_the_priors_width() -> None:
     assert np.array_equal(cleaned.samples, raw.samples)
     assert zero is not None
     assert zero.sd == UNMEASURED
-    (verdict,) = zero_verdicts("fit.friction", zero, (raw,), 0.02)
+    (verdict,) = zero_verdicts(zero, (raw,), 0.02)
     assert verdict.status == "not_evaluated"
     assert "one second at idle" in verdict.why
 
@@ -135,7 +135,7 @@ def test_imports_without_commands_stay_as_they_are() -> None:
     cleaned, zero = without_zeros((raw,), UNMEASURED)
     assert zero is None
     assert cleaned == (raw,)
-    assert zero_verdicts("fit.friction", zero, (raw,), 0.02)[0].status == "not_evaluated"
+    assert zero_verdicts(zero, (raw,), 0.02)[0].status == "not_evaluated"
 
 
 def test_a_hand_that_holds_the_handles_at_rest_is_no_zero() -> None:
@@ -153,7 +153,7 @@ def test_a_hand_that_holds_the_handles_at_rest_is_no_zero() -> None:
 def test_a_zero_beyond_the_drive_fails_and_names_its_sensor() -> None:
     raw = recording(force=(2.0, 2.0))
     zero = without_zeros((raw,), UNMEASURED)[1]
-    large, drift = zero_verdicts("fit.friction", zero, (raw,), 0.02)
+    large, drift = zero_verdicts(zero, (raw,), 0.02)
     assert large.status == "fail"
     assert "unload the force sensor" in large.why
     assert drift.status == "pass"

@@ -5,16 +5,27 @@ stands upright before it comes to lie over the contact) there is none here eithe
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from scissorcal.bench.extremes.exact_laws import Curve, Force, Number, mp, root, scouted
+from scissorcal.bench.extremes.exact_laws import (
+    Curve,
+    Force,
+    Number,
+    TableForce,
+    mp,
+    root,
+    scouted,
+)
 
 PARTS = 8
 """Places in each piece of a bent edge at which its release is looked at."""
 DOUBLINGS = range(-3, 30)
 """Places are looked for within 2^29 blade lengths."""
+CLOSE = 1e-9
+"""Share of its station to which the place is known at which an edge comes to stand upright."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +60,7 @@ class Blade:
 
 @dataclass(frozen=True)
 class Spot:
-    """A place of the edge in the material; ``stored`` is that of all moving blades."""
+    """A place of the edge in the material, and the force of one blade there."""
 
     station: Number
     x: Number
@@ -59,7 +70,6 @@ class Spot:
     taper: Number
     depth: Number
     force: Number
-    stored: Number
 
     @property
     def slope(self) -> Number:
@@ -90,9 +100,7 @@ class Turned:
         offset, taper = self.law.edge.at(station)
         y = station * self.sine + offset * self.cosine
         depth = self.law.upper_face - y
-        force = stored = 0 * y
-        if depth > 0:
-            force, stored = self.law.response.at(depth)
+        force = self.law.response.at(depth) if depth > 0 else 0 * y
         return Spot(
             station,
             station * self.cosine - offset * self.sine,
@@ -102,7 +110,6 @@ class Turned:
             taper,
             depth,
             force,
-            stored * self.law.moving,
         )
 
     def over(self, contact: Number) -> tuple[Spot | None, float]:
@@ -113,40 +120,23 @@ class Turned:
         scout, goal = self.scout, float(contact)
         outwards = self.x_at(mp.mpf(0)) < contact
         least = scout.run_at(0.0)
-        for low, high in scout.pieces(0.0, outwards):
+        ahead = deque(scout.pieces(0.0, outwards) if least > 0.0 else ())
+        while ahead:
+            low, high = ahead.popleft()
+            middle, wide = (low + high) / 2, CLOSE * (abs(low) + abs(high))
+            run = scout.least_run(*sorted((low, high)))
+            if run <= 0.0 and abs(high - low) < wide + CLOSE * scout.law.tip:
+                break
+            if run <= 0.0:
+                ahead.extendleft([(middle, high), (low, middle)])
+                continue
             x = scout.x_at(high)
-            least = min(least, scout.least_run(*sorted((low, high))))
-            past = x >= goal if outwards else x <= goal
-            if past and scout.least_run(*sorted((low, high))) > 0.0:
-                wide = 1e-9 * (abs(low) + abs(high))
-                ends = sorted((mp.mpf(low), mp.mpf(high)))
-                place = root(
-                    lambda s: self.x_at(s) - contact, ends[0] - wide, ends[1] + wide
-                )  # a bracket of floats, made a little wider
+            if x >= goal if outwards else x <= goal:
+                ends = sorted((mp.mpf(low), mp.mpf(high)))  # of floats, so a little wider
+                place = root(lambda s: self.x_at(s) - contact, ends[0] - wide, ends[1] + wide)
                 within = scout.least_run(*sorted((low, float(place))))
-                return self.spot(place), min(within, scout.run_at(0.0))
-            if least <= 0.0:
-                return self._before_upright(contact, low, high, outwards)
-        return None, -1.0
-
-    def _before_upright(
-        self, contact: Number, low: float, high: float, outwards: bool, closer: int = 4
-    ) -> tuple[Spot | None, float]:
-        """As `over`, within the piece in which the edge comes to stand upright.
-
-        The part in which it does is looked at ``closer`` and closer.
-        """
-        step = (high - low) / 256
-        for k in range(256):
-            near, far = low + k * step, low + (k + 1) * step
-            if self.scout.least_run(*sorted((near, far))) <= 0.0:
-                if not closer:
-                    return None, -1.0
-                return self._before_upright(contact, near, far, outwards, closer - 1)
-            x = self.scout.x_at(far)
-            if x >= float(contact) if outwards else x <= float(contact):
-                place = root(lambda s: self.x_at(s) - contact, mp.mpf(near), mp.mpf(far))
-                return self.spot(place), self.scout.least_run(*sorted((low, float(place))))
+                return self.spot(place), min(least, within)
+            least = min(least, run)
         return None, -1.0
 
     def least_run_of_blade(self) -> float:
@@ -161,41 +151,51 @@ class Turned:
             return 0 * spot.force
         return self.law.moving * spot.force * spot.slope
 
-    def rests(
-        self, start: Spot, target: "Callable[[Turned, Spot], Number]"
-    ) -> tuple[Spot, bool, bool]:
+    def excess(self, station: Number, share: Number | None) -> Number:
+        """By how much the release at a station is above the target."""
+        spot = self.spot(station)
+        return self.released(spot) - self.target(spot, share)
+
+    def target(self, spot: Spot, share: Number | None) -> Number:
+        """A share of J_c h; None is that of the mean force of a ripple over its peak."""
+        law = self.law
+        if share is not None or law.kappa == 1 or spot.slope <= law.parallel:
+            return law.toughness * (1 if share is None else share)
+        assert not isinstance(law.response, TableForce)
+        peak = law.toughness / (law.moving * spot.slope)
+        top, bottom = law.response.inverse(peak), law.response.inverse(law.kappa * peak)
+        if not top > bottom:
+            return law.toughness
+        work = law.response.energy(top) - law.response.energy(bottom)
+        return law.toughness * work / (top - bottom) / peak
+
+    def rests(self, start: Spot, share: Number | None) -> tuple[Spot, bool, bool]:
         """The first place outwards whose release is at most the target.
 
         Also whether it lies before the tip (else the tip's place is given), and whether the release
-        rises again anywhere farther out. ``target`` is a function of a turned blade and a place.
+        rises again anywhere farther out.
         """
         scout = self.scout
-        place = float(start.station)
-        before = scout.spot(place)
-        level = scout.released(before) - target(scout, before)
-        found: tuple[float, float] | None = None
+        before = place = float(start.station)
+        level = scout.excess(place, share)
+        bracket: tuple[float, float] | None = None
         rises = False
         for low, high in scout.pieces(place, True):
             for part in self._parts(low, min(high, scout.law.tip)):
-                spot = scout.spot(part)
-                now = scout.released(spot) - target(scout, spot)
+                now = scout.excess(part, share)
                 rises = rises or now > level + 1e-3 * abs(level)
-                if found is None and now <= 0.0:
-                    found = before.station, part
-                before, level = spot, now
+                if bracket is None and now <= 0.0:
+                    bracket = before, part
+                before, level = part, now
             if high >= scout.law.tip:
                 break
-        if found is None:
+        if bracket is None:
             return self.spot(self.law.tip), False, rises
 
-        def excess(s: Number) -> Number:
-            spot = self.spot(s)
-            return self.released(spot) - target(self, spot)
-
-        low = max(mp.mpf(found[0]), start.station)
-        if excess(low) <= 0:
-            return self.spot(low), True, rises
-        return self.spot(root(excess, low, mp.mpf(found[1]))), True, rises
+        low = max(mp.mpf(bracket[0]), start.station)
+        if self.excess(low, share) > 0:
+            low = root(lambda s: self.excess(s, share), low, mp.mpf(bracket[1]))
+        return self.spot(low), True, rises
 
     def torque(self, spot: Spot, rate: Number) -> Number:
         """Torque of the response at a place, rate damping included."""
@@ -203,10 +203,6 @@ class Turned:
         if self.law.closure == "eq4":
             return force * spot.x / mp.sqrt(1 + spot.taper**2)
         return force * spot.lever
-
-    def push(self, spot: Spot, rate: Number) -> Number:
-        """Force on the pivot along the cut."""
-        return -self.law.moving * self._damped(spot, rate) * spot.slope
 
     def x_at(self, s: Number) -> Number:
         """x of a station."""
@@ -243,26 +239,3 @@ class Turned:
     def _parts(self, low: Number, high: Number) -> list[Number]:
         parts = PARTS if self.law.edge.breaks else 2
         return [low + (high - low) * k / parts for k in range(1, parts + 1)]
-
-
-def mean_target(turned: Turned, spot: Spot) -> Number:
-    """J_c h times the mean force of a ripple over its peak."""
-    law = turned.law
-    if law.kappa == 1 or spot.slope <= law.parallel:
-        return law.toughness
-    peak = law.toughness / (law.moving * spot.slope)
-    top, bottom = law.response.inverse(peak), law.response.inverse(law.kappa * peak)
-    if not top > bottom:
-        return law.toughness
-    work = law.response.at(top)[1] - law.response.at(bottom)[1]
-    return law.toughness * work / (top - bottom) / peak
-
-
-def peak_target(turned: Turned, spot: Spot) -> Number:
-    """J_c h."""
-    return turned.law.toughness + 0 * spot.force
-
-
-def kept_target(turned: Turned, spot: Spot) -> Number:
-    """kappa J_c h."""
-    return turned.law.kappa * turned.law.toughness + 0 * spot.force

@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from scissorcal.errors import needs_extra
 
@@ -23,82 +23,55 @@ mp.dps = 50
 Number = Any
 """A number of :data:`mp`, or a float."""
 
-HOLDS = TypeVar("HOLDS")
+Law = TypeVar("Law")
 CLOSE = mp.mpf(10) ** -44
 """Share of its place to which a root is found."""
 
 
-class OverflowedError(Exception):
-    """A force beyond what a float can hold."""
+class NotComparedError(Exception):
+    """There is nothing to compare with; the sentence says why."""
 
 
-class Curve(Protocol):
-    """An edge e(s): a polynomial of at most third degree between ``breaks``."""
-
-    @property
-    def breaks(self) -> tuple[Number, ...]:
-        """Stations between which the edge is one polynomial."""
-        ...
-
-    def at(self, s: Number) -> tuple[Number, Number]:
-        """Offset and slope at a station."""
-        ...
-
-
-class Force(Protocol):
-    """A response."""
-
-    def at(self, delta: Number) -> tuple[Number, Number]:
-        """Force (N) and stored energy (J) of one blade at an indentation > 0."""
-        ...
-
-    def inverse(self, force: Number) -> Number:
-        """Indentation at which a force > 0 is reached."""
-        ...
+TOO_LARGE = "above 1e30 N"
 
 
 @dataclass(frozen=True)
-class Bow:
-    """offset + s tan(taper) + curvature s^2 / 2."""
+class FormulaEdge:
+    """offset + s tangent + curvature s^2 / 2 + bend s^3 / 6, and a cubic B-spline.
 
-    offset: Number
-    tangent: Number
-    curvature: Number
-    breaks: tuple[Number, ...] = ()
-
-    def at(self, s: Number) -> tuple[Number, Number]:
-        """Offset and slope at a station."""
-        bent = self.curvature * s
-        return self.offset + s * (self.tangent + bent / 2), self.tangent + bent
-
-
-@dataclass(frozen=True)
-class Nicked:
-    """A bow, and one cubic B-spline of the height ``weight``, of which it reaches 2/3.
-
-    The B-spline is a sum of truncated powers over five knots ``step`` apart from ``first`` on.
+    ``polynomial`` holds offset, tangent, curvature and bend. The spline has its first knot at
+    ``start``, pieces of the length ``step``, and goes on straight beyond both ends.
     """
 
-    bow: Bow
-    weight: Number
-    first: Number
-    step: Number
+    polynomial: tuple[Number, Number, Number, Number]
+    weights: tuple[Number, ...] = ()
+    start: Number = 0
+    step: Number = 1
 
     @property
     def breaks(self) -> tuple[Number, ...]:
-        """Knots of the B-spline."""
-        return tuple(self.first + k * self.step for k in range(5))
+        """Stations between which the edge is a polynomial of at most third degree."""
+        return tuple(
+            self.start + k * self.step
+            for k in range(len(self.weights) - 2)
+            if any(self.weights[max(k - 1, 0) : k + 4])
+        )
 
     def at(self, s: Number) -> tuple[Number, Number]:
         """Offset and slope at a station."""
-        offset, slope = self.bow.at(s)
-        u = (s - self.first) / self.step
-        if 0 < u < 4:
-            for factor, k in ((1, 0), (-4, 1), (6, 2), (-4, 3)):
-                over = u - k
-                if over > 0:
-                    offset += self.weight * factor * over**3 / 6
-                    slope += self.weight * factor * over**2 / 2 / self.step
+        first, tangent, curvature, bend = self.polynomial
+        offset = first + s * (tangent + s * (curvature / 2 + s * bend / 6))
+        slope = tangent + s * (curvature + s * bend / 2)
+        if self.weights:
+            pieces = len(self.weights) - 3
+            u = (s - self.start) / self.step
+            within = min(max(u, 0 * u), pieces)
+            k = min(int(within), pieces - 1)
+            t, (a, b, c, d) = within - k, self.weights[k : k + 4]
+            tilt = d * t**2 + c * (1 + 2 * t - 3 * t**2) - b * (4 * t - 3 * t**2) - a * (1 - t) ** 2
+            offset += (a * (1 - t) ** 3 + b * (3 * t**3 - 6 * t**2 + 4) + d * t**3) / 6
+            offset += c * (1 + 3 * t + 3 * t**2 - 3 * t**3) / 6 + tilt / 2 * (u - within)
+            slope += tilt / 2 / self.step
         return offset, slope
 
 
@@ -142,12 +115,9 @@ class TableCurve:
         t = (at - self.x[i]) / w
         return y + t * (p + t * (c + t * d)), (p + t * (2 * c + t * 3 * d)) / w
 
-    def magnitude(self, at: Number) -> Number:
-        """Sum of the magnitudes of what adds up to the value: its rounding is a share of it."""
-        i, w, (y, p, _, d) = self.piece(at)
-        t = (at - self.x[i]) / w
-        rise = abs(self.y[min(i + 1, len(self.y) - 1)] - y) if d else 0 * t
-        return abs(y) + abs(t) * (abs(p) + abs(t) * (rise + 3 * abs(p) + 2 * abs(d)))
+    def held(self, at: Number) -> Number:
+        """Value, beyond the ends that of the end."""
+        return self.at(min(max(at, self.x[0]), self.x[-1]))[0]
 
 
 @dataclass(frozen=True)
@@ -158,13 +128,16 @@ class Power:
     exponent: Number
     reference: Number
 
-    def at(self, delta: Number) -> tuple[Number, Number]:
-        """Force and its integral."""
+    def at(self, delta: Number) -> Number:
+        """Force at an indentation > 0."""
         try:
-            force = self.force * (delta / self.reference) ** self.exponent
+            return self.force * (delta / self.reference) ** self.exponent
         except OverflowError:
-            raise OverflowedError from None
-        return force, force * delta / (self.exponent + 1)
+            raise NotComparedError(TOO_LARGE) from None
+
+    def energy(self, delta: Number) -> Number:
+        """Integral of the force up to an indentation."""
+        return self.at(delta) * delta / (self.exponent + 1)
 
     def inverse(self, force: Number) -> Number:
         """Indentation at which a force is reached."""
@@ -179,20 +152,24 @@ class Exponential:
     exponent: Number
     reference: Number
 
-    def at(self, delta: Number) -> tuple[Number, Number]:
-        """Force and its integral."""
+    def at(self, delta: Number) -> Number:
+        """Force at an indentation > 0."""
         a = self.exponent * delta / self.reference
         if a > 700:
-            raise OverflowedError
-        own = math if isinstance(a, float) else mp
-        scale = self.force / own.expm1(self.exponent)
-        grown = own.expm1(a)
-        return scale * grown, scale * (grown - a) * self.reference / self.exponent
+            raise NotComparedError(TOO_LARGE)
+        numbers = math if isinstance(a, float) else mp
+        return self.force * numbers.expm1(a) / numbers.expm1(self.exponent)
+
+    def energy(self, delta: Number) -> Number:
+        """Integral of the force up to an indentation."""
+        numbers = math if isinstance(delta, float) else mp
+        line = self.force * (self.exponent * delta / self.reference) / numbers.expm1(self.exponent)
+        return (self.at(delta) - line) * self.reference / self.exponent
 
     def inverse(self, force: Number) -> Number:
         """Indentation at which a force is reached."""
-        own = math if isinstance(force, float) else mp
-        grown = own.log1p(force / self.force * own.expm1(self.exponent))
+        numbers = math if isinstance(force, float) else mp
+        grown = numbers.log1p(force / self.force * numbers.expm1(self.exponent))
         return self.reference * grown / self.exponent
 
 
@@ -201,40 +178,18 @@ class TableForce:
     """A response's table, with a cap on the force (N) beyond which it is constant."""
 
     table: TableCurve
-    areas: tuple[Number, ...]
     cap: Number
 
-    @classmethod
-    def of(cls, table: Any, cap: float) -> "TableForce":
-        """The table of a kernel, exactly."""
-        curve = TableCurve.of(table)
-        areas = [mp.mpf(0)]
-        for i, (low, high) in enumerate(itertools.pairwise(curve.x)):
-            mean = (curve.y[i] + curve.y[i + 1]) / 2
-            mean += (high - low) * (curve.slope[i] - curve.slope[i + 1]) / 12
-            areas.append(areas[-1] + (high - low) * mean)
-        return cls(curve, tuple(areas), mp.mpf(cap))
-
-    def at(self, delta: Number) -> tuple[Number, Number]:
-        """Force and its integral."""
-        i, w, (y, p, c, d) = self.table.piece(delta)
-        t = (delta - self.table.x[i]) / w
-        force = y + t * (p + t * (c + t * d))
-        area = self.areas[i] + w * t * (y + t * (p / 2 + t * (c / 3 + t * d / 4)))
-        if force > self.cap and i == len(self.areas) - 1 and p > 0:
-            area -= (force - self.cap) ** 2 / p / 2
-        return max(min(force, self.cap), 0 * force), area
-
-    def inverse(self, force: Number) -> Number:
-        """Indentation at which a force is reached, by bisection between knots."""
-        curve = self.table
-        if force >= curve.y[-1]:
-            return curve.x[-1] + (force - curve.y[-1]) / curve.slope[-1]
-        i = bisect.bisect_right(curve.y, force) - 1
-        return root(lambda x: curve.at(x)[0] - force, curve.x[i], curve.x[i + 1])
+    def at(self, delta: Number) -> Number:
+        """Force at an indentation > 0."""
+        return max(min(self.table.at(delta)[0], self.cap), 0 * delta)
 
 
-def scouted(law: HOLDS) -> HOLDS:
+Curve = FormulaEdge | TableCurve
+Force = Power | Exponential | TableForce
+
+
+def scouted(law: Law) -> Law:
     """The same law of floats."""
     changes = {f.name: _floats(getattr(law, f.name)) for f in fields(law)}  # type: ignore[arg-type]
     return replace(law, **changes)  # type: ignore[type-var]
@@ -242,7 +197,7 @@ def scouted(law: HOLDS) -> HOLDS:
 
 def _floats(value: Any) -> Any:
     if isinstance(value, tuple):
-        return tuple(_floats(one) for one in value)
+        return tuple(_floats(entry) for entry in value)
     if is_dataclass(value):
         return scouted(value)
     return float(value) if isinstance(value, mp.mpf) else value

@@ -1,253 +1,166 @@
-"""States that are tried: values for every quantity of the physics, and the laws they make."""
+"""States that are tried of a package: places from its scene to the absurd, and its law there."""
 
+import itertools
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scissorcal.bench.extremes import exact_laws as exact
+from scissorcal.aliases import Array
 from scissorcal.bench.extremes.exact_blade import Blade
-from scissorcal.bench.extremes.exact_laws import mp
-from scissorcal.bench.extremes.quantities import QUANTITIES
-from scissorcal.kernel import ModelTables, Table
-from scissorcal.model import Cutting, Edge, Response
-from scissorcal.package.tables import fit_table
+from scissorcal.bench.extremes.exact_laws import (
+    Exponential,
+    FormulaEdge,
+    NotComparedError,
+    Power,
+    TableCurve,
+    TableForce,
+    mp,
+)
+from scissorcal.kernel import ModelTables
+from scissorcal.model import Cutting
+from scissorcal.package.manifest import Ranges
+from scissorcal.package.model_package import ModelPackage
 
-REFERENCE_m = 3e-4
-"""Indentation at which the quantity ``force`` holds: that of the recipes for paper."""
-
-SWEPT = (
-    "opening", "opening_rate", "contact", "indentation", "thickness", "force", "exponent",
-    "toughness", "kappa", "edge_offset", "taper", "curvature", "nick", "rate_damping",
-    "blade_length", "table_size",
-)  # fmt: skip
-"""Quantities of the physics, each of which is swept."""
-
-NICK_PIECES = 60
-"""Intervals of the spline whose one weight is a nick: a nick is 4 of them wide."""
-
-TABLE_TOLERANCE = 1e-4
-STRONGEST_N = 1e5
-"""As in `package.compile`: no response is tabulated beyond."""
-
-Plan = Literal["one", "pair", "random", "everyday"]
+QUANTITIES = ("opening", "opening_rate", "contact", "indentation")
+"""Quantities of a place (rad, rad/s, m, m); an indentation says where the contact is."""
+PAIRS = (("opening", "contact"), ("opening", "indentation"), ("opening_rate", "indentation"))
+"""Pairs of quantities, each drawn as a map of errors."""
+BEYOND_TIP = 1.5
+"""Blade lengths up to which contacts are tried."""
+KERNEL_CAP_N = 1e6
+"""The kernel's cap on the response."""
+LARGEST_OPENING_rad = 3.1415925
+"""The largest float32 number below pi."""
 
 
 @dataclass(frozen=True)
 class State:
-    """One state: a value for each quantity of :data:`SWEPT`, and the discrete choices.
+    """One place of the blades, all three float32 numbers, and the law of the cut there.
 
-    ``plan`` says how it was chosen and ``swept`` which quantities were moved on purpose. Where
-    ``by_depth`` is true the contact is where the indentation has its value, else it is ``contact``.
+    ``band`` says whether the state is an ordinary one or an extreme one, ``swept`` which quantities
+    were moved on purpose, ``values`` those of all that are named.
     """
 
-    plan: Plan
+    band: str
     swept: tuple[str, ...]
     values: Mapping[str, float]
-    moving: int
-    closure: Literal["work", "eq4"]
-    family: Literal["power", "exponential"]
-    cut: bool
-    by_depth: bool
+    opening: float
+    rate: float
+    contact: float
+    cutting: Cutting = field(repr=False)
 
-    @property
-    def contact_m(self) -> float:
-        """Place of the crack tip from the pivot, a float32 number."""
-        v = self.values
-        if not self.by_depth:
-            return float(np.float32(v["contact"] * v["blade_length"]))
-        beta = self.opening / self.moving
-        edge = self.edge
-        s = 0.5 * v["blade_length"]
-        for _ in range(60):
-            rise = np.sin(beta) + float(edge.slope_at(s)) * np.cos(beta)
-            height = s * np.sin(beta) + float(edge.offset_at(s)) * np.cos(beta)
-            step = (self.upper_face_m - v["indentation"] - height) / rise if rise else 0.0
-            s = float(np.clip(s + step, -10 * v["blade_length"], 10 * v["blade_length"]))
-        return float(np.float32(s * np.cos(beta) - float(edge.offset_at(s)) * np.sin(beta)))
 
-    @property
-    def opening(self) -> float:
-        """Opening (rad), a float32 number not above pi."""
-        return float(min(np.float32(self.values["opening"]), np.float32(3.1415925)))
+def package_states(package: ModelPackage, size: float, seed: int) -> list[State]:
+    """States of a package: in its scene, one quantity at a time, in pairs, and at random in all.
 
-    @property
-    def rate(self) -> float:
-        """Opening rate (rad/s), a float32 number."""
-        return float(np.float32(self.values["opening_rate"]))
-
-    @property
-    def upper_face_m(self) -> float:
-        """y_top, a float32 number: h for one moving blade, h / 2 for two."""
-        return float(np.float32(self.values["thickness"] / self.moving))
-
-    @property
-    def fracture_energy(self) -> float:
-        """J_c h, a float32 number; 0 where nothing is cut."""
-        if not self.cut:
-            return 0.0
-        return float(np.float32(self.values["toughness"] * self.values["thickness"]))
-
-    @property
-    def kappa(self) -> float:
-        """Share of the fracture energy at which a crack stops, a float32 number."""
-        return float(np.float32(self.values["kappa"]))
-
-    @property
-    def damping(self) -> float:
-        """Rate damping (s/m), a float32 number."""
-        return float(np.float32(self.values["rate_damping"]))
-
-    @property
-    def edge(self) -> Edge:
-        """The edge as the model takes it; a nick makes it a spline of one weight."""
-        v = self.values
-        fields: dict[str, Any] = {
-            "offset_m": v["edge_offset"],
-            "taper_rad": v["taper"],
-            "length_m": v["blade_length"],
-            "curvature_per_m": v["curvature"],
-        }
-        if not v["nick"]:
-            return Edge("arc" if v["curvature"] else "line", **fields)
-        weights = [0.0] * (NICK_PIECES + 3)
-        weights[NICK_PIECES // 2] = 1.5 * v["nick"]
-        return Edge("spline", **fields, spline_m=tuple(weights))
-
-    @property
-    def cutting(self) -> Cutting:
-        """The law as the float64 model takes it."""
-        return Cutting(
-            self.edge,
-            Response(self.family, self.values["force"], self.values["exponent"], REFERENCE_m),
-            self.moving,
-            self.upper_face_m,
-            self.fracture_energy if self.cut else None,
-            self.kappa,
-            self.closure,
-            self.damping,
+    ``size`` multiplies their number. The same package, size and seed give the same states.
+    """
+    rng = np.random.default_rng([seed, 0])
+    ranges, cutting = package.manifest.ranges, package.exact.cutting
+    side = math.sqrt(size)
+    many, repeats = max(3, round(17 * side)), max(1, round(3 * side))
+    grid, random = max(3, round(13 * side)), max(1, round(200 * size))
+    moved: list[dict[str, float]] = [{}] * random
+    for name in QUANTITIES:
+        moved += [{name: value} for value in extreme(name, cutting, many).tolist()] * repeats
+    for pair in PAIRS:
+        axes = [extreme(name, cutting, grid).tolist() for name in pair]
+        moved += [dict(zip(pair, place, strict=True)) for place in itertools.product(*axes)]
+    states = [
+        _state(
+            "beyond" if values else "scene",
+            tuple(values),
+            _drawn(ranges, cutting, rng) | values,
+            cutting,
         )
-
-    def exact_law(self, parallel: float) -> Blade:
-        """The law in 50 digits."""
-        v = {name: mp.mpf(value) for name, value in self.values.items()}
-        bow = exact.Bow(v["edge_offset"], mp.tan(v["taper"]), v["curvature"])
-        edge: exact.Curve = bow
-        if v["nick"]:
-            width = v["blade_length"] / NICK_PIECES
-            first = width * (NICK_PIECES // 2 - 3)
-            edge = exact.Nicked(bow, mp.mpf(1.5 * self.values["nick"]), first, width)
-        kind = exact.Power if self.family == "power" else exact.Exponential
-        response = kind(v["force"], v["exponent"], mp.mpf(REFERENCE_m))
-        return self._blade(edge, response, parallel, v["blade_length"])
-
-    def exact_tables(self, tables: ModelTables, cap: float, parallel: float) -> Blade:
-        """The kernel's own tables in 50 digits."""
-        edge = exact.TableCurve.of(tables.edge)
-        response = exact.TableForce.of(tables.response, cap)
-        tip = mp.mpf(float(np.float32(tables.tip_station)))
-        return self._blade(edge, response, parallel, tip)
-
-    def _blade(self, edge: exact.Curve, response: exact.Force, parallel: float, tip: Any) -> Blade:
-        return Blade(
-            edge,
-            response,
-            self.moving,
-            mp.mpf(self.upper_face_m),
-            mp.mpf(self.fracture_energy),
-            mp.mpf(self.kappa),
-            self.closure,
-            mp.mpf(self.damping),
-            tip,
-            mp.mpf(parallel),
-        )
-
-    def tables(self, deepest: float) -> tuple[ModelTables, bool]:
-        """The kernel's tables for indentations up to ``deepest`` (m), and whether they are close.
-
-        Close: every table kept its tolerance with the knots that it may have. ValueError, with a
-        sentence, where a law cannot be a table.
-        """
-        size, cutting = int(self.values["table_size"]), self.cutting
-        length, response = self.values["blade_length"], cutting.response
-        strongest = float(response.indentation_at(STRONGEST_N))
-        edge = fit_table(
-            cutting.edge.offset_at, cutting.edge.slope_at, 0.0, 1.05 * length,
-            tolerance=TABLE_TOLERANCE, largest=size,
-        )  # fmt: skip
-        force = fit_table(
-            response.force_at, response.stiffness_at, 0.0, min(1.05 * deepest, strongest),
-            tolerance=TABLE_TOLERANCE, monotone=True, largest=size,
-        )  # fmt: skip
-        nothing = Table(*np.array([[0, 1], [0, 0], [0, 0]], dtype=np.float32))
-        tables = ModelTables(
-            edge=edge.table,
-            response=force.table,
-            friction_opening=nothing,
-            friction_closing=nothing,
-            friction_angle=nothing,
-            moving_blades=self.moving,
-            upper_face=self.upper_face_m,
-            fracture_energy=self.fracture_energy,
-            kappa=self.kappa,
-            closure=self.closure,
-            rate_damping=self.damping,
-            render_friction=False,
-            friction_rate_eps=0.01,
-            handle_radius=0.06,
-            opening_min=0.0,
-            opening_max=np.pi,
-            contact_min=-1e3,
-            contact_max=1e3,
-            tip_station=length,
-        )
-        return tables, edge.met and force.met
-
-
-def everyday_state(rng: np.random.Generator) -> State:
-    """A state whose quantities all lie in their everyday ranges."""
-    return _state("everyday", (), {}, rng)
-
-
-def one_at_a_time(name: str, count: int, repeats: int, rng: np.random.Generator) -> list[State]:
-    """``count`` values of one quantity over its extreme range, ``repeats`` everyday states each."""
-    return [
-        _state("one", (name,), {name: float(value)}, rng)
-        for value in QUANTITIES[name].values(count)
-        for _ in range(repeats)
+        for values in moved
     ]
+    for number in range(random):
+        names = ("opening", "opening_rate", ("contact", "indentation")[number % 2])
+        absurd = {name: float(rng.choice(extreme(name, cutting, 10_001))) for name in names}
+        states.append(_state("beyond", (), absurd, cutting))
+    return [state for state in states if math.isfinite(state.contact)]
 
 
-def in_pair(first: str, second: str, count: int, rng: np.random.Generator) -> list[State]:
-    """A grid of ``count`` by ``count`` values of two quantities over their extreme ranges."""
-    return [
-        _state("pair", (first, second), {first: float(a), second: float(b)}, rng)
-        for a in QUANTITIES[first].values(count)
-        for b in QUANTITIES[second].values(count)
-    ]
+def extreme(name: str, cutting: Cutting, count: int) -> Array:
+    """``count`` values of a quantity from one end of its extreme range to the other."""
+    if name == "opening":
+        return np.linspace(0.0, np.pi, count)
+    if name == "contact":
+        return np.linspace(0.0, BEYOND_TIP * cutting.edge.length_m, count)
+    if name == "indentation":
+        return np.geomspace(1e-12, 0.1, count)
+    half = np.geomspace(1e-6, 1e3, max((count - 1) // 2, 2))
+    return np.concatenate([-half[::-1], [0.0], half])
 
 
-def random_state(rng: np.random.Generator) -> State:
-    """A state whose quantities are all drawn from their extreme ranges."""
-    drawn = {name: QUANTITIES[name].draw(rng, extreme=True) for name in SWEPT}
-    return _state("random", (), drawn, rng)
+def blade_of_law(cutting: Cutting, parallel: float) -> Blade:
+    """A law in 50 digits. NotComparedError where its response has no written formula."""
+    edge, response = cutting.edge, cutting.response
+    kinds: dict[str, Any] = {"power": Power, "exponential": Exponential}
+    if response.family not in kinds:
+        raise NotComparedError(f"a response that is a {response.family} has no second writing")
+    offset, taper, *bends = _exact(
+        edge.offset_m, edge.taper_rad, edge.curvature_per_m, edge.bend_per_m2
+    )
+    weights = _exact(*np.asarray(edge.spline_m))
+    start, length = _exact(edge.spline_start_m, edge.length_m)
+    step = (length - start) / (len(weights) - 3) if weights else length
+    force = _exact(response.force, response.exponent, response.reference_m)
+    upper, energy, kappa, damping = _exact(
+        cutting.upper_face_m, cutting.fracture_energy or 0.0, cutting.kappa, cutting.rate_damping
+    )
+    shape = FormulaEdge((offset, mp.tan(taper), *bends), weights, start, step)
+    return Blade(
+        shape, kinds[response.family](*force), cutting.moving_blades, upper, energy, kappa,
+        cutting.closure, damping, length, mp.mpf(parallel),
+    )  # fmt: skip
+
+
+def blade_of_tables(tables: ModelTables, parallel: float) -> Blade:
+    """A kernel's own tables and float32 numbers in 50 digits."""
+    numbers = (tables.upper_face, tables.fracture_energy, tables.kappa, tables.rate_damping)
+    upper, energy, kappa, damping, tip = _exact(*map(np.float32, (*numbers, tables.tip_station)))
+    response = TableForce(TableCurve.of(tables.response), mp.mpf(KERNEL_CAP_N))
+    return Blade(
+        TableCurve.of(tables.edge), response, tables.moving_blades, upper, energy, kappa,
+        tables.closure, damping, tip, mp.mpf(parallel),
+    )  # fmt: skip
+
+
+def _exact(*numbers: Any) -> tuple[Any, ...]:
+    return tuple(mp.mpf(float(number)) for number in numbers)
+
+
+def _drawn(ranges: Ranges, cutting: Cutting, rng: np.random.Generator) -> dict[str, float]:
+    """A place of the scene at which the edge touches, where it does; both directions alike."""
+    opening = rng.uniform(*ranges.opening_rad)
+    low, high = ranges.contact_m
+    touched = _contact(cutting, opening, 0.0)
+    return {
+        "opening": opening,
+        "opening_rate": rng.choice([-1.0, 1.0]) * rng.uniform(*ranges.opening_rate_rad_per_s),
+        "contact": rng.uniform(low, min(high, touched) if touched > low else high),
+    }
+
+
+def _contact(cutting: Cutting, opening: float, indentation: float) -> float:
+    """Where the edge is so deep in the material; NaN where it is nowhere."""
+    edge, beta = cutting.edge, opening / cutting.moving_blades
+    station = edge.station_at_height(cutting.upper_face_m - indentation, beta)
+    return float(station * np.cos(beta) - edge.offset_at(station) * np.sin(beta))
 
 
 def _state(
-    plan: Plan, swept: tuple[str, ...], given: Mapping[str, float], rng: np.random.Generator
+    band: str, swept: tuple[str, ...], values: Mapping[str, float], cutting: Cutting
 ) -> State:
-    values = {name: QUANTITIES[name].draw(rng, extreme=False) for name in SWEPT} | dict(given)
-    choices: NDArray[np.int64] = rng.integers(0, 4, 5)
-    by_depth = "contact" not in swept and bool("indentation" in swept or choices[4] >= 2)
-    return State(
-        plan,
-        swept,
-        values,
-        1 if choices[0] < 2 else 2,
-        "work" if choices[1] < 3 else "eq4",
-        "power" if choices[2] < 2 else "exponential",
-        bool(choices[3] < 3),
-        by_depth,
-    )
+    """A state at these values; its contact is NaN where the edge reaches no such indentation."""
+    opening = min(float(np.float32(values["opening"])), LARGEST_OPENING_rad)
+    contact = values.get("contact", math.nan)
+    if "indentation" in values:
+        contact = _contact(cutting, opening, values["indentation"])
+    rate = float(np.float32(values["opening_rate"]))
+    return State(band, swept, values, opening, rate, float(np.float32(contact)), cutting)

@@ -1,80 +1,62 @@
-"""`bench extremes`: its jobs spread over processes, its page and JSON twin."""
+"""`bench extremes`: a package and the model under it against 50 digits, as panels."""
 
-import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+import json
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.aliases import Progress
-from scissorcal.workday.pool import open_pool
+from scissorcal.files import replacing
+from scissorcal.identity import VERSION
 
 if TYPE_CHECKING:
-    from scissorcal.bench.extremes.result import Extremes
-    from scissorcal.bench.extremes.study import Done, Extent, Job
+    from scissorcal.package import ModelPackage
+    from scissorcal.report.panel import Panel
 
-
-FINISH_S = 2.0
-"""Time within a budget for writing the results."""
-
-
-@dataclass(frozen=True)
-class ExtremesOutcome:
-    """The result and its files."""
-
-    result: "Extremes"
-    html: Path
-    json: Path
+FORMAT = "scissorcal-extremes/2"
 
 
 def run_extremes(
-    extent: "Extent",
-    folder: Path,
-    *,
-    seed: int = 0,
-    budget_s: float | None = None,
-    workers: int | None = None,
-    cluster: str | None = None,
-    progress: Progress | None = None,
-) -> ExtremesOutcome:
-    """Try the extremes and write extremes.html and extremes.json into ``folder``.
+    package: "ModelPackage", folder: Path, *, size: float, seed: int, progress: Progress
+) -> "tuple[list[Panel], tuple[Path, Path]]":
+    """Try a package and write extremes.html and extremes.json into ``folder``: panels, and paths.
 
-    The same extent and seed try the same states; with ``budget_s`` no job begins that would end
-    later, and what was tried is some of everything. Needs no workspace.
+    The same package, size and seed try the same states.
     """
-    from scissorcal.bench.extremes.cells import all_cells
-    from scissorcal.bench.extremes.result import extremes_text, summarise
-    from scissorcal.bench.extremes.study import Done, do, jobs
-    from scissorcal.report.extremes import extremes_page
-    from scissorcal.workday.runs.bench_files import run_facts, write_page_and_twin
+    from pydantic import TypeAdapter
 
-    began = time.monotonic()
-    tell = progress or (lambda done, sentence: None)
-    deadline = None if budget_s is None else began + budget_s - FINISH_S
-    every = list(jobs(extent, seed))
-    planned = sum(len(job.states) for job in every)
-    done: list[Done] = []
+    from scissorcal.bench.extremes.compare import compare_kernel, compare_model, compare_package
+    from scissorcal.bench.extremes.long_runs import strokes
+    from scissorcal.bench.extremes.states import package_states
+    from scissorcal.report.extremes import extremes_page, extremes_panels
+    from scissorcal.report.panel import Panel
 
-    def keep(one: Done) -> None:
-        done.append(one)
-        tell(len(done) / len(every), f"{len(done)} of {len(every)} jobs")
-
-    with open_pool(workers, cluster) as pool:
-        # within a budget no worker is handed a second job: each begins when it is handed out
-        handed = pool if deadline is None else replace(pool, ahead=1)
-        handed.work(do, _in_time(every, done, deadline), keep, Done)
-        count = pool.workers
-    run = run_facts(began, workers=count, seed=seed, planned=planned, budget_s=budget_s)
-    result = summarise(run, done, all_cells())
-    twin = extremes_text(result)
-    html, json = write_page_and_twin(folder, "extremes", extremes_page(result), twin)
-    return ExtremesOutcome(result, html, json)
-
-
-def _in_time(every: "list[Job]", done: "list[Done]", deadline: float | None) -> "Iterator[Job]":
-    """The jobs that may begin: none that would, at the longest done, end after the deadline."""
-    for job in every:
-        longest = max((one.seconds for one in done), default=0.0)
-        if deadline is not None and time.monotonic() + longest > deadline:
-            return
-        yield job
+    manifest, tables = package.manifest, package.tables
+    scene = manifest.ranges.opening_rad, manifest.ranges.contact_m[0]
+    states, tried = package_states(package, size, seed), []
+    for state in states:
+        kernel, rendered = compare_kernel(state, tables), compare_package(state, package)
+        tried.append((state, (compare_model(state), kernel, rendered)))
+        progress(len(tried) / len(states), f"{len(tried)} of {len(states)} states")
+    panels, now = extremes_panels(tried, strokes(tables, *scene)), datetime.now(UTC)
+    facts = {
+        "format": FORMAT,
+        "created": now.isoformat(),
+        "scissorcal_version": VERSION,
+        "package": manifest.name,
+        "content_hash": manifest.content_hash,
+        "seed": seed,
+        "states": len(states),
+    }
+    said = (
+        f"{len(states)} states of the package {manifest.name} ({manifest.content_hash[:12]}), seed "
+        f"{seed}. Made {now:%Y-%m-%d %H:%M %Z} by scissorcal {VERSION}."
+    )
+    plain = TypeAdapter(list[Panel]).dump_python(panels, mode="json", exclude_defaults=True)
+    twin = json.dumps(facts | {"panels": plain}, ensure_ascii=False, allow_nan=False) + "\n"
+    folder.mkdir(parents=True, exist_ok=True)
+    html, twin_path = folder / "extremes.html", folder / "extremes.json"
+    for path, text in ((twin_path, twin), (html, extremes_page(panels, said))):
+        with replacing(path) as part:
+            part.write_text(text, encoding="utf-8")
+    return panels, (html, twin_path)

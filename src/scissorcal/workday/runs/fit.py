@@ -10,13 +10,13 @@ from scissorcal.aliases import Progress
 from scissorcal.errors import InputError, MissingError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine, refuse_other_fit
-from scissorcal.workday.options import FitOptions
 from scissorcal.workday.states import WAITING, StepState
 from scissorcal.workday.steps import BY_NAME, Step, steps_of
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from scissorcal.calibration.result import Effort
+    from scissorcal.workday.options import FitOptions
 
 Stop = Callable[[], bool]
 
@@ -81,7 +81,7 @@ class FitOutcome:
 def fit_workspace(
     workspace: Workspace,
     wanted: Sequence[str] = (),
-    options: FitOptions = FitOptions(),
+    options: "FitOptions | None" = None,
     *,
     progress: Progress | None = None,
     stop: Stop | None = None,
@@ -131,8 +131,12 @@ def steps_to_fit(engine: Engine, wanted: Sequence[str] = ()) -> list[Step]:
     return [step for step in steps_of("fit") if step.name in names]
 
 
-def for_step(options: FitOptions, step: Step, wanted: Sequence[str]) -> FitOptions:
+def for_step(
+    options: "FitOptions | None", step: Step, wanted: Sequence[str]
+) -> "FitOptions | None":
     """The options of one fit: it is forced, and its critic asked, only where it is wanted."""
+    if options is None:
+        return None
     named = step.what in wanted
     return replace(
         options, force=options.force and (named or not wanted), critic=options.critic and named
@@ -142,14 +146,16 @@ def for_step(options: FitOptions, step: Step, wanted: Sequence[str]) -> FitOptio
 def fit_step(
     engine: Engine,
     step: Step,
-    options: FitOptions = FitOptions(),
+    options: "FitOptions | None" = None,
     *,
     progress: Progress | None = None,
     stop: Stop | None = None,
 ) -> FitOutcome:
     """Run one fit, or read it back where its identity is the stored one's, unless forced."""
     from scissorcal.workday.elsewhere import refuse_unwritable, save_anywhere
+    from scissorcal.workday.options import FitOptions
 
+    options = options or FitOptions()
     chosen: Effort = options.effort or engine.recipe.fit.effort
     identity = engine.identity(step.name, chosen)
     path = engine.file(step.name)

@@ -12,6 +12,7 @@ from scissorcal.errors import InputError, MissingError, needs_extra
 from scissorcal.identity import VERSION
 from scissorcal.recipe.load import read_text
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import NONE, PrototypeOptions
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.runs.render import package_warnings
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from scissorcal.prototype.server import PrototypeServer
     from scissorcal.recording import Recording
 
-NONE = "none"
 SIM_REQUEST = "The virtual rig moves by itself: nobody has to keep clear."
 TRACK_REQUEST = (
     "The motors stay off. Move the handles so that the blade's tip taps the plate, at several "
@@ -191,24 +191,17 @@ def rig_commands(
     return tuple(found)
 
 
-def prototype_server(
-    workspace: Workspace,
-    *,
-    device: str = NONE,
-    camera: str = NONE,
-    package_path: Path | None = None,
-    port: int = 0,
-) -> "PrototypeServer":
+def prototype_server(workspace: Workspace, options: PrototypeOptions) -> "PrototypeServer":
     """A server of the package's page that follows the workspace's rig; see `serve`.
 
-    With a ``device`` the page may start commands on it, with a ``camera`` a track too. Raises
-    InputError where aiohttp is not installed or a camera has no device, MissingError where the page
-    was not built and cannot be, and what `workspace_scene` raises.
+    Raises InputError where aiohttp is not installed or a camera has no device, MissingError where
+    the page was not built and cannot be, and what `workspace_scene` raises.
     """
     _require_aiohttp()
     from scissorcal.prototype.document import ensure_page, page_of, policy_of
     from scissorcal.prototype.server import PrototypeServer
 
+    device, camera, package_path = options.device, options.camera, options.package_path
     if camera != NONE and device == NONE:
         raise InputError("--camera is for a track that the page starts: name a --device, too.")
     scene = workspace_scene(workspace, package_path)
@@ -221,7 +214,7 @@ def prototype_server(
         workspace.captures_dir,
         workspace.root,
         commands,
-        port=port,
+        port=options.port,
     )
 
 

@@ -7,8 +7,8 @@ fitted.
 from dataclasses import dataclass
 
 import numpy as np
+from benchmarks.extremes.made_friction import MadeFriction, Motion, record, sweeps
 
-from scissorcal.bench.extremes.made_friction import MadeFriction, Motion, record, sweeps
 from scissorcal.recording import Recording, Stroke
 
 STROKES_A_SHEET = 4

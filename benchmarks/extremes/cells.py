@@ -12,23 +12,19 @@ from typing import Literal
 import numpy as np
 
 import scissorcal
+from scissorcal.bench.extremes.compare import Outcome
 from scissorcal.errors import ScissorcalError
 
-Part = Literal["kernel", "model", "inference", "signals", "vision", "package"]
-Outcome = Literal["right", "refused", "flagged", "not compared", "wrong"]
-"""``right``: within the stated error of the truth. ``refused``: an error with a sentence, or an
-output that is marked as refused. ``flagged``: a number whose own status says not to use it (a
-failed verdict, a rejected estimate). ``not compared``: the truth is larger than what is compared.
-``wrong``: a number that is none of these, or an error without a sentence."""
+Part = Literal["kernel", "model", "inference", "signals", "vision"]
 
 CELLS = (
-    "scissorcal.bench.extremes.physics_cells:cells",
-    "scissorcal.bench.extremes.inference_cells:cells",
-    "scissorcal.bench.extremes.statistics_cells:cells",
-    "scissorcal.bench.extremes.friction_cells:cells",
-    "scissorcal.bench.extremes.cut_cells:cells",
-    "scissorcal.bench.extremes.import_cells:cells",
-    "scissorcal.bench.extremes.vision_cells:cells",
+    "benchmarks.extremes.physics_cells:cells",
+    "benchmarks.extremes.inference_cells:cells",
+    "benchmarks.extremes.statistics_cells:cells",
+    "benchmarks.extremes.friction_cells:cells",
+    "benchmarks.extremes.cut_cells:cells",
+    "benchmarks.extremes.import_cells:cells",
+    "benchmarks.extremes.vision_cells:cells",
 )
 """Where cells come from: functions without arguments that give a sequence of them."""
 

@@ -5,11 +5,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from benchmarks.extremes.cells import Cell, Found, judged, refusal, worst_of
+from benchmarks.extremes.conjugate import Linear, line
+from benchmarks.extremes.shapes import shape_cells
 
 from scissorcal.aliases import Array
-from scissorcal.bench.extremes.cells import Cell, Found, judged, refusal, worst_of
-from scissorcal.bench.extremes.conjugate import Linear, line
-from scissorcal.bench.extremes.shapes import shape_cells
 from scissorcal.inference import NotFiniteError, Posterior, infer
 
 Made = Callable[[np.random.Generator], Linear]

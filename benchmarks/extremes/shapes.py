@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
+from benchmarks.extremes.cells import Cell, Found, judged
 
 from scissorcal.aliases import Array
-from scissorcal.bench.extremes.cells import Cell, Found, judged
 from scissorcal.inference import Posterior, Problem, infer
 
 Density = Callable[[Array], float]

@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from benchmarks.extremes.cells import Cell, Found, judged
+from benchmarks.extremes.made_friction import MadeFriction, Motion, changed, record, sweeps
 
-from scissorcal.bench.extremes.cells import Cell, Found, judged
-from scissorcal.bench.extremes.made_friction import MadeFriction, Motion, changed, record, sweeps
 from scissorcal.calibration import FitResult, fit_friction
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording import Recording

@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from benchmarks.extremes.cells import Cell, Found, judged, refusal
 
-from scissorcal.bench.extremes.cells import Cell, Found, judged, refusal
 from scissorcal.errors import ScissorcalError
 from scissorcal.recording import import_table
 

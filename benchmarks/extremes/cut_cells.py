@@ -5,11 +5,11 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from benchmarks.extremes.cells import Cell, Found, judged
+from benchmarks.extremes.friction_cells import LAW
+from benchmarks.extremes.made_cut import MadeCut, cut_motion, record_cut
+from benchmarks.extremes.made_friction import MadeFriction, changed, record, sweeps
 
-from scissorcal.bench.extremes.cells import Cell, Found, judged
-from scissorcal.bench.extremes.friction_cells import LAW
-from scissorcal.bench.extremes.made_cut import MadeCut, cut_motion, record_cut
-from scissorcal.bench.extremes.made_friction import MadeFriction, changed, record, sweeps
 from scissorcal.calibration import FitResult, fit_cut, fit_friction
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.schema import Recipe

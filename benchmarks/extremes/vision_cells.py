@@ -6,9 +6,9 @@ Photographs are points through a pinhole that is written out here.
 from collections.abc import Callable
 
 import numpy as np
+from benchmarks.extremes.cells import Cell, Found, judged, worst_of
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.bench.extremes.cells import Cell, Found, judged, worst_of
 from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera
 from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
 from scissorcal.verdicts import failed

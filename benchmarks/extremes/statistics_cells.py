@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
+from benchmarks.extremes.cells import Cell, Found
 
 from scissorcal.aliases import Array
-from scissorcal.bench.extremes.cells import Cell, Found
 from scissorcal.inference import fit_ar, ljung_box, smooth_weights, tails_of
 from scissorcal.inference.autocorrelation import robust_covariance_of_scores
 from scissorcal.inference.between import between_groups

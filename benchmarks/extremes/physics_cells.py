@@ -4,18 +4,17 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-
-from scissorcal.bench.extremes.cells import Cell, Found, judged, worst_of
-from scissorcal.bench.extremes.exact_laws import Exponential, Power, TableCurve, mp
-from scissorcal.bench.extremes.long_runs import (
-    CLOSING_rad,
-    energy_of_strokes,
+from benchmarks.extremes.cells import Cell, Found, judged, worst_of
+from benchmarks.extremes.long_runs import (
+    balance_of_strokes,
     energy_of_throw,
     hostile_inputs,
     walk_of_strokes,
 )
-from scissorcal.bench.extremes.refused_inputs import refused_tables, refused_walks
-from scissorcal.bench.extremes.states import REFERENCE_m
+from benchmarks.extremes.refused_inputs import refused_tables, refused_walks
+from benchmarks.extremes.states import REFERENCE_m
+
+from scissorcal.bench.extremes.exact_laws import Exponential, Number, Power, TableCurve, mp
 from scissorcal.kernel import Table, presliding_path
 from scissorcal.model import (
     Cutting,
@@ -30,11 +29,6 @@ from scissorcal.model import (
 Run = Callable[[np.random.Generator], Found]
 
 FLOAT32 = 2.0**-24
-
-SMOOTH_BALANCE = 1e-3
-RIPPLED_BALANCE = 1e-2
-"""Stated energy balance of a long run, as a share of the work done: the trapezoid over steps of
-1e-5 rad leaves 1e-4, and each drop of a ripple half a step more."""
 
 THROWN_BALANCE = 1e-2
 LAW_ERROR = 1e-12
@@ -99,16 +93,11 @@ _LONG_RUNS: tuple[tuple[str, dict[str, float], bool], ...] = (
 
 
 def _strokes(values: dict[str, float]) -> Run:
-    allowed = SMOOTH_BALANCE if values["kappa"] == 1.0 else RIPPLED_BALANCE
-
-    def run(rng: np.random.Generator) -> Found:
-        return energy_of_strokes(values, rng, CLOSING_rad, allowed)
-
-    return run
+    return lambda rng: balance_of_strokes(values)
 
 
 def _thrown(rng: np.random.Generator) -> Found:
-    found = [energy_of_throw(inertia, rng, THROWN_BALANCE) for inertia in np.logspace(-6, 2, 9)]
+    found = [energy_of_throw(inertia, THROWN_BALANCE) for inertia in np.logspace(-6, 2, 9)]
     return worst_of(found)
 
 
@@ -129,10 +118,18 @@ def _tables(rng: np.random.Generator) -> Found:
             values = table.evaluate(places).astype(np.float64)
             for place, value in zip(places.tolist(), values.tolist(), strict=True):
                 at = mp.mpf(place)
-                size_of = float(exact.magnitude(at))
+                size_of = float(_magnitude(exact, at))
                 error = abs(float(mp.mpf(value) - exact.at(at)[0])) / max(size_of, 1e-300)
                 found.append(judged(error, 8 * FLOAT32, f"a table of {len(x)} knots"))
     return worst_of(found)
+
+
+def _magnitude(table: TableCurve, at: Number) -> Number:
+    """Sum of the magnitudes of what adds up to the value: its rounding is a share of it."""
+    i, width, (y, p, _, d) = table.piece(at)
+    t = (at - table.x[i]) / width
+    rise = abs(table.y[min(i + 1, len(table.y) - 1)] - y) if d else 0 * t
+    return abs(y) + abs(t) * (abs(p) + abs(t) * (rise + 3 * abs(p) + 2 * abs(d)))
 
 
 def _response(family: str) -> Run:
@@ -145,7 +142,8 @@ def _response(family: str) -> Run:
             exact = kind(mp.mpf(2), mp.mpf(exponent), mp.mpf(REFERENCE_m))
             most = 0.1 if family == "power" else 690.0 * REFERENCE_m / exponent
             for delta in np.geomspace(1e-15, min(most, 0.1), 60) * rng.uniform(0.9, 1.0, 60):
-                force, energy = exact.at(mp.mpf(float(delta)))
+                there = mp.mpf(float(delta))
+                force, energy = exact.at(there), exact.energy(there)
                 pairs = (
                     (float(own.force_at(delta)), force),
                     (float(own.energy_at(delta)), energy),
@@ -172,7 +170,7 @@ def _mean_share(rng: np.random.Generator) -> Found:
                 law = Cutting(edge, own, 2, 1e-4, 0.5, kappa)
                 top = exact.inverse(mp.mpf(peak))
                 bottom = exact.inverse(mp.mpf(kappa) * mp.mpf(peak))
-                share = (exact.at(top)[1] - exact.at(bottom)[1]) / (top - bottom) / mp.mpf(peak)
+                share = (exact.energy(top) - exact.energy(bottom)) / (top - bottom) / mp.mpf(peak)
                 error = abs(float(mp.mpf(float(mean_share(law, peak))) / share - 1))
                 found.append(judged(error, LAW_ERROR, f"{family}, kappa 1 - {1 - kappa:.2g}"))
     return worst_of(found)

@@ -7,15 +7,15 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from benchmarks.extremes.cells import Found, refusal, worst_of
+from benchmarks.extremes.long_runs import FIRST, LAST, scissors, scissors_tables, walk_law
 
-from scissorcal.bench.extremes.cells import Found, refusal, worst_of
-from scissorcal.bench.extremes.long_runs import FIRST, LAST, scissors, walk_law
 from scissorcal.kernel import Kernel, Table, walk_crack
 
 
 def refused_tables(rng: np.random.Generator) -> Found:
     """Numbers and tables that a kernel must not take."""
-    sound = scissors({"kappa": 0.7}, rng).tables(1e-3)[0]
+    sound = scissors_tables({"kappa": 0.7})
     falling = _table([0.0, 1.0], [0.0, -1.0], [-1.0, -1.0])
     changes: dict[str, Any] = {
         "kappa": (0.0, -1.0, 1.5, math.nan),
@@ -49,7 +49,7 @@ def refused_tables(rng: np.random.Generator) -> Found:
 
 def refused_walks(rng: np.random.Generator) -> Found:
     """Laws and motions that a crack's walk must not take."""
-    state = scissors({"kappa": 0.7}, rng)
+    state = scissors({"kappa": 0.7})
     opening, advance = np.linspace(FIRST, LAST, 50), np.full(50, -0.01)
     broken = opening.copy()
     broken[7] = math.nan

@@ -1,0 +1,1 @@
+"""Every quantity from the everyday to the absurd: model, kernel, estimation, vision, imports."""
