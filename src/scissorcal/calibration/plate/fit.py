@@ -43,7 +43,6 @@ def fit_plate(
     plate_target: Pose = UNMOVED,
     rig: RigPose | None = None,
     places: PixelMap | None = None,
-    inputs_hash: str = "",
 ) -> PlateFit:
     """Fit one pose of the plate to all photographs of it, corners and photographs together.
 
@@ -52,6 +51,7 @@ def fit_plate(
     photograph of another pose is detected by fitting it alone. Both poses that a plane allows
     are refined and kept. ``priors`` are the recipe's. ``rig`` takes the pose into the rig's frame.
     ``places`` is how well the camera is known over the picture, from its fit.
+    ``inputs_hash`` of the result is empty: who reads the photographs puts it in.
 
     Raises MissingError without a photograph, InputError where photographs show different targets,
     VerdictError where the corners determine no pose.
@@ -94,7 +94,7 @@ def fit_plate(
         rms_px=whole.rms_px,
         noise_px=whole.sd_px,
         verdicts=plate_verdicts(whole, views, halves, camera, _there(photos, places), rig),
-        inputs_hash=inputs_hash,
+        inputs_hash="",
         sources=tuple(photo.name for photo in photos),
     )
 

@@ -1,6 +1,7 @@
 """The plate: photographs of its target and of the rig's card captured, and its pose fitted."""
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -89,8 +90,8 @@ def fit(engine: "Engine", request: "Request") -> "Made":
         plate_target=plate_target(engine.recipe),
         rig=locate_workspace_rig(engine, camera),
         places=fitted.pixel_map,
-        inputs_hash=request.inputs_hash,
     )
+    result = replace(result, inputs_hash=request.inputs_hash)
     return Made(result, lambda folder: _draw(newest, result, camera, engine, folder))
 
 
