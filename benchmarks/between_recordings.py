@@ -24,7 +24,7 @@ from scissorcal.calibration import FitResult, fit_cut, fit_friction
 from scissorcal.calibration.result import Effort
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.device.sim.truth import true_parameters, varied
-from scissorcal.package.build import pick_draws
+from scissorcal.package.exact import pick_draws
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 

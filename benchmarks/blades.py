@@ -17,6 +17,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from benchmarks.photographs import Glare, GlaringLayer, centreline_turn, random_looks
 
 from scissorcal.calibration.edge.fit import BladeFit, fit_blade
 from scissorcal.errors import InputError
@@ -25,13 +26,11 @@ from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import (
     BladeShape,
-    Glare,
     Lens,
     Nick,
     SimPose,
     as_jpeg,
     blade_layer,
-    random_looks,
     render,
     target_layers,
 )
@@ -113,21 +112,21 @@ def photographed(width: int, strength: float, rng: np.random.Generator, *, known
             )
         )
     printed = tuple(1.0 + rng.normal(0, 1e-3, 2) * strength)
+    metal = blade_layer(
+        shape,
+        pose,
+        where,
+        turn,
+        reflectance=rng.uniform(0.1, 0.35),
+        shading=(rng.normal(0, 0.3), rng.normal(0, 0.6)),
+        brushed=0.05 * strength,
+        shadow=strength * rng.uniform(0.0, 0.5),
+        shadow_m=tuple(rng.normal(0, 1.2e-3, 2)),
+        shadow_soft_m=rng.uniform(0.8e-3, 3e-3),
+    )
     layers = [
         *target_layers(BLADE_MAT, pose, print_scale=printed),
-        blade_layer(
-            shape,
-            pose,
-            where,
-            turn,
-            reflectance=rng.uniform(0.1, 0.35),
-            shading=(rng.normal(0, 0.3), rng.normal(0, 0.6)),
-            brushed=0.05 * strength,
-            glares=tuple(glares),
-            shadow=strength * rng.uniform(0.0, 0.5),
-            shadow_m=tuple(rng.normal(0, 1.2e-3, 2)),
-            shadow_soft_m=rng.uniform(0.8e-3, 3e-3),
-        ),
+        GlaringLayer(**vars(metal), glares=tuple(glares)),
     ]
     picture = render(layers, lens, random_looks(rng, px_per_mm, strength), rng)
     data = np.frombuffer(as_jpeg(picture, int(rng.integers(75, 97))), dtype=np.uint8)
@@ -187,7 +186,7 @@ def believed(lens: Lens, rng: np.random.Generator) -> Camera:
 
 def true_edge(shape: BladeShape, stations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Edge and its slope angle in the frame whose x axis is the centreline."""
-    turn = shape.centreline_turn()
+    turn = centreline_turn(shape)
     s = np.linspace(0.0, shape.length_m, 40_001)
     e = shape.edge_at(s)
     along, off = np.cos(turn) * s + np.sin(turn) * e, np.cos(turn) * e - np.sin(turn) * s

@@ -31,7 +31,7 @@ import numpy as np
 from benchmarks.days import day_options
 
 from scissorcal.calibration import FitResult, fit_cut, fit_friction
-from scissorcal.calibration.friction.typical import friction_and_offset
+from scissorcal.calibration.friction.layout import friction_and_offset
 from scissorcal.workday.demo.day import make_day, specimen_of
 from scissorcal.workday.workspace import create_workspace
 

@@ -18,10 +18,11 @@ from tests.second_rig import capture_cut, capture_friction, fine, paper, recipe_
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut import teeth
-from scissorcal.calibration.cut.known import KnownFriction
-from scissorcal.calibration.cut.path import mean_torque, path_motion
-from scissorcal.calibration.cut.path.runs import find_runs, split
-from scissorcal.calibration.cut.scout import Scouted, belief_geometry, scout, tooth_periods
+from scissorcal.calibration.cut.geometry import belief_geometry
+from scissorcal.calibration.cut.known import CutBasis, KnownFriction
+from scissorcal.calibration.cut.path_motion import find_runs, path_motion, split
+from scissorcal.calibration.cut.path_work import mean_torque
+from scissorcal.calibration.cut.scout import Scouted, scout, tooth_periods
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.model import Response
@@ -84,8 +85,7 @@ def virtual_cuts(seed: int) -> tuple[Cut, Cut]:
     ):
         recording, _ = capture_cut(one, recipe, rng)
         motions = path_motion((recording,), known.inertia)
-        geometry = belief_geometry(recipe, edge_of(recipe))
-        scouted = scout(motions, known, recipe, geometry, "rippled")
+        scouted = scout(motions, CutBasis.of(recipe, known), "rippled")
         found.append(Cut(name, colour, scouted, signals_of(scouted, recipe)))
     return found[0], found[1]
 

@@ -31,7 +31,7 @@ from tests.prototype.made import running
 
 from scissorcal.prototype.document import page_of, policy_of
 from scissorcal.prototype.server import PrototypeServer
-from scissorcal.recording import Recording, RecordingWriter, read_recording
+from scissorcal.recording import Recording, RecordingFacts, RecordingWriter, read_recording
 from scissorcal.workday.runs.prototype import workspace_scene
 from scissorcal.workday.workspace import Workspace
 
@@ -210,7 +210,9 @@ def replay(recording: Recording, captures: Path, over: threading.Event) -> None:
         path = captures / f"render-{turn}.mcap"
         began, began_ns = time.monotonic(), time.time_ns()
         time_s = 1e-6 * (own["device_time_us"] - own["device_time_us"][0])
-        with RecordingWriter(path, "render", handle_radius_m=recording.handle_radius_m) as writer:
+        with RecordingWriter(
+            path, "render", facts=RecordingFacts(handle_radius_m=recording.handle_radius_m)
+        ) as writer:
             for first in range(0, len(own), CHUNK):
                 chunk, at = own[first : first + CHUNK].copy(), time_s[first : first + CHUNK]
                 chunk["host_time_ns"] = began_ns + np.round(1e9 * at).astype(np.int64)

@@ -18,20 +18,13 @@ from typing import Any
 
 import cv2
 import numpy as np
+from benchmarks.photographs import random_looks
 
 from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
 from scissorcal.errors import ScissorcalError
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
-from scissorcal.vision.sim import (
-    Lens,
-    PaintLayer,
-    SimPose,
-    as_jpeg,
-    random_looks,
-    render,
-    target_layers,
-)
+from scissorcal.vision.sim import Lens, PaintLayer, SimPose, as_jpeg, render, target_layers
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP, MarkedBoard, dictionary
 from scissorcal.vision.targets.detect import find_board
 

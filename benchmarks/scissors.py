@@ -18,20 +18,17 @@ from typing import Any
 
 import cv2
 import numpy as np
+from benchmarks.photographs import CastShadow, Lamp, TexturedLayer, random_looks
 
-from scissorcal.calibration.edge.fit import fit_blade
+from scissorcal.calibration.edge.fit import Blade, fit_blade
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.photo import BladePhoto, by_blade, photograph_scissors
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import (
     BladeShape,
-    CastShadow,
-    Lamp,
     Lens,
-    PaintLayer,
     SimPose,
     as_jpeg,
-    random_looks,
     render,
     scissors_layers,
 )
@@ -128,7 +125,7 @@ def photographed(
 
     white = rng.uniform(0.7, 0.9)
     far = 0.3 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    sheet = PaintLayer(
+    sheet = TexturedLayer(
         [far],
         pose,
         white,
@@ -214,7 +211,9 @@ def judged(pairs: list[Pair], seed: int) -> dict[str, Any]:
             return {**row, "refused": "closed"}
         length = float(np.mean([blade.length_m for blade in pair.blades.values()]))
         fits = {
-            name: fit_blade(groups[name], None, effort="draft", rng=rng, name=name, length_m=length)
+            name: fit_blade(
+                groups[name], None, effort="draft", rng=rng, blade=Blade(name=name, length_m=length)
+            )
             for name in pair.blades
         }
     except InputError as error:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.probe.result import ProbeResult
 from scissorcal.device.session import RigSession
+from scissorcal.recording.probe import ProbeResult
 from scissorcal.workday.runs import probe
 from scissorcal.workday.workspace import Workspace
 from tests.made_once import made_once

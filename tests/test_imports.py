@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from benchmarks.house import size_of
 
 import scissorcal
 
@@ -99,6 +100,12 @@ def test_every_room_has_a_rule() -> None:
     rooms = {room_of(module_of(path)) for path in MODULES}
     assert rooms <= set(MAY_IMPORT)
     assert [room for room, allowed in MAY_IMPORT.items() if "cli" in allowed] == ["__main__"]
+
+
+@pytest.mark.parametrize("room", ["calibration", "inference", "package"])
+def test_no_function_of_a_fits_room_takes_more_than_six_parameters(room: str) -> None:
+    for path in (PACKAGE / room).rglob("*.py"):
+        assert size_of(path.read_text(encoding="utf-8")).most_parameters <= 6, path
 
 
 @pytest.mark.parametrize("room", MAY_IMPORT)

@@ -1,6 +1,6 @@
 """Every quantity with its everyday and its extreme range.
 
-Everyday ranges are those of :mod:`scissorcal.recipe.everyday`, extreme ones stand here.
+Everyday ranges are those of :mod:`scissorcal.recipe.unlikely`, extreme ones stand here.
 """
 
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.recipe.everyday import EVERYDAY
+from scissorcal.recipe.unlikely import EVERYDAY
 
 Spacing = Literal["linear", "log", "sign-log", "whole"]
 

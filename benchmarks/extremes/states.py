@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scissorcal.bench.extremes.states import State
 from scissorcal.kernel import ModelTables, Table
 from scissorcal.model import Cutting, Edge, Response
-from scissorcal.package.tables import fit_table
+from scissorcal.package.tables import TableLaw, fit_table
 
 REFERENCE_m = 3e-4
 """Indentation at which the quantity ``force`` holds: that of the recipes for paper."""
@@ -77,12 +77,15 @@ def fitted_tables(state: State, deepest: float) -> tuple[ModelTables, bool]:
     length, response = state.values["blade_length"], cutting.response
     strongest = float(response.indentation_at(STRONGEST_N))
     edge = fit_table(
-        cutting.edge.offset_at, cutting.edge.slope_at, 0.0, 1.05 * length,
+        TableLaw(cutting.edge.offset_at, cutting.edge.slope_at, 0.0, 1.05 * length),
         tolerance=TABLE_TOLERANCE, largest=size,
     )  # fmt: skip
     force = fit_table(
-        response.force_at, response.stiffness_at, 0.0, min(1.05 * deepest, strongest),
-        tolerance=TABLE_TOLERANCE, monotone=True, largest=size,
+        TableLaw(
+            response.force_at, response.stiffness_at, 0.0, min(1.05 * deepest, strongest),
+            monotone=True,
+        ),
+        tolerance=TABLE_TOLERANCE, largest=size,
     )  # fmt: skip
     nothing = Table(*np.array([[0, 1], [0, 0], [0, 0]], dtype=np.float32))
     tables = ModelTables(

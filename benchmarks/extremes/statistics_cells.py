@@ -7,9 +7,9 @@ from benchmarks.extremes.cells import Cell, Found
 
 from scissorcal.aliases import Array
 from scissorcal.inference import fit_ar, ljung_box, smooth_weights, tails_of
+from scissorcal.inference.ascent import least_squares
 from scissorcal.inference.autocorrelation import robust_covariance_of_scores
 from scissorcal.inference.between import between_groups
-from scissorcal.inference.least_squares import least_squares
 from scissorcal.inference.thorough import rank_r_hat
 
 Check = Callable[[np.random.Generator], tuple[bool, str]]

@@ -13,13 +13,14 @@ from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade import study
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.point import Curve, Error, Point, Sample, Setting, Spread
-from scissorcal.bench.trade.result import FORMAT, read_trade, trade_text
+from scissorcal.bench.trade.result import FORMAT, read_trade
 from scissorcal.bench.trade.schedule import Schedule
 from scissorcal.bench.trade.study import Task
 from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, TOGETHER, Together
 from scissorcal.bench.trade.torque import WORST
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.library import schemas_dir
+from scissorcal.report.twin import twin_text
 from scissorcal.workday.runs import bench
 from scissorcal.workday.runs.bench import TradeOutcome, TradeSettings, trade_workspace
 from scissorcal.workday.runs.bench_case import ON_A_CLUSTER
@@ -123,7 +124,7 @@ def test_each_measurement_names_the_computer_that_made_it(
     found = run(workspace)
     assert found.trade.machine == "one computer; another computer"
     page = found.html.read_text(encoding="utf-8")
-    assert "<dt>Computer</dt><dd>one computer; another computer</dd>" in page
+    assert "computer</th><td>one computer; another computer</td>" in page
 
 
 def test_a_cluster_measures_no_photographs_and_says_why(
@@ -317,5 +318,5 @@ def test_results_of_another_version_are_refused(workspace: Workspace) -> None:
 
 def test_the_twin_reads_back_as_it_was(workspace: Workspace) -> None:
     found = run(workspace)
-    found.json.write_text(trade_text(read_trade(found.json)), encoding="utf-8")
+    found.json.write_text(twin_text(read_trade(found.json)), encoding="utf-8")
     assert read_trade(found.json) == found.trade

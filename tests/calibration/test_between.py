@@ -10,12 +10,12 @@ from scissorcal.calibration import FitResult, fit_friction, friction_experiment
 from scissorcal.calibration.between import BetweenRecordings
 from scissorcal.calibration.caveats import next_recording_sd, next_recording_sentence
 from scissorcal.calibration.parameters import Layout, Parameter
-from scissorcal.calibration.verify.check import assess, make_study, tasks_of
+from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.calibration.verify.simulator import friction_simulator
 from scissorcal.calibration.verify.study import run
 from scissorcal.model.transforms import LOG
-from scissorcal.package.build import pick_draws
+from scissorcal.package.exact import pick_draws
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.friction.test_fit import emps
@@ -45,7 +45,7 @@ def alone() -> FitResult:
 def halves(given: tuple[Recording, ...], fit: FitResult) -> VerifyResult:
     design = friction_experiment(given, SETTINGS, fit)
     simulator = friction_simulator(given, SETTINGS, fit, design.layout)
-    study = make_study(design, fit, simulator, seed=0)
+    study = make_study(design, fit, simulator, settings=StudySettings(seed=0))
     records = [run(study, task) for task in tasks_of(study, ("halves",), 0)]
     return assess(study, fit, ("halves",), records)
 

@@ -1,6 +1,7 @@
 """Verdicts: each fails on what it is for, says what to measure next, and stops a calibration."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.stats import chi2
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.checks import trust_verdicts
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
+from scissorcal.calibration.fit_model import Outcome
 from scissorcal.calibration.result import StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.cli.fit_law import text
@@ -87,9 +89,9 @@ def judged(
         StrokeError(int(k), "a.mcap", "closing", 0.1, 0.1, error) for k in np.unique(bins.stroke)
     )
     met = np.full(len(bins.rate), np.nan) if contact is None else contact
-    verdicts = trust_verdicts(
-        what, effort, chosen, posterior, diagnostics, errors, nuisance, bins, met
-    )
+    design = SimpleNamespace(what=what, nuisance=nuisance, bins=bins, contact=lambda point: met)
+    outcome = Outcome(design, effort, [chosen], chosen, posterior, {})
+    verdicts = trust_verdicts(outcome, diagnostics, errors)
     return {verdict.check: verdict for verdict in verdicts}
 
 

@@ -17,6 +17,7 @@ from scissorcal.calibration.critic import (
     structure_verdict,
 )
 from scissorcal.calibration.fit_candidate import fit_candidate
+from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.model.course_terms import LIBRARY
 from scissorcal.recipe.schema import FitFriction
@@ -53,7 +54,7 @@ def critique(recording: Recording, seed: int, template):
     law = friction_experiment((recording,), SIMPLE, template)
     chosen = fit_candidate(law.candidate(law.observed), law.series, law.strokes)
     rng = np.random.default_rng(seed)
-    return criticise("friction", chosen, law.bins, None, recording.joint, rng)
+    return criticise(law, chosen, recording.joint, rng)
 
 
 def test_fewer_bins_than_terms_are_criticised_too(template):
@@ -68,7 +69,7 @@ def test_fewer_bins_than_terms_are_criticised_too(template):
     )
     chosen = fit_candidate(law.candidate(law.observed), law.series, law.strokes)
     rng = np.random.default_rng(0)
-    assert isinstance(criticise("friction", chosen, law.bins, None, recording.joint, rng), Critique)
+    assert isinstance(criticise(law, chosen, recording.joint, rng), Critique)
 
 
 @pytest.mark.slow
@@ -142,7 +143,9 @@ def test_the_critic_is_asked_at_standard_effort_only_unless_it_is_asked_for():
     ):
         settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=critic)
         rng = np.random.default_rng(7)
-        found = fit_friction((recording,), settings, effort=effort, rng=rng, critic=asked)
+        found = fit_friction(
+            (recording,), settings, effort=effort, rng=rng, run=FrictionRun(critic=asked)
+        )
         judged = next(one for one in found.verdicts if one.check == "structure left")
         spoken[effort, critic, asked] = found.diagnostics["critic"], judged.status
     silent = (NOT_ASKED, "not_evaluated")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction
+from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.verdicts import Verdict
 from tests.calibration.planted import planted
@@ -33,7 +34,7 @@ def day(seed: int, make=fine):
 
 def criticised(recording, law=LAW) -> tuple[tuple[str, ...], Verdict]:
     rng = np.random.default_rng(183)
-    fit = fit_friction((recording,), law, effort="draft", rng=rng, critic=True)
+    fit = fit_friction((recording,), law, effort="draft", rng=rng, run=FrictionRun(critic=True))
     judged = next(one for one in fit.verdicts if one.check == "structure left")
     return tuple(proposal.name for proposal in fit.critic), judged
 

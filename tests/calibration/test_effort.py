@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from scissorcal.calibration.effort import candidates_for, draft_note
+from scissorcal.calibration.fit_model import candidates_for, draft_note
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from scissorcal.calibration import (
     load_fit,
     save,
 )
-from scissorcal.calibration.predictive import REPLICATES, _rounded
+from scissorcal.calibration.assemble import REPLICATES, _rounded
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
 from tests.calibration.truth import (

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from scissorcal.calibration.parameters import Layout, Parameter
-from scissorcal.calibration.stated_prior import StatedPrior
+from scissorcal.calibration.parameters import Layout, Parameter, StatedPrior
 from scissorcal.model.transforms import LOG
 
 NAMES = ("response_force", "response_exponent", "noise_scale", "kappa")

@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.plateau import plateau_of
-from scissorcal.calibration.stroke_intervals import difference_interval, mean_interval
+from scissorcal.calibration.stroke_intervals import difference_interval, mean_interval, plateau_of
 from scissorcal.calibration.summary import (
     BINS,
     LogSummary,

@@ -28,7 +28,7 @@ def test_bench_trade_prints_settings_and_recommendations(cli: Cli, made: Path) -
     assert said.code == 0, said.err
     assert "coarse" in said.out
     assert "middle is enough" in said.out
-    assert "measured 8 of 8 samples" in said.out
+    assert "8 samples, 8 of them by this run" in said.out
     shown = cli("bench", "trade", "--show", "--json")
     assert shown.code == 0
     assert shown.envelope["result"]["trade"]["measured"] == 8

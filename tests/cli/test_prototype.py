@@ -22,7 +22,7 @@ import pytest
 
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.sim.process import SimProcess
-from scissorcal.recording import RecordingWriter, Stroke, read_recording
+from scissorcal.recording import RecordingFacts, RecordingWriter, Stroke, read_recording
 from scissorcal.render.engine import REQUEST
 from scissorcal.workday.runs.prototype import workspace_hands
 from scissorcal.workday.workspace import Workspace
@@ -286,7 +286,7 @@ def test_a_recording_whose_name_is_no_text_is_a_hand_all_the_same(
     stroke = Stroke(0, "closing", 0.3, 0)
     packed.captures_dir.mkdir(exist_ok=True)
     path = packed.captures_dir / os.fsdecode(b"cut-\xff.mcap")
-    with RecordingWriter(path, "cut", strokes=(stroke,)) as writer:
+    with RecordingWriter(path, "cut", facts=RecordingFacts(strokes=(stroke,))) as writer:
         samples = samples_of(0, 1000)
         samples["stroke"] = 0
         writer.append(samples)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.package import build_package
+from scissorcal.package import PackageOptions, build_package
 from scissorcal.package.manifest import RigRecord
 from scissorcal.recording import read_recording
 from scissorcal.workday.runs.package import recorded_rig
@@ -27,7 +27,9 @@ def package(folder: Path, *, tolerance: float = 7.0, rig: RigRecord | None = Non
     friction = friction_fit(coulomb=0.014, stribeck=0.004, viscous=0.002)
     cut = cut_fit(chosen, kappa=0.75, energy=0.52)
     path = folder / "package.zip"
-    build_package(chosen, friction, cut, path, np.random.default_rng(1), rig=rig)
+    build_package(
+        chosen, friction, cut, path, np.random.default_rng(1), options=PackageOptions(rig=rig)
+    )
     return path
 
 

@@ -26,11 +26,12 @@ def test_it_prints_tables_and_verdicts(
     assert said.code == 0, said.out
     assert "FAIL  " not in said.out
     for words in (
-        "3 fits to simulated data (truths: a normal distribution around the posterior, 3 times as",
-        "noise: white ",
+        "3 fits to data simulated from known values",
+        "(a normal distribution around the posterior, 3 times as wide",
+        "; white ",
         "effort_rms",
-        "two halves: whole strokes of a kind, alternating by speed",
-        "power-scaling sensitivity to prior and likelihood",
+        "they do not share (whole strokes of a kind, alternating by speed).",
+        "Trust check: prior sensitivity",
         "----  verify.friction  calibration",
         "pass  verify.friction  halves-effort",
     ):
@@ -60,7 +61,7 @@ def test_a_rig_that_changed_ends_with_three(
     assert "FAIL  fit.friction  recordings" in said.out
     assert "The rig changed between recordings" in said.out
     said = cli("verify", "friction", "--checks", "halves", "--workers", "1")
-    assert "two halves: whole recordings, 1 of 2 in one half" in said.out
+    assert "(whole recordings, 1 of 2 in one half)" in said.out
 
 
 def test_wrong_words_and_a_missing_fit_are_refused(

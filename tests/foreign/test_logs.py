@@ -13,11 +13,17 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.signals.sensors import channels_of
 from scissorcal.calibration.signals.survey import survey
 from scissorcal.errors import InputError
-from scissorcal.recording import Joint, Recording, import_table
+from scissorcal.recording import ImportOptions, Joint, Recording, import_table
+from scissorcal.recording.faulty_values import (
+    continued_clock,
+    jumps_in,
+    lone_excursion,
+    marks_in,
+    overflows,
+)
 from scissorcal.recording.layout import empty_samples
-from scissorcal.recording.marks import lone_excursion, marks_in
-from scissorcal.recording.plausible import size_note
-from scissorcal.recording.wraps import continued_clock, jumps_in, overflows
+from scissorcal.recording.quantities import size_note
+from tests.recording.logs import imported
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "logs"
 COUNT, RATE_HZ = 1600, 200.0
@@ -44,7 +50,7 @@ def read(
     path = folder / "log.csv"
     path.write_text("\n".join([*rows, ""]), encoding="utf-8")
     chosen = {"columns": {"time": 0, "opening": 1, "handle_force": 2}, "handle_radius_m": 0.06}
-    return import_table(path, **{**chosen, **options})  # type: ignore[arg-type]
+    return imported(path, **{**chosen, **options})
 
 
 def told(recording: Recording) -> str:
@@ -65,7 +71,7 @@ def test_the_logs_of_others(name: str, effort: str, said: str) -> None:
         pytest.skip(f"{path.name} is not beside the project")
     channel = "handle_force" if effort == "force_N" else "motor_torque"
     columns = {"time": "time_s", "opening": "angle_deg", channel: effort}
-    recording = import_table(path, columns=columns, handle_radius_m=0.06)
+    recording = import_table(path, columns=columns, options=ImportOptions(handle_radius_m=0.06))
     notes = [*recording.notes, *survey(recording, ("opening", channel)).notes]
     assert said in " ".join(notes)
     assert len(recording.strokes) == 12
@@ -180,7 +186,12 @@ def test_commas_in_numbers_between_commas_are_refused(tmp_path: Path, cells: str
     path = tmp_path / "log.csv"
     path.write_text("\n".join(["t,angle,force", *[cells] * 30, ""]), encoding="utf-8")
     with pytest.raises(InputError, match="6 cells, and line 1 has 3 headings"):
-        import_table(path, columns={"time": 0, "opening": 2}, units={"time": "s"}, motion_only=True)
+        import_table(
+            path,
+            columns={"time": 0, "opening": 2},
+            units={"time": "s"},
+            options=ImportOptions(motion_only=True),
+        )
 
 
 @given(

@@ -11,6 +11,7 @@ from scipy import stats
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.inference import (
+    InferOptions,
     NotFiniteError,
     Problem,
     SamplingStatus,
@@ -107,15 +108,33 @@ def test_what_importance_cannot_do_goes_to_ensembles_and_says_so() -> None:
     narrow = problem_of(
         lambda u: -0.5 * float(u[0] ** 2 / 4 + ((u[1] - u[0] ** 2) / 0.1) ** 2), [[1.0, 1.0]]
     )
-    found = infer(narrow, "standard", np.random.default_rng(3), count=1000, budget=112_000)
+    found = infer(
+        narrow,
+        "standard",
+        np.random.default_rng(3),
+        count=1000,
+        options=InferOptions(budget=112_000),
+    )
     assert found.effort_reached == "thorough"
     assert "Escalated from standard" in found.sentence
     assert found.status is SamplingStatus.BUDGET_USED_UP
     assert not found.status.trusted
-    poor = infer(narrow, "standard", np.random.default_rng(3), count=1000, budget=20_000)
+    poor = infer(
+        narrow,
+        "standard",
+        np.random.default_rng(3),
+        count=1000,
+        options=InferOptions(budget=20_000),
+    )
     assert (poor.effort_reached, poor.status) == ("standard", SamplingStatus.HEAVY_WEIGHTS)
     assert "ensembles need at least" in poor.sentence
-    calm = infer(narrow, "standard", np.random.default_rng(3), count=1000, escalate=False)
+    calm = infer(
+        narrow,
+        "standard",
+        np.random.default_rng(3),
+        count=1000,
+        options=InferOptions(escalate=False),
+    )
     assert calm.evaluations < 10_000
     assert not calm.status.trusted
 
@@ -228,7 +247,9 @@ def test_slopes_that_are_nan_beside_the_optimum_are_an_error_that_names_them() -
 def test_walkers_that_never_move_do_not_read_as_converged() -> None:
     """All walkers share one value of b, so no difference between them ever moves it."""
     start = Mixture(np.ones(1), np.zeros((1, 2)), np.diag([1.0, 0.0])[None])
-    chains = run_ensembles(normal(np.eye(2)), start, np.random.default_rng(0), budget=500_000)
+    chains = run_ensembles(
+        normal(np.eye(2)), start, np.random.default_rng(0), InferOptions(500_000)
+    )
     assert chains.status is SamplingStatus.STUCK
     assert np.isnan(chains.tau[1])
     assert np.isfinite(chains.tau[0])
@@ -244,7 +265,7 @@ def test_a_posterior_that_accepts_nothing_is_stuck() -> None:
         return 0.0 if u.tobytes() in allowed else -np.inf
 
     start = Mixture(np.ones(1), np.zeros((1, 2)), np.eye(2)[None])
-    chains = run_ensembles(once, start, np.random.default_rng(0), budget=500_000)
+    chains = run_ensembles(once, start, np.random.default_rng(0), InferOptions(500_000))
     assert chains.status is SamplingStatus.STUCK
     assert chains.acceptance == 0.0
 
@@ -258,7 +279,7 @@ def test_a_killed_run_goes_on_as_if_it_had_not_been(tmp_path: Path) -> None:
 
     def run(checkpoint: Path | None, target: Problem = problem):
         rng = np.random.default_rng(5)
-        return infer(target, "thorough", rng, checkpoint=checkpoint, budget=35_000)
+        return infer(target, "thorough", rng, options=InferOptions(35_000, checkpoint=checkpoint))
 
     whole = run(None)
     independent = whole.evaluations / (2.0 * whole.tau.max())
@@ -291,18 +312,23 @@ def test_a_checkpoint_of_another_posterior_is_refused_and_kept(tmp_path: Path) -
     path = tmp_path / "not there yet" / "walks.npz"
     rng = np.random.default_rng(0)
     problem = problem_of(normal(np.eye(2)), [[1.0, 1.0]])
-    infer(problem, "thorough", rng, checkpoint=path, budget=20_000)
+    infer(problem, "thorough", rng, options=InferOptions(20_000, checkpoint=path))
     before = path.read_bytes()
     for other in (
         problem_of(normal(2 * np.eye(2)), [[1.0, 1.0]]),
         problem_of(normal(CORRELATED), [[1.0, 1.0, 1.0]]),
     ):
         with pytest.raises(ValueError, match=r"walks\.npz: this checkpoint is of another"):
-            infer(other, "thorough", rng, checkpoint=path)
+            infer(other, "thorough", rng, options=InferOptions(checkpoint=path))
     assert path.read_bytes() == before
     path.write_bytes(before[: len(before) // 2])
     with pytest.raises(ValueError, match=r"walks\.npz: not a readable checkpoint"):
-        infer(problem_of(normal(np.eye(2)), [[1.0, 1.0]]), "thorough", rng, checkpoint=path)
+        infer(
+            problem_of(normal(np.eye(2)), [[1.0, 1.0]]),
+            "thorough",
+            rng,
+            options=InferOptions(checkpoint=path),
+        )
 
 
 def test_a_checkpoint_with_a_long_header_is_refused_in_one_line(tmp_path: Path) -> None:
@@ -313,14 +339,15 @@ def test_a_checkpoint_with_a_long_header_is_refused_in_one_line(tmp_path: Path) 
         np.savez(path, **long_header)
     problem = problem_of(normal(np.eye(2)), [[1.0, 1.0]])
     with pytest.raises(ValueError, match="not a readable checkpoint") as caught:
-        infer(problem, "thorough", np.random.default_rng(0), checkpoint=path)
+        infer(problem, "thorough", np.random.default_rng(0), options=InferOptions(checkpoint=path))
     assert "\n" not in str(caught.value)
 
 
 def test_the_generator_alone_decides_what_is_drawn() -> None:
     problem = problem_of(normal(np.eye(2)), [[1.0, 1.0]])
     first, second, other = (
-        infer(problem, "thorough", np.random.default_rng(seed), budget=17_000) for seed in (7, 7, 8)
+        infer(problem, "thorough", np.random.default_rng(seed), options=InferOptions(17_000))
+        for seed in (7, 7, 8)
     )
     np.testing.assert_array_equal(first.draws, second.draws)
     assert not np.array_equal(first.draws, other.draws)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from scissorcal.inference import (
+    InferOptions,
     NotFiniteError,
     Problem,
     find_optimum,
@@ -14,9 +15,9 @@ from scissorcal.inference import (
     smooth_weights,
     tails_of,
 )
+from scissorcal.inference.ascent import least_squares
 from scissorcal.inference.between import between_groups
 from scissorcal.inference.importance import sample_by_importance
-from scissorcal.inference.least_squares import least_squares
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.thorough import rank_r_hat
 
@@ -42,7 +43,7 @@ def test_weight_on_a_few_draws_is_not_trusted_whatever_its_tail() -> None:
     proposal = Mixture.of(np.ones(1), np.zeros((1, 1)), np.eye(1)[None])
     rng = np.random.default_rng(1)
     sampled = sample_by_importance(
-        lambda u: 0.0 if abs(u[0]) < 2e-3 else -60.0, proposal, 2000, rng, rounds=1
+        lambda u: np.where(abs(u[:, 0]) < 2e-3, 0.0, -60.0), proposal, 2000, rng, rounds=1
     )
     assert sampled.effective < 50
     assert not sampled.trusted
@@ -57,7 +58,7 @@ def test_a_ridge_that_is_longer_than_its_proposal_is_not_reported_too_short() ->
 
     for seed in (2, 4):
         rng = np.random.default_rng(seed)
-        found = infer(_problem(density, 2, 1.0), "standard", rng, budget=40_000)
+        found = infer(_problem(density, 2, 1.0), "standard", rng, options=InferOptions(40_000))
         assert not found.status.trusted or abs(found.draws[:, 0].std() - 1.0) < 0.15
 
 
@@ -106,7 +107,7 @@ def test_a_prior_far_from_stretched_data_does_not_collapse_the_draws() -> None:
         upper=np.full(2, np.inf),
         standardised=standardised,
     )
-    found = infer(problem, "standard", np.random.default_rng(1), budget=30_000)
+    found = infer(problem, "standard", np.random.default_rng(1), options=InferOptions(30_000))
     assert not found.status.trusted or np.all(found.draws.std(axis=0) > 0.01)
 
 

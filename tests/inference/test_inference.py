@@ -115,7 +115,9 @@ def test_importance_sampling_of_a_correlated_normal_keeps_its_dependence():
     precision = np.linalg.inv(covariance)
     rng = np.random.default_rng(5)
     proposal = Mixture.of(np.ones(1), np.array([[0.5, 0.0]]), 2 * np.eye(2)[None])
-    sampled = sample_by_importance(lambda u: -0.5 * float(u @ precision @ u), proposal, 4000, rng)
+    sampled = sample_by_importance(
+        lambda u: -0.5 * np.sum((u @ precision) * u, axis=1), proposal, 4000, rng
+    )
     draws = sampled.resample(4000, rng)
     assert sampled.k_hat < 0.7
     assert np.cov(draws, rowvar=False) == pytest.approx(covariance, abs=0.12)
@@ -127,7 +129,7 @@ def test_draws_of_several_proposals_are_weighed_as_those_of_their_mixture():
     parts = [Mixture.of(np.ones(1), np.array([[c, 0.0]]), 0.5 * np.eye(2)[None]) for c in (-1, 1)]
 
     def height(u):
-        return -0.5 * float(u @ u) if u[0] < 2.5 else -np.inf
+        return np.where(u[:, 0] < 2.5, -0.5 * np.sum(u**2, axis=1), -np.inf)
 
     seen = [sample_by_importance(height, part, 8000, rng, rounds=1) for part in parts]
     both = pooled(seen)
@@ -150,21 +152,21 @@ def test_a_mixture_is_drawn_from_until_as_many_draws_are_effective_as_were_asked
     found = []
     for budget in (200_000, 14_000):
         rng = np.random.default_rng(3)
-        begun = sample_by_importance(lambda u: float(many(u[None])[0]), first, 2000, rng, many=many)
-        given = (lambda u: 0.0, begun, first, 2000, rng, budget, many)
+        begun = sample_by_importance(many, first, 2000, rng)
+        given = (many, begun, first, 2000, rng, budget)
         found.append(sample_by_mixture(*given))
         assert found[-1].evaluations <= begun.evaluations + budget
     enough, short = found
     assert (enough.trusted, short.trusted) == (True, False)
     assert enough.effective >= enough.wanted == 2000
     assert short.k_hat <= short.limit, "it lacks draws alone"
-    assert sample_by_mixture(*given[:5], 4_000, many) is None
+    assert sample_by_mixture(*given[:5], 4_000) is None
 
 
 def test_a_hopeless_proposal_is_said_to_be_one():
     rng = np.random.default_rng(6)
     sampled = sample_by_importance(
-        lambda u: -0.5 * float(np.sum((u - 60.0) ** 2)),
+        lambda u: -0.5 * np.sum((u - 60.0) ** 2, axis=1),
         Mixture.of(np.ones(1), np.zeros((1, 2)), 1e-2 * np.eye(2)[None]),
         500,
         rng,

@@ -7,7 +7,7 @@ from scipy.linalg import toeplitz
 
 from scissorcal.aliases import Array
 from scissorcal.inference import ArNoise, Problem, fit_ar, infer, log_density, tails_of
-from scissorcal.inference.long_run import covariance_of_sum
+from scissorcal.inference.autocorrelation import covariance_of_sum
 
 
 def test_covariance_of_a_sum_is_the_toeplitz_quadratic_form():

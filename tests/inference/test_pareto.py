@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scissorcal.inference.pareto import smooth_weights
+from scissorcal.inference.importance import smooth_weights
 from tests.with_arviz import arviz
 
 

@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from scissorcal.aliases import Array
 from scissorcal.inference import Optimum, Problem, find_optimum, optimise
-from scissorcal.inference.counting import Stop
+from scissorcal.inference.problem import Stop
 
 SEEDS = range(6)
 SAME_HEIGHT = 0.01

@@ -9,6 +9,7 @@ import pytest
 from scissorcal.aliases import Array
 from scissorcal.inference import (
     Counter,
+    InferOptions,
     Problem,
     SamplingStatus,
     SearchStatus,
@@ -81,7 +82,9 @@ def test_all_evaluations_are_counted(effort: str, vectorised: bool) -> None:
     problem, counter = decay(), Counter()
     if vectorised:
         problem = replace(problem, log_posterior_many=at_once(problem))
-    found = infer(counter.over(problem), effort, np.random.default_rng(0), budget=20_000)
+    found = infer(
+        counter.over(problem), effort, np.random.default_rng(0), options=InferOptions(20_000)
+    )
     assert found.evaluations == counter.calls
 
 
@@ -127,7 +130,7 @@ def test_sampling_that_runs_out_of_time_gives_the_normal_approximation(
     problem = decay()
     optimum = find_optimum(problem)
     rng = np.random.default_rng(0)
-    found = infer(problem, effort, rng, optimum=optimum, stop=after(calls))
+    found = infer(problem, effort, rng, optimum=optimum, options=InferOptions(stop=after(calls)))
     if effort == "standard" and calls == 3000:
         assert found.status is SamplingStatus.WEIGHED
         return

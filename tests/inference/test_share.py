@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scissorcal.inference import Problem, find_optimum, infer
+from scissorcal.inference.autocorrelation import long_run_covariance
 from scissorcal.inference.laplace import shape_at
-from scissorcal.inference.long_run import long_run_covariance
 from tests.inference.test_long_run import regression, sweeps
 
 TIMES = 40

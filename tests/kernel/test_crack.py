@@ -8,7 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.calibration.verify.simulation import Sheet, Unevenness, crack_law, material_torque
+from scissorcal.calibration.verify.simulated_recordings import (
+    Sheet,
+    Unevenness,
+    crack_law,
+    material_torque,
+)
 from scissorcal.kernel import CrackPath, walk_crack
 from scissorcal.model import Cutting, Edge, Response, settled_contact
 from scissorcal.model.cutting import torque_at
@@ -190,7 +195,7 @@ def test_a_fresh_sheet_is_cut_from_its_edge_and_air_gives_no_force():
     uneven = Unevenness(0.05, 1e-3, 0.01)
     made = [
         material_torque(
-            cutting(), uneven, opening, advance, sheets, TICK_S, np.random.default_rng(seed)
+            cutting(), uneven, (opening, advance, sheets), TICK_S, np.random.default_rng(seed)
         )
         for seed in (1, 1, 2)
     ]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from scissorcal.model import FrictionLaw, friction_torque, presliding_state
 from scissorcal.model.friction import angle_factor, angle_slope, friction_level
-from scissorcal.model.friction_terms import PARAMETERS, TERMS, evaluate, law_names, terms_of
+from scissorcal.model.friction_terms import PARAMETERS, TERMS, law_names, terms_of
 from scissorcal.model.terms import Motion, Role
 from scissorcal.recipe.schema import FitFriction
 
@@ -63,11 +63,11 @@ def test_named_terms_are_added_and_those_of_the_rate_follow_the_place():
 def test_every_term_is_finite_and_as_long_as_its_motion():
     rng = np.random.default_rng(0)
     motion = Motion(*(rng.standard_normal(50) for _ in range(4)))
-    columns = evaluate(tuple(TERMS), motion)
+    columns = np.stack([term.column(motion) for term in TERMS.values()], axis=1)
     assert columns.shape == (50, len(TERMS))
     assert np.all(np.isfinite(columns))
     with pytest.raises(ValueError, match="needs a load"):
-        evaluate(("load*sign",), Motion(motion.opening, motion.rate, motion.acceleration))
+        TERMS["load*sign"].column(Motion(motion.opening, motion.rate, motion.acceleration))
 
 
 def test_terms_of_the_rate_alone_do_not_know_the_place():

@@ -6,7 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scissorcal.package import ModelPackage, PackageSummary, build_package, open_package
+from scissorcal.package import (
+    ModelPackage,
+    PackageOptions,
+    PackageSummary,
+    build_package,
+    open_package,
+)
 from scissorcal.recipe.schema import Recipe
 from tests.package.fits import cut_fit, friction_fit, recipe
 
@@ -141,7 +147,12 @@ def test_coarse_tables_state_a_larger_bound(tmp_path: Path) -> None:
     fit = cut_fit(chosen, energy=None, exponent=2.5)
     shares = [
         build_package(
-            chosen, friction_fit(), fit, tmp_path / "p.zip", np.random.default_rng(1), tolerance=t
+            chosen,
+            friction_fit(),
+            fit,
+            tmp_path / "p.zip",
+            np.random.default_rng(1),
+            options=PackageOptions(tolerance=t),
         ).manifest.bound.share
         for t in (3e-3, 1e-4)
     ]

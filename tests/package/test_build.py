@@ -13,6 +13,7 @@ from scissorcal.calibration import FitResult
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.package import (
     FailedFitsWarning,
+    PackageOptions,
     PackageSummary,
     Review,
     build_package,
@@ -90,7 +91,9 @@ def test_provenance_names_recordings_fits_and_recipe(paper: PackageSummary) -> N
 def test_a_package_carries_the_identity_that_the_workspace_gives_it(tmp_path: Path) -> None:
     chosen, identity = recipe(), "5f" * 32
     fits = friction_fit(), cut_fit(chosen)
-    given = build_package(chosen, *fits, tmp_path / "a.zip", rng(), inputs_hash=identity)
+    given = build_package(
+        chosen, *fits, tmp_path / "a.zip", rng(), options=PackageOptions(inputs_hash=identity)
+    )
     assert given.manifest.provenance.inputs_hash == identity
     outside = build_package(chosen, *fits, tmp_path / "b.zip", rng())
     assert outside.manifest.provenance.inputs_hash == "0" * 64
@@ -112,8 +115,8 @@ def test_a_package_keeps_the_plates_covariance_and_failed_checks(tmp_path: Path)
     path = tmp_path / "p.zip"
     fits = (chosen, friction_fit(), cut_fit(chosen))
     with pytest.raises(VerdictError, match="'scissorcal fit plate' again"):
-        build_package(*fits, path, rng(), plate=plate)
-    build_package(*fits, path, rng(), plate=plate, allow_failed=True)
+        build_package(*fits, path, rng(), options=PackageOptions(plate=plate))
+    build_package(*fits, path, rng(), options=PackageOptions(plate=plate, allow_failed=True))
     package = open_package(path, warn=False)
     record = package.manifest.plate
     assert record is not None
@@ -127,7 +130,12 @@ def test_a_package_keeps_the_plates_covariance_and_failed_checks(tmp_path: Path)
     unsure = replace(plate, rig_plate=replace(plate.rig_plate, covariance=None))
     with pytest.raises(InputError, match="no covariance of its pose"):
         build_package(
-            chosen, friction_fit(), cut_fit(chosen), path, rng(), plate=unsure, allow_failed=True
+            chosen,
+            friction_fit(),
+            cut_fit(chosen),
+            path,
+            rng(),
+            options=PackageOptions(plate=unsure, allow_failed=True),
         )
 
 
@@ -204,7 +212,12 @@ def test_tables_worse_than_the_scene_allows_are_refused(tmp_path: Path) -> None:
     chosen = recipe(tolerance_percent=0.01)
     with pytest.raises(VerdictError, match=r"was not written.*raise its tolerance"):
         build_package(
-            chosen, friction_fit(), cut_fit(chosen), tmp_path / "p.zip", rng(), tolerance=1e-2
+            chosen,
+            friction_fit(),
+            cut_fit(chosen),
+            tmp_path / "p.zip",
+            rng(),
+            options=PackageOptions(tolerance=1e-2),
         )
     assert not list(tmp_path.iterdir())
 
@@ -258,7 +271,12 @@ def test_friction_that_is_not_rendered_may_have_failed(tmp_path: Path) -> None:
 def test_a_package_from_a_failed_fit_says_so_on_every_use(tmp_path: Path) -> None:
     chosen = recipe()
     summary = build_package(
-        chosen, friction_fit(), failed_cut(chosen), tmp_path / "p.zip", rng(), allow_failed=True
+        chosen,
+        friction_fit(),
+        failed_cut(chosen),
+        tmp_path / "p.zip",
+        rng(),
+        options=PackageOptions(allow_failed=True),
     )
     sentence = (
         "The package paper-80gsm was built from fits that failed 1 check, so its torque and its "

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult
-from scissorcal.package.build import pick_draws
+from scissorcal.package.exact import pick_draws
 from scissorcal.package.simplest.candidates import Aspect, Candidate, simpler_candidates
 from scissorcal.package.simplest.difference import Scene, difference, felt
 from scissorcal.package.simplest.law import Law, column

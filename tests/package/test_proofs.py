@@ -1,5 +1,6 @@
 """Proved bounds: never below what a dense search finds, and not far above it."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,19 +19,12 @@ from scissorcal.model.curvature import (
 from scissorcal.model.friction import friction_level
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.bound import ExactTorque
-from scissorcal.package.compile import (
-    TableLaw,
-    compile_model,
-    scene_ranges,
-    table_file,
-    table_laws,
-    table_of,
-)
+from scissorcal.package.compile import compile_model, scene_ranges, table_file, table_laws, table_of
 from scissorcal.package.exact import FitDraws, central_model
 from scissorcal.package.grid import Points
 from scissorcal.package.proved_tables import proved_table, seen_deviation
 from scissorcal.package.proved_torque import proved_torque
-from scissorcal.package.tables import NumberFormat, fit_table
+from scissorcal.package.tables import NumberFormat, TableLaw, fit_table
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.package.test_bound import CASES
 
@@ -39,15 +33,7 @@ FORMATS = st.sampled_from(["float32", "int16"])
 
 def judge(law: TableLaw, tolerance: float, number_format: NumberFormat) -> None:
     """Compare the proved bound of a table with 20,000 places, and with its own search."""
-    fitted = fit_table(
-        law.law,
-        law.derivative,
-        law.low,
-        law.high,
-        tolerance=tolerance,
-        monotone=law.monotone,
-        number_format=number_format,
-    )
+    fitted = fit_table(replace(law, scale=None), tolerance=tolerance, number_format=number_format)
     array = fitted.array.astype(np.float32)
     proof = proved_table(law, array)
     assert proof is not None

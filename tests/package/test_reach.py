@@ -11,7 +11,7 @@ from scissorcal.calibration import FitResult
 from scissorcal.calibration.cut.unknowns import SceneMean
 from scissorcal.model import edge_height
 from scissorcal.model.cutting import within_thickness
-from scissorcal.package import build_package, open_package
+from scissorcal.package import PackageOptions, build_package, open_package
 from scissorcal.package.exact import FitDraws, central_model
 from scissorcal.package.reach import data_reach, reach_sentences
 from scissorcal.package.scene_torque import scene_torque
@@ -65,7 +65,14 @@ def test_what_is_rendered_beyond_the_data_is_stated_for_every_law(
     assert "0.88 mm" in said
     assert "0.4 mm" in said
     path = tmp_path / "package.zip"
-    build_package(chosen, None, short, path, np.random.default_rng(1), allow_failed=True)
+    build_package(
+        chosen,
+        None,
+        short,
+        path,
+        np.random.default_rng(1),
+        options=PackageOptions(allow_failed=True),
+    )
     package = open_package(path)
     assert package.manifest.reach == reach
     assert said in package.warnings

@@ -10,9 +10,8 @@ import pytest
 
 from scissorcal.calibration import FitResult
 from scissorcal.package import build_package, check_package, open_package
-from scissorcal.package.build import pick_draws
 from scissorcal.package.compile import scene_ranges
-from scissorcal.package.exact import FitDraws, exact_model
+from scissorcal.package.exact import FitDraws, exact_model, pick_draws
 from scissorcal.package.grid import spread_points
 from scissorcal.package.simplest.choice import scene_choice, spare_sweeps_s
 from scissorcal.package.simplest.model import Simplified, simplest_model

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from scissorcal.aliases import Array
 from scissorcal.model import Response
-from scissorcal.package.tables import FLOOR, LARGEST_TABLE, fit_table, hermite
+from scissorcal.package.tables import FLOOR, LARGEST_TABLE, TableLaw, fit_table, hermite
 
 FLOAT32_ROUNDING = 2e-6
 """A few float32 roundings while a cubic is evaluated, as a share of its value."""
@@ -34,7 +34,7 @@ def test_response_tables_keep_their_tolerance(
     if family == "exponential":
         law = Response("exponential", force, exponent, max(3e-4, reach / 5))
     fitted = fit_table(
-        law.force_at, law.stiffness_at, 0.0, reach, tolerance=tolerance, monotone=True
+        TableLaw(law.force_at, law.stiffness_at, 0.0, reach, monotone=True), tolerance=tolerance
     )
     assert fitted.met
     assert len(fitted.table.x) <= LARGEST_TABLE
@@ -49,7 +49,7 @@ def test_response_tables_keep_their_tolerance(
 def test_monotone_tables_never_fall(exponent: float, tolerance: float) -> None:
     law = Response("power", 2.0, exponent, 3e-4)
     table = fit_table(
-        law.force_at, law.stiffness_at, 0.0, 1e-3, tolerance=tolerance, monotone=True
+        TableLaw(law.force_at, law.stiffness_at, 0.0, 1e-3, monotone=True), tolerance=tolerance
     ).table
     knots, values, slopes = (a.astype(np.float64) for a in (table.x, table.y, table.slope))
     x = independent_points(float(knots[0]), float(knots[-1]))
@@ -65,7 +65,7 @@ def test_hermite_passes_through_values_and_slopes() -> None:
 
 def test_a_cubic_needs_two_knots_only() -> None:
     fitted = fit_table(
-        lambda x: 1 - x + 4 * x**3, lambda x: -1 + 12 * x**2, -1.0, 2.0, tolerance=1e-5
+        TableLaw(lambda x: 1 - x + 4 * x**3, lambda x: -1 + 12 * x**2, -1.0, 2.0), tolerance=1e-5
     )
     assert len(fitted.table.x) == 2
     assert fitted.met
@@ -74,10 +74,12 @@ def test_a_cubic_needs_two_knots_only() -> None:
 def test_knots_gather_where_the_law_bends() -> None:
     """A friction level falls steeply at low rates and is nearly straight beyond."""
     fitted = fit_table(
-        lambda w: 0.01 + 0.006 * np.exp(-((w / 0.02) ** 2)),
-        lambda w: -0.012 * w / 4e-4 * np.exp(-((w / 0.02) ** 2)),
-        0.0,
-        2.0,
+        TableLaw(
+            lambda w: 0.01 + 0.006 * np.exp(-((w / 0.02) ** 2)),
+            lambda w: -0.012 * w / 4e-4 * np.exp(-((w / 0.02) ** 2)),
+            0.0,
+            2.0,
+        ),
         tolerance=1e-4,
     )
     assert fitted.met
@@ -86,7 +88,9 @@ def test_knots_gather_where_the_law_bends() -> None:
 
 def test_a_table_with_too_few_knots_reports_its_error() -> None:
     fitted = fit_table(
-        np.sqrt, lambda x: 0.5 / np.sqrt(x), 0.0, 1.0, tolerance=1e-6, monotone=True, largest=12
+        TableLaw(np.sqrt, lambda x: 0.5 / np.sqrt(x), 0.0, 1.0, monotone=True),
+        tolerance=1e-6,
+        largest=12,
     )
     assert len(fitted.table.x) == 12
     assert not fitted.met
@@ -96,7 +100,8 @@ def test_scale_sets_where_precision_may_end() -> None:
     law = Response("power", 2.0, 4.0, 3e-4)
     coarse, fine = (
         fit_table(
-            law.force_at, law.stiffness_at, 0, 3e-3, tolerance=1e-4, monotone=True, scale=scale
+            TableLaw(law.force_at, law.stiffness_at, 0, 3e-3, monotone=True, scale=scale),
+            tolerance=1e-4,
         ).table
         for scale in (None, 1.0)
     )
@@ -120,4 +125,4 @@ def test_a_law_that_no_table_can_represent_is_refused(
     law: object, low: float, high: float, words: str
 ) -> None:
     with pytest.raises(ValueError, match=words):
-        fit_table(law, np.ones_like, low, high, tolerance=1e-3, monotone=True)  # type: ignore[arg-type]
+        fit_table(TableLaw(law, np.ones_like, low, high, monotone=True), tolerance=1e-3)  # type: ignore[arg-type]

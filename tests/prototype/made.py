@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from scissorcal.prototype.rig_commands import RigCommand
 from scissorcal.prototype.server import PrototypeServer
-from scissorcal.recording import RecordingWriter, layout
+from scissorcal.recording import RecordingFacts, RecordingWriter, layout
 from tests.guard import GUARD_S
 
 POLICY = "default-src 'none'"
@@ -96,4 +96,6 @@ def samples_of(first: int, count: int, rate_Hz: float = 1000.0) -> NDArray[np.vo
 
 def a_writer(folder: Path, kind: Any = "render", name: str = "render-1.mcap") -> RecordingWriter:
     (folder / "captures").mkdir(exist_ok=True)
-    return RecordingWriter(folder / "captures" / name, kind, handle_radius_m=0.07)
+    return RecordingWriter(
+        folder / "captures" / name, kind, facts=RecordingFacts(handle_radius_m=0.07)
+    )

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.friction.typical import at_typical
+from scissorcal.calibration.friction.layout import at_typical
 from scissorcal.kernel import Kernel
 from scissorcal.kernel.tables import Table
 from scissorcal.model.edge import Edge

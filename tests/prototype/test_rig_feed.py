@@ -12,9 +12,9 @@ import pytest
 
 from scissorcal.prototype.rig_feed import COLUMNS, Look, QUIET_s, RigFeed
 from scissorcal.recording.following import RecordingFollower
-from scissorcal.recording.partfile import create_locked
-from scissorcal.recording.plate_channels import POSE
 from scissorcal.recording.recovering import recover
+from scissorcal.recording.samplefile import create_locked
+from scissorcal.recording.telemetry import POSE
 from tests.guard import GUARD_S
 
 from .made import a_writer, samples_of

@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass
 
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
-from scissorcal.device.probe.result import ProbeResult
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recording.probe import ProbeResult
 
 from .link import RigLink
 from .person import Person

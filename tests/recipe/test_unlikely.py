@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.everyday import EVERYDAY
 from scissorcal.recipe.explain import table_model
 from scissorcal.recipe.library import builtin_recipe, recipe_names, recipe_path
 from scissorcal.recipe.load import parse_recipe
@@ -17,7 +16,7 @@ from scissorcal.recipe.priors import AnyPrior, NormalPrior
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recipe.show import as_toml, recipe_settings
 from scissorcal.recipe.units import split_unit
-from scissorcal.recipe.unlikely import MARGIN, QUANTITY_OF, bounds, unlikely_numbers
+from scissorcal.recipe.unlikely import EVERYDAY, MARGIN, QUANTITY_OF, bounds, unlikely_numbers
 
 PAPER = recipe_path("paper-80gsm").read_text(encoding="utf-8")
 

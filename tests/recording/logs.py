@@ -1,5 +1,6 @@
 """A made-up log, as a table in text, and what an import of it must hold."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.recording import Recording, import_table
+from scissorcal.recording import ImportOptions, Recording, import_table
 
 COLUMNS: dict[str, str | int] = {"time": "t", "opening": "angle", "motor_torque": "torque"}
 UNITS = {"time": "s", "opening": "rad", "motor_torque": "Nm"}
@@ -37,8 +38,15 @@ def assert_holds(recording: Recording, table: list[list[float]]) -> None:
     np.testing.assert_array_equal(recording.samples["motor_torque"], expected[:, 2])
 
 
+def imported(path: Path, **chosen: Any) -> Recording:
+    """`import_table`, with its options among the other keywords."""
+    names = {field.name for field in fields(ImportOptions)} & set(chosen)
+    options = ImportOptions(**{name: chosen.pop(name) for name in names})
+    return import_table(path, **chosen, options=options)
+
+
 def refusal(path: Path, **options: Any) -> str:
     chosen = {"columns": COLUMNS, "units": UNITS, **options}
     with pytest.raises(InputError) as caught:
-        import_table(path, **chosen)
+        imported(path, **chosen)
     return str(caught.value)

@@ -5,7 +5,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording, RecordingWriter, Stroke
+from scissorcal.recording import (
+    SAMPLE_DTYPE,
+    Joint,
+    Recording,
+    RecordingFacts,
+    RecordingWriter,
+    Stroke,
+)
 
 EPOCH_NS = 1_700_000_000_000_000_000
 
@@ -43,7 +50,7 @@ def made_recording(count: int = 3000) -> Recording:
 
 def written_live(path: Path, samples: NDArray[np.void], batch: int = 20) -> Path:
     """Write samples as a capture does: in small batches, with a note and an attachment."""
-    with RecordingWriter(path, "friction", recipe_toml="x = 1\n") as writer:
+    with RecordingWriter(path, "friction", facts=RecordingFacts(recipe_toml="x = 1\n")) as writer:
         for start in range(0, len(samples), batch):
             if start == 10 * batch:
                 writer.note("The hand rested.")

@@ -10,7 +10,14 @@ from pyarrow import csv
 from pyarrow import parquet as pq
 
 from scissorcal.errors import InputError
-from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording, export_table, import_table
+from scissorcal.recording import (
+    SAMPLE_DTYPE,
+    ImportOptions,
+    Joint,
+    Recording,
+    export_table,
+    import_table,
+)
 from scissorcal.recording.layout import column_name
 from tests.recording.made import made_recording, made_samples
 
@@ -47,8 +54,7 @@ def test_an_export_is_imported_without_stating_units(tmp_path: Path, suffix: str
             "opening": "opening_rad",
             **{channel: column_name(channel, recording.joint) for channel in channels},
         },
-        kind="cut",
-        handle_radius_m=0.06,
+        options=ImportOptions(kind="cut", handle_radius_m=0.06),
     )
     for channel in ("opening", *channels):
         np.testing.assert_array_equal(found.samples[channel], recording.samples[channel])

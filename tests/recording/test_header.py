@@ -10,6 +10,7 @@ import pytest
 from scissorcal.errors import InputError
 from scissorcal.recording import (
     Joint,
+    RecordingFacts,
     RecordingWriter,
     read_header,
     read_recording,
@@ -44,7 +45,9 @@ def test_it_is_read_without_numpy_pydantic_or_mcap(tmp_path: Path) -> None:
 
 
 def test_strokes_that_are_found_from_the_motion_are_not_in_it(tmp_path: Path) -> None:
-    with RecordingWriter(tmp_path / "r.mcap", "cut", min_travel=0.1) as writer:
+    with RecordingWriter(
+        tmp_path / "r.mcap", "cut", facts=RecordingFacts(min_travel=0.1)
+    ) as writer:
         writer.append(made_samples(2000))
     header = read_header(tmp_path / "r.mcap")
     assert (header.strokes, header.min_travel) == ((), 0.1)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from scissorcal.errors import InputError
 from scissorcal.recording import (
+    ImportOptions,
     Joint,
     content_hash,
     import_table,
@@ -43,7 +44,10 @@ def test_delimiters_and_headings_are_found(
 def test_a_delimiter_may_be_named(tmp_path: Path) -> None:
     for name, character in (("tab", "\t"), ("\\t", "\t"), ("space", " "), (":", ":"), (";", ";")):
         path = written(tmp_path / "log.csv", rows(), character)
-        assert_holds(import_table(path, columns=COLUMNS, units=UNITS, delimiter=name), rows())
+        assert_holds(
+            import_table(path, columns=COLUMNS, units=UNITS, options=ImportOptions(delimiter=name)),
+            rows(),
+        )
     for nonsense in ("comma", ";;", "1", ".", '"'):
         assert "cannot separate the columns" in refusal(path, delimiter=nonsense)
     assert "has no row of numbers" in refusal(path, delimiter="|")
@@ -100,7 +104,10 @@ def test_units(tmp_path: Path, channel: str, unit: str, joint: Any, factor: floa
         units = {"time": "s", "opening": "m", "motor_torque": "N"}
     path = written(tmp_path / "log.csv", table.tolist())
     recording = import_table(
-        path, columns=COLUMNS, units={**units, channel: unit}, joint=Joint(joint)
+        path,
+        columns=COLUMNS,
+        units={**units, channel: unit},
+        options=ImportOptions(joint=Joint(joint)),
     )
     expected = np.array(rows())
     found = recording.device_time_s if channel == "time" else recording.samples[channel]
@@ -188,7 +195,9 @@ def test_gaps_are_refused_or_kept_and_noted(tmp_path: Path) -> None:
     assert "Allow gaps" in message
     assert "bridges gaps of up to 0.05 s (here 2 of 2)" in message
     assert "about 0.04 s of 3.96 s" in message
-    recording = import_table(path, columns=COLUMNS, units=UNITS, allow_gaps=True)
+    recording = import_table(
+        path, columns=COLUMNS, units=UNITS, options=ImportOptions(allow_gaps=True)
+    )
     assert_holds(recording, table)
     note = "4 frames are missing in 2 gaps, the longest (3 frames) at 0.490 s."
     assert note in recording.notes

@@ -19,10 +19,15 @@ from scissorcal.recording import (
     recover,
     summary,
 )
-from scissorcal.recording.channels import CHANNELS
 from scissorcal.recording.exporting import channel_columns
-from scissorcal.recording.plate_channels import FRAME, PICTURE, POSE, frame_rows
-from scissorcal.recording.telemetry import TelemetryChannel
+from scissorcal.recording.telemetry import (
+    CHANNELS,
+    FRAME,
+    PICTURE,
+    POSE,
+    TelemetryChannel,
+    frame_rows,
+)
 from tests.recording.made import EPOCH_NS, made_samples
 
 COUNT = 60

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from scissorcal.recording import Joint, import_table, read_recording, write_recording
+from scissorcal.recording import ImportOptions, Joint, import_table, read_recording, write_recording
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 EMPS = DATA / "emps" / "DATA_EMPS.mat"
@@ -21,7 +21,7 @@ def test_emps_keeps_every_bit(tmp_path: Path) -> None:
         columns={"time": "t", "opening": "qm", "motor_torque": "vir"},
         units={"time": "s", "opening": "m", "motor_torque": "V"},
         scale={"motor_torque": "gtau"},
-        joint=Joint("linear"),
+        options=ImportOptions(joint=Joint("linear")),
     )
     raw = loadmat(EMPS)
     assert len(recording.samples) == 24_841

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from scissorcal.calibration.signals.survey import survey
 from scissorcal.errors import InputError
-from scissorcal.recording import Joint, Recording, import_table, textfile
+from scissorcal.recording import ImportOptions, Joint, Recording, import_table, textfile
 from scissorcal.recording.resolution import noise_of, stroke_threshold
+from tests.recording.logs import imported
 
 HEAD = "t_ms,angle_deg,force_g"
 COLUMNS: dict[str, str | int] = {"time": 0, "opening": 1, "handle_force": 2}
@@ -34,7 +35,7 @@ def log(step_deg: float = 0.25, noise_deg: float = 0.0) -> Lines:
 def read(path: Path, lines: Lines, end: str = "\n", **options: object) -> Recording:
     path.write_bytes("\n".join(lines).encode() + end.encode())
     chosen = {"columns": COLUMNS, "handle_radius_m": 0.06, **options}
-    return import_table(path, **chosen)  # type: ignore[arg-type]
+    return imported(path, **chosen)
 
 
 def garbled(lines: Lines) -> Lines:
@@ -190,7 +191,7 @@ def test_a_heading_may_end_in_a_unit_of_force(tmp_path: Path, heading: str) -> N
     rows = [f"{0.01 * i:.2f},{30 + 20 * np.cos(0.05 * i):.3f},100" for i in range(500)]
     path.write_text("\n".join([f"t_s,angle_deg,{heading}", *rows, ""]), encoding="utf-8")
     columns = {"time": "t_s", "opening": "angle_deg", "handle_force": heading}
-    made = import_table(path, columns=columns, handle_radius_m=0.06)
+    made = import_table(path, columns=columns, options=ImportOptions(handle_radius_m=0.06))
     assert made.samples["handle_force"][0] == pytest.approx(0.980665, rel=1e-6)
 
 
@@ -211,7 +212,9 @@ def test_a_file_of_more_lines_than_are_read_is_refused(
     path = tmp_path / "log.csv"
     path.write_text("1\n" * 101, encoding="utf-8")
     with pytest.raises(InputError, match="has 101 lines, and 100 are read at most"):
-        import_table(path, columns={"opening": 0}, rate_Hz=1.0, motion_only=True)
+        import_table(
+            path, columns={"opening": 0}, rate_Hz=1.0, options=ImportOptions(motion_only=True)
+        )
 
 
 def test_the_survey_finds_steps_ends_and_gaps(tmp_path: Path) -> None:
@@ -225,8 +228,7 @@ def test_the_survey_finds_steps_ends_and_gaps(tmp_path: Path) -> None:
     found = import_table(
         path,
         columns={"time": 0, "opening": 1, "handle_force": 2},
-        handle_radius_m=0.06,
-        allow_gaps=True,
+        options=ImportOptions(handle_radius_m=0.06, allow_gaps=True),
     )
     seen = survey(found, ("opening", "handle_force"))
     opening, handle = seen.sensors

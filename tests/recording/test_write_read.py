@@ -16,6 +16,7 @@ from scissorcal.recording import (
     SAMPLE_DTYPE,
     Joint,
     Recording,
+    RecordingFacts,
     RecordingWriter,
     Stroke,
     content_hash,
@@ -250,7 +251,9 @@ def test_samples_of_another_layout_are_refused(tmp_path: Path) -> None:
 
 def test_strokes_are_found_from_motion_with_their_sheets(tmp_path: Path) -> None:
     samples = made_samples(4000, strokes=False)  # half a turn a second: 2 closing, 2 opening
-    with RecordingWriter(tmp_path / "a.mcap", "cut", min_travel=0.1) as writer:
+    with RecordingWriter(
+        tmp_path / "a.mcap", "cut", facts=RecordingFacts(min_travel=0.1)
+    ) as writer:
         writer.mark_sheet(0)
         writer.append(samples[:2000])
         writer.mark_sheet(1)
@@ -264,13 +267,17 @@ def test_strokes_are_found_from_motion_with_their_sheets(tmp_path: Path) -> None
     ]
     assert set(found.samples["stroke"]) == {0, 1, 2, 3}
     with pytest.raises(ValueError, match="not both"):
-        RecordingWriter(tmp_path / "b.mcap", "cut", strokes=(Stroke(0, "closing"),), min_travel=1)
+        RecordingWriter(
+            tmp_path / "b.mcap",
+            "cut",
+            facts=RecordingFacts(strokes=(Stroke(0, "closing"),), min_travel=1),
+        )
 
 
 def test_strokes_that_are_stated_while_it_runs_survive_a_killed_capture(tmp_path: Path) -> None:
     strokes = (Stroke(0, "closing", 0.5, 0), Stroke(1, "opening", 1.0, 0))
     path = tmp_path / "cut.mcap"
-    writer = RecordingWriter(path, "cut", recipe_toml="a = 1\n")
+    writer = RecordingWriter(path, "cut", facts=RecordingFacts(recipe_toml="a = 1\n"))
     writer.append(made_samples(50))
     writer.state_strokes(strokes[:1])
     writer.append(made_samples(50))

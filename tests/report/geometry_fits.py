@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 
 from scissorcal.calibration.camera.result import CameraFit, CrossValidation, PixelMap, ViewError
-from scissorcal.calibration.edge.cells import FoundNick
 from scissorcal.calibration.edge.result import (
     Band,
     BladeFit,
     BladeResult,
+    FoundNick,
     PhotographRow,
     RungRow,
 )

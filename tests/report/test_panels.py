@@ -23,7 +23,7 @@ from scissorcal.report.subjects.decision import (
     weaknesses_panel,
 )
 from scissorcal.report.subjects.torque import group_strokes, torque_panel
-from scissorcal.report.text import panel_text
+from scissorcal.report.text import LARGEST_WIDTH, panel_text
 from scissorcal.verdicts import Verdict
 from tests.report.conftest import paper
 from tests.report.fits import (
@@ -358,3 +358,15 @@ def test_a_sheet_takes_units_from_names() -> None:
 
 def _summary(source: str, digest: str, strokes: tuple[Stroke, ...]) -> RecordingSummary:
     return replace(cut_recording(), source=source, content_hash=digest, strokes=strokes)
+
+
+def test_the_terminal_keeps_to_a_width_and_writes_the_note_of_a_row() -> None:
+    names = [f"a quantity with a long name, {place}" for place in range(9)]
+    wide = Row("a", tuple(Value(name, 1.5, "N m") for name in names))
+    text = panel_text(Panel("p", "cut", "Rows", rows=(wide, Row("b", note="Failed: no result."))))
+    title, head, first, second, rest = text.splitlines()
+    assert max(map(len, (head, first))) <= LARGEST_WIDTH
+    assert head.split("  ")[-1] == f"{names[2]} [N m]"
+    assert "Failed: no result." in second
+    assert rest.strip() == "... and 6 more columns"
+    assert title == "Rows"

@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.edge_force import EdgePlace, force_along_edge
-from scissorcal.calibration.cut.fracture_work import fracture_work
-from scissorcal.calibration.cut.response_curve import response_curve
+from scissorcal.calibration.cut.curves import (
+    EdgePlace,
+    force_along_edge,
+    fracture_work,
+    response_curve,
+)
 from scissorcal.calibration.friction.curve import friction_curve, friction_map
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError

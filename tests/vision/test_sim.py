@@ -5,6 +5,7 @@ import math
 import cv2
 import numpy as np
 import pytest
+from benchmarks.photographs import centreline_turn, random_looks
 
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.sim import (
@@ -15,11 +16,10 @@ from scissorcal.vision.sim import (
     SimPose,
     as_jpeg,
     blade_layer,
-    random_looks,
     render,
     target_layers,
 )
-from scissorcal.vision.sim.coverage import coverage
+from scissorcal.vision.sim.optics import coverage
 from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD
 
 SHARP = Looks(exposure=0.9, softness_px=0.0)
@@ -149,8 +149,8 @@ def test_a_blade_covers_the_sheet_except_in_its_hole():
 
 
 def test_the_centreline_of_a_symmetric_blade_is_its_x_axis():
-    assert BladeShape(back_m=0.008, back_slope=-math.tan(0.035)).centreline_turn() == pytest.approx(
+    assert centreline_turn(BladeShape(back_m=0.008, back_slope=-math.tan(0.035))) == pytest.approx(
         0.0, abs=1e-9
     )
-    turned = BladeShape(back_m=0.008, back_slope=-math.tan(0.035) + 0.02).centreline_turn()
+    turned = centreline_turn(BladeShape(back_m=0.008, back_slope=-math.tan(0.035) + 0.02))
     assert turned == pytest.approx(0.01, abs=1e-3)

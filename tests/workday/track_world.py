@@ -14,7 +14,7 @@ from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.surface import Plane
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import parse_recipe, read_text
-from scissorcal.recipe.photograph_priors import PlatePriors
+from scissorcal.recipe.priors import PlatePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.tracking.contacts import TipContacts
 from scissorcal.tracking.rotation import pose_error

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scissorcal.calibration.cut import CutExperiment, cut_experiment, cutting_from, fit_cut
-    from scissorcal.calibration.fit_model import Experiment
+    from scissorcal.calibration.fit_model import CutRun, Experiment, FrictionRun
     from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
     from scissorcal.calibration.friction.model import FrictionExperiment
     from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
@@ -13,11 +13,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CutExperiment",
+    "CutRun",
     "Experiment",
     "FitResult",
     "FitSeries",
     "FittedParameter",
     "FrictionExperiment",
+    "FrictionRun",
     "StrokeError",
     "cut_experiment",
     "cutting_from",
@@ -35,7 +37,7 @@ _HOMES = {
     "cut.fit": ("cut_experiment", "fit_cut"),
     "cut.model": ("CutExperiment",),
     "cut.structure": ("cutting_from",),
-    "fit_model": ("Experiment",),
+    "fit_model": ("CutRun", "Experiment", "FrictionRun"),
     "friction.fit": ("fit_friction", "friction_experiment"),
     "friction.model": ("FrictionExperiment",),
     "result": ("FitResult", "FitSeries", "FittedParameter", "StrokeError"),

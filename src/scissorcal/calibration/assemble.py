@@ -1,24 +1,27 @@
 """Put a posterior and the compared candidates into the result that people read."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import PurePath
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from scissorcal.aliases import Array, Integers
+from scissorcal.aliases import Array
+from scissorcal.calibration.candidates import DRAWS, LeftOut
 from scissorcal.calibration.checks import trust_verdicts
-from scissorcal.calibration.comparison import candidate_rows, comparison_text
+from scissorcal.calibration.comparison import best_of, candidate_rows, comparison_text, contenders
 from scissorcal.calibration.critic import NOT_ASKED, Critique, criticise, structure_verdict
 from scissorcal.calibration.fit_candidate import FittedCandidate
-from scissorcal.calibration.predictive import predictive_of
+from scissorcal.calibration.fit_model import Outcome
 from scissorcal.calibration.replay import compare_with_replay
-from scissorcal.calibration.result import Effort, FitResult, FitSeries, StrokeError
+from scissorcal.calibration.result import Effort, FitResult, FitSeries, Predictive, StrokeError
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.calibration.signals.usage import Usage
-from scissorcal.inference import Posterior, ljung_box
-from scissorcal.recording.recording import Joint, Recording
+from scissorcal.inference import fit_ar, ljung_box
+from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict
 
 MOST_POINTS = 20000
@@ -26,90 +29,90 @@ BAND_DRAWS = 100
 PRIOR_DRAWS = 1000
 
 
+@dataclass(frozen=True)
+class Particulars:
+    """What only the fit itself can say; it follows what is common to all fits."""
+
+    verdicts: tuple[Verdict, ...] = ()
+    notes: tuple[str, ...] = ()
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CriticRequest:
+    """Whether the residuals are searched for what the law lacks.
+
+    It is judged by the ``tolerance`` of torque, a share, where there is one, but for terms that are
+    ``known`` by name from elsewhere.
+    """
+
+    asked: bool
+    tolerance: float | None = None
+    known: tuple[str, ...] = ()
+
+
 def assemble(
-    *,
-    what: Literal["friction", "cut"],
-    effort: Effort,
-    posterior: Posterior,
-    compared: list[FittedCandidate],
-    chosen: FittedCandidate,
-    structure: Mapping[str, Any],
-    bins: Bins,
-    strokes: Integers,
-    measured: Array,
-    contact: Array,
+    outcome: Outcome,
     recordings: tuple[Recording, ...],
-    joint: Joint,
-    nuisance: tuple[str, ...],
-    rng: np.random.Generator,
-    critic: bool,
     usage: Usage,
-    brief: bool = False,
-    load: Array | None = None,
-    tolerance: float | None = None,
-    known: tuple[str, ...] = (),
-    extra_verdicts: tuple[Verdict, ...] = (),
-    extra_notes: tuple[str, ...] = (),
-    extra_diagnostics: Mapping[str, Any] | None = None,
+    particulars: Particulars,
+    critic: CriticRequest,
+    rng: np.random.Generator,
 ) -> FitResult:
     """Put a finished fit into the form that reports, packages and files read.
 
-    ``nuisance`` names parameters that the posterior holds but nobody asked for; they are kept
-    out of the parameter table. ``measured`` and ``contact`` are by bin (n,). ``extra_verdicts`` and
-    ``extra_notes`` and ``extra_diagnostics`` are what only the fit itself can say; they follow the
-    common ones. ``critic`` has the residuals searched for what the law lacks, which is judged by
-    the ``tolerance`` of torque, a share, where there is one, but for terms that are ``known`` by
-    name from elsewhere; ``load`` (n,) is what the joint bore, where that was measured. ``usage``
-    says which samples the fit uses, ``brief`` leaves out replay and replicated data.
+    Nuisance parameters of its design are kept out of the parameter table. ``usage`` says which
+    samples the fit uses. A fit of simulated data leaves out replay and replicated data.
     """
-    held_out = _stroke_errors(chosen, bins, strokes, measured, recordings)
+    design, chosen, compared = outcome.design, outcome.chosen, outcome.compared
+    what, measured, joint = design.what, design.observed, recordings[0].joint
+    contact = design.contact(outcome.point)
+    held_out = _stroke_errors(outcome, recordings)
     thin = slice(None, None, max(1, -(-len(measured) // MOST_POINTS)))
-    predictions = _predictions(chosen, posterior, measured, thin)
-    series = _series(chosen, predictions, bins, strokes, measured, contact, thin)
+    predictions = _predictions(outcome, thin)
+    series = _series(outcome, predictions, thin)
     rows = candidate_rows(compared, chosen)
-    diagnostics = _diagnostics(compared, chosen, posterior, bins, measured)
-    diagnostics |= dict(extra_diagnostics or {})
+    diagnostics = _diagnostics(outcome) | dict(particulars.diagnostics)
     critique = Critique((), NOT_ASKED)
-    if critic:
-        critique = _criticise(what, chosen, bins, measured, load, joint, rng, known)
-    tables = _parameters(chosen, posterior, nuisance, rng)
+    if critic.asked:
+        critique = criticise(design, chosen, joint, rng, critic.known)
+    tables = _parameters(outcome, rng)
     diagnostics["critic"] = critique.sentence
-    trust = trust_verdicts(
-        what, effort, chosen, posterior, diagnostics, held_out, nuisance, bins, contact
-    )
-    if tolerance is not None:
+    trust = trust_verdicts(outcome, diagnostics, held_out)
+    if critic.tolerance is not None:
         drive, unit = float(np.sqrt(np.mean(measured**2))), joint.effort_unit
-        trust += (structure_verdict(critique, drive, unit, tolerance).of(f"fit.{what}"),)
+        verdict = structure_verdict(critique, drive, unit, critic.tolerance)
+        trust += (verdict.of(f"fit.{what}"),)
     for_people: dict[str, Any] = {}
-    if not brief:
+    if not outcome.simulated:
         for_people["replay"] = compare_with_replay(
             chosen,
-            bins,
+            design.bins,
             measured,
             contact,
             tuple(recording.source for recording in recordings),
-            refit=what == "cut" and effort != "draft",
+            refit=what == "cut" and outcome.effort != "draft",
         )
         for_people["predictive"] = predictive_of(
-            compared, chosen, predictions, thin, effort, rng.spawn(1)[0]
+            compared, chosen, predictions, thin, outcome.effort, rng.spawn(1)[0]
         )
     return FitResult(
         what=what,
-        effort=effort,
+        effort=outcome.effort,
         rung=chosen.candidate.name,
-        structure=structure,
+        structure=outcome.structure,
         series=series,
         held_out=held_out,
         rungs=rows,
         diagnostics=diagnostics,
-        verdicts=(*trust, *extra_verdicts),
+        verdicts=(*trust, *particulars.verdicts),
         effort_unit=joint.effort_unit,
         position_unit=joint.position_unit,
         inputs_hash="",
         sources=tuple(f"{_name(r.source)} sha256:{r.content_hash}" for r in recordings),
         used=usage.spans,
-        notes=(*(note for recording in recordings for note in recording.notes), *extra_notes),
-        selection=comparison_text(compared, chosen, bins, contact, joint),
+        notes=(*(note for recording in recordings for note in recording.notes), *particulars.notes),
+        selection=comparison_text(compared, chosen, design.bins, contact, joint),
         critic=critique.proposals,
         proposed=None if critique.torque is None else critique.torque[thin],
         **for_people,
@@ -123,13 +126,9 @@ def _name(source: str) -> str:
     return path.name if path.is_absolute() else source
 
 
-def _parameters(
-    chosen: FittedCandidate,
-    posterior: Posterior,
-    nuisance: tuple[str, ...],
-    rng: np.random.Generator,
-) -> dict[str, Any]:
+def _parameters(outcome: Outcome, rng: np.random.Generator) -> dict[str, Any]:
     """The fields of a result that have a column for each parameter, in natural units."""
+    chosen, posterior, nuisance = outcome.chosen, outcome.posterior, outcome.design.nuisance
     layout = chosen.candidate.layout
     fitted, natural = layout.fitted(posterior.draws), layout.columns(posterior.draws)
     wanted = [i for i, name in enumerate(layout.names) if name not in nuisance]
@@ -144,14 +143,10 @@ def _parameters(
     }
 
 
-def _diagnostics(
-    compared: list[FittedCandidate],
-    chosen: FittedCandidate,
-    posterior: Posterior,
-    bins: Bins,
-    measured: Array,
-) -> dict[str, Any]:
+def _diagnostics(outcome: Outcome) -> dict[str, Any]:
     """Plain numbers and strings; ``evaluations`` are those of all candidates and of sampling."""
+    compared, chosen, posterior = outcome.compared, outcome.chosen, outcome.posterior
+    bins, measured = outcome.design.bins, outcome.design.observed
     likelihood, point = chosen.candidate.likelihood, chosen.optimum.point
     white = ljung_box(likelihood.standardised(point), bins.series)
     residuals = likelihood.residuals(point)
@@ -186,22 +181,6 @@ def _of_time(bins: Bins) -> dict[str, float]:
     return {"rate_floor": bins.rate_floor, "bin_s": bins.bin_s}
 
 
-def _criticise(
-    what: Literal["friction", "cut"],
-    chosen: FittedCandidate,
-    bins: Bins,
-    measured: Array,
-    load: Array | None,
-    joint: Joint,
-    rng: np.random.Generator,
-    known: tuple[str, ...],
-) -> Critique:
-    """A cut's load, where none was measured, is the torque that the law expects of the material."""
-    if what == "cut" and load is None:
-        load = measured - chosen.candidate.likelihood.residuals(chosen.optimum.point)
-    return criticise(what, chosen, bins, load, joint, rng, known)
-
-
 def _prior_draws(chosen: FittedCandidate, rng: np.random.Generator) -> Array:
     """Draws of the prior (PRIOR_DRAWS, parameters) in natural units."""
     candidate = chosen.candidate
@@ -210,17 +189,12 @@ def _prior_draws(chosen: FittedCandidate, rng: np.random.Generator) -> Array:
     return candidate.layout.columns(draws)
 
 
-def _stroke_errors(
-    chosen: FittedCandidate,
-    bins: Bins,
-    strokes: Integers,
-    measured: Array,
-    recordings: tuple[Recording, ...],
-) -> tuple[StrokeError, ...]:
+def _stroke_errors(outcome: Outcome, recordings: tuple[Recording, ...]) -> tuple[StrokeError, ...]:
+    chosen, bins, measured = outcome.chosen, outcome.design.bins, outcome.design.observed
     planned = [stroke for recording in recordings for stroke in recording.strokes]
     errors = []
     size = float(np.sqrt(np.mean(measured**2)))
-    for label, here in by_label(strokes).items():
+    for label, here in by_label(outcome.design.strokes).items():
         rms = float(np.sqrt(np.mean(chosen.held_out_residuals[here] ** 2)))
         known = planned[label] if 0 <= label < len(planned) else None
         errors.append(
@@ -237,35 +211,113 @@ def _stroke_errors(
     return tuple(errors)
 
 
-def _predictions(
-    chosen: FittedCandidate, posterior: Posterior, measured: Array, thin: slice
-) -> Array:
+def _predictions(outcome: Outcome, thin: slice) -> Array:
     """Means (draws, k) by draws of the posterior, at the points that ``thin`` selects."""
-    residuals = chosen.candidate.likelihood.residuals
+    posterior, measured = outcome.posterior, outcome.design.observed
+    residuals = outcome.chosen.candidate.likelihood.residuals
     every = max(1, len(posterior.draws) // BAND_DRAWS)
     return np.stack([(measured - residuals(u))[thin] for u in posterior.draws[::every]])
 
 
-def _series(
-    chosen: FittedCandidate,
-    predictions: Array,
-    bins: Bins,
-    strokes: Integers,
-    measured: Array,
-    contact: Array,
-    thin: slice,
-) -> FitSeries:
-    residuals = chosen.candidate.likelihood.residuals
+def _series(outcome: Outcome, predictions: Array, thin: slice) -> FitSeries:
+    design, bins = outcome.design, outcome.design.bins
     low, high = np.quantile(predictions, [0.05, 0.95], axis=0)
     return FitSeries(
         time_s=bins.time_s[thin],
         recording=bins.recording[thin],
-        stroke=strokes[thin],
+        stroke=design.strokes[thin],
         opening=bins.opening[thin],
         opening_rate=bins.rate[thin],
-        contact=contact[thin],
-        measured=measured[thin],
-        predicted=(measured - residuals(chosen.optimum.point))[thin],
+        contact=design.contact(outcome.point)[thin],
+        measured=design.observed[thin],
+        predicted=outcome.expected[thin],
         band_low=low,
         band_high=high,
     )
+
+
+RESAMPLED = 3 * DRAWS // 4
+"""Equally weighted draws, few enough that hardly one is repeated: repeated ones raise k-hats."""
+
+REPLICATES = 50
+AT_ONCE = 4_000_000
+"""Values of the noise that are drawn together: 32 MB."""
+LARGEST = 3e38
+MANTISSA_BITS = 10
+"""Bits of a replicated value's mantissa, which compresses it to a third: within 0.05 %."""
+
+
+def predictive_of(
+    compared: Sequence[FittedCandidate],
+    chosen: FittedCandidate,
+    predictions: Array,
+    thin: slice,
+    effort: Effort,
+    rng: np.random.Generator,
+) -> Predictive:
+    """Replicate the data of a fit, and collect log-likelihoods by stroke of its contenders.
+
+    ``compared`` are the candidates that were compared, ``chosen`` is among them. ``predictions``
+    (draws, k) are means by draws of the posterior at the points that ``thin`` selects; to some of
+    them a draw of the noise is added. Candidates that are no :func:`~.comparison.contenders`, and
+    draft effort, have no log-likelihoods.
+    """
+    own = next(candidate for candidate in compared if candidate.candidate is chosen.candidate)
+    share = best_of(list(compared)).share
+    near = [] if effort == "draft" else contenders(compared)
+    sampled = [candidate for candidate in near if len(candidate.left_out.densities)]
+    densities = np.zeros((RESAMPLED, len(np.unique(own.strokes)), len(sampled)))
+    for index, candidate in enumerate(sampled):
+        densities[:, :, index] = (
+            share * candidate.left_out.densities[_resampled(candidate.left_out)]
+        )
+    reference = densities.max(axis=(0, 2)) if sampled else np.zeros(densities.shape[1])
+    densities -= reference[:, None]
+    layout = own.candidate.layout
+    held = own in sampled
+    points = layout.columns(own.left_out.points[_resampled(own.left_out)]) if held else None
+    means = predictions[:: max(1, len(predictions) // REPLICATES)]
+    return Predictive(
+        torque=_rounded(means + _noise(own, len(means), thin, rng)),
+        stroke=np.unique(own.strokes),
+        log_likelihood=densities[:, :, sampled.index(own)] if held else None,
+        log_likelihood_draws=points,
+        parameters=layout.names,
+        log_likelihood_reference=reference,
+        independent_share=share,
+        candidates=tuple(candidate.name for candidate in sampled),
+        candidate_log_likelihoods=densities if sampled else None,
+    )
+
+
+def _noise(fitted: FittedCandidate, count: int, thin: slice, rng: np.random.Generator) -> Array:
+    """Draws of the noise (count, k) at the points that ``thin`` selects.
+
+    It is autoregressive, with the likelihood's standard deviations.
+
+    The autoregression is fitted to the residuals at the optimum over these standard deviations,
+    within each series without a gap: the likelihood itself counts a share of the points.
+    """
+    likelihood, point = fitted.candidate.likelihood, fitted.optimum.point
+    sd = np.exp(likelihood.normal(point)[1])
+    noise = fit_ar(likelihood.residuals(point) / sd, fitted.series)
+    most = max(1, AT_ONCE // len(sd))
+    drawn = [
+        noise.draws(fitted.series, min(most, count - first), rng)[:, thin]
+        for first in range(0, count, most)
+    ]
+    return sd[thin] * np.concatenate(drawn)
+
+
+def _resampled(left_out: LeftOut) -> NDArray[np.int64]:
+    """Rows (RESAMPLED,) of equally weighted draws, by systematic resampling."""
+    weights = np.cumsum(np.exp(left_out.log_weights))
+    places = (np.arange(RESAMPLED) + 0.5) / RESAMPLED * weights[-1]
+    return np.asarray(np.searchsorted(weights, places))
+
+
+def _rounded(values: Array) -> NDArray[np.float32]:
+    """The nearest numbers with a short mantissa; those of a law that is far off are bounded."""
+    bits = np.clip(values, -LARGEST, LARGEST).astype(np.float32).view(np.uint32)
+    step = np.uint32(1 << (23 - MANTISSA_BITS))
+    return ((bits + step // np.uint32(2)) & ~(step - np.uint32(1))).view(np.float32)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.aliases import Array, Integers, Mask
+from scissorcal.aliases import Array, Mask
 from scissorcal.calibration.caveats import NEXT_RECORDING
 from scissorcal.calibration.checks import HELD_OUT_LIMIT
-from scissorcal.calibration.fit_model import Experiment
+from scissorcal.calibration.fit_model import Design, Experiment
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.calibration.friction.search import search, search_from
@@ -193,8 +193,8 @@ def compare_recordings(
     of the recordings' estimates before they are compared (see
     :func:`scissorcal.inference.between.between_groups`).
     """
-    every = design.candidate(design.observed)
-    law, problem = every.reduced, every.problem(design.series)
+    candidate = design.candidate(design.observed)
+    law, problem = candidate.reduced, candidate.problem(design.series)
     if not isinstance(law, ReducedLaw):
         return None
 
@@ -205,14 +205,11 @@ def compare_recordings(
         left = law.without(np.unique(design.strokes[here]))
         return np.asarray(search_from(replace(problem, reduced=left), point).point)
 
-    return gather_recordings(
-        design, design.bins.recording, point, recordings, FitsApart(own, others), usual, rng
-    )
+    return gather_recordings(design, point, recordings, FitsApart(own, others), usual, rng)
 
 
 def gather_recordings(
-    design: Experiment,
-    index: Integers,
+    design: Design,
     point: Array,
     recordings: tuple[Recording, ...],
     fits: FitsApart,
@@ -221,16 +218,17 @@ def gather_recordings(
 ) -> BetweenRecordings | None:
     """Compare a law's fits to single recordings; None where fewer than two can be fitted.
 
-    ``index`` (n,) is the recording of each bin, ``point`` (p,) the optimum over all of them,
-    ``usual`` the share by which recordings usually differ.
+    ``point`` (p,) is the optimum over all of them, ``usual`` the share by which recordings usually
+    differ.
     """
+    index = design.bins.recording
     labels = [
         int(label) for label in np.unique(index) if np.count_nonzero(index == label) >= FEWEST_BINS
     ]
     if len(labels) < 2:
         return None
-    every = design.candidate(design.observed)
-    prior = every.prior_precision
+    candidate = design.candidate(design.observed)
+    prior = candidate.prior_precision
     points, covariances, precisions, estimates, errors = [], [], [], [], []
     for label in labels:
         here = index == label
@@ -239,7 +237,7 @@ def gather_recordings(
         points.append(own.optimum.point)
         covariances.append(own.covariance)
         precisions.append(likelihood)
-        estimates.append(_without_prior(own, likelihood, prior, every.prior_mean))
+        estimates.append(_without_prior(own, likelihood, prior, candidate.prior_mean))
         reached = (fits.others(here), point, own.optimum.point)
         errors.append(_error(design, recordings[label].source, here, reached))
     scatter = between_groups(
@@ -282,13 +280,13 @@ def jackknife(
     law, problem = rung.reduced, rung.problem(design.series)
     if not isinstance(law, ReducedLaw) or len(law.moments.labels) < 3:
         return {}
-    full, every = design.layout.columns(point), np.diag(law.information(point))
+    full, information = design.layout.columns(point), np.diag(law.information(point))
     left, repeated = [], np.ones(len(point), dtype=bool)
     labels, counts = law.moments.labels, law.moments.counts
     groups = [slice(k, None, MOST_GROUPS) for k in range(min(MOST_GROUPS, len(labels)))]
     for group in groups:
         rest = law.without(labels[group])
-        repeated &= np.diag(rest.information(point)) > REPEATED * every
+        repeated &= np.diag(rest.information(point)) > REPEATED * information
         seen = replace(problem, reduced=rest)
         left.append(design.layout.columns(search_from(seen, point).point))
     size = np.array([[law.counted / counts[group].sum()] for group in groups])

@@ -60,21 +60,21 @@ class _Row:
 def caveats_of(fit: FitResult) -> tuple[Caveat, ...]:
     """The rows of the table that hold for a fit, with the parameters that they concern."""
     names = [parameter.name for parameter in (*fit.parameters, *fit.derived)]
-    found = []
+    caveats = []
     for row in _ROWS:
         concerned = tuple(name for name in names if _concerns(row, name))
         if concerned and row.holds(fit):
-            found.append(Caveat(concerned, row.sentence(fit)))
-    return tuple(found)
+            caveats.append(Caveat(concerned, row.sentence(fit)))
+    return tuple(caveats)
 
 
 def caveats_by_parameter(fit: FitResult) -> Mapping[str, tuple[str, ...]]:
     """The sentences by parameter, for those that have one."""
-    found: dict[str, tuple[str, ...]] = {}
+    sentences: dict[str, tuple[str, ...]] = {}
     for caveat in caveats_of(fit):
         for name in caveat.parameters:
-            found[name] = (*found.get(name, ()), caveat.sentence)
-    return found
+            sentences[name] = (*sentences.get(name, ()), caveat.sentence)
+    return sentences
 
 
 def next_recording_sd(fit: FitResult, parameter: FittedParameter) -> float | None:
@@ -83,8 +83,8 @@ def next_recording_sd(fit: FitResult, parameter: FittedParameter) -> float | Non
     By the recordings of the fit, else by those of an earlier one; None where neither shows it.
     """
     known = fit.diagnostics
-    found = known.get(NEXT_RECORDING) or known.get(ON_RECORD) or {}
-    sd = found.get(parameter.name)
+    scatter = known.get(NEXT_RECORDING) or known.get(ON_RECORD) or {}
+    sd = scatter.get(parameter.name)
     return None if sd is None else float(sd)
 
 
@@ -105,7 +105,8 @@ def next_recording_sentence(fit: FitResult) -> str:
 
 def _concerns(row: _Row, name: str) -> bool:
     return any(
-        name == one or (one.endswith("*") and name.startswith(one[:-1])) for one in row.parameters
+        name == parameter or (parameter.endswith("*") and name.startswith(parameter[:-1]))
+        for parameter in row.parameters
     )
 
 

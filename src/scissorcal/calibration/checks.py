@@ -7,6 +7,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.fit_candidate import SEARCH_REACH, FittedCandidate
+from scissorcal.calibration.fit_model import Outcome
 from scissorcal.calibration.result import PRIOR_ONLY, StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.segments import by_label
@@ -62,28 +63,23 @@ HOLD_OUT = Check(
 
 
 def trust_verdicts(
-    what: str,
-    effort: str,
-    chosen: FittedCandidate,
-    posterior: Posterior,
-    diagnostics: Mapping[str, Any],
-    held_out: tuple[StrokeError, ...],
-    nuisance: tuple[str, ...],
-    bins: Bins,
-    contact: Array,
+    outcome: Outcome, diagnostics: Mapping[str, Any], held_out: tuple[StrokeError, ...]
 ) -> tuple[Verdict, ...]:
     """Judge a fit: its numbers, search, draws, bounds, data, strokes, unseen strokes."""
-    nuisance = (*nuisance, *(p.name for p in chosen.candidate.layout.parameters if p.believed))
+    chosen, posterior, design = outcome.chosen, outcome.posterior, outcome.design
+    what, contact = design.what, design.contact(outcome.point)
+    believed = (p.name for p in chosen.candidate.layout.parameters if p.believed)
+    nuisance = (*design.nuisance, *believed)
     verdicts = (
         _finite(chosen, posterior, diagnostics),
         _search(posterior, nuisance),
-        _importance(effort, posterior),
+        _importance(outcome.effort, posterior),
         _bounds(chosen),
         _identified(chosen, posterior, (*nuisance, *NEAR_REST)),
         _null(posterior, nuisance),
         _independent(what, chosen, diagnostics, held_out),
         _explained(diagnostics),
-        _varied(what, chosen, bins, contact),
+        _varied(what, chosen, design.bins, contact),
         _unseen(held_out),
     )
     return tuple(verdict.of(f"fit.{what}") for verdict in verdicts)

@@ -10,6 +10,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.candidates import (
     POSITIVE_EVIDENCE,
+    RELIABLE,
     RELIABLE_UNITS,
     Account,
     CandidateRow,
@@ -18,7 +19,6 @@ from scissorcal.calibration.candidates import (
     standard_error,
 )
 from scissorcal.calibration.fit_candidate import FittedCandidate
-from scissorcal.calibration.psis_loo import RELIABLE
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.recording.recording import Joint
 
@@ -52,7 +52,7 @@ def best_of(fitted: Sequence[FittedCandidate]) -> FittedCandidate:
 
     Its share of independent bins is the one by which all candidates are compared.
     """
-    return max(fitted, key=lambda one: float(one.scores.sum()))
+    return max(fitted, key=lambda candidate: float(candidate.scores.sum()))
 
 
 def contenders(fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
@@ -62,11 +62,11 @@ def contenders(fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
     """
     best = best_of(fitted)
     most = len(best.optimum.point)
-    behind = [float((best.scores - one.scores).sum()) * best.share for one in fitted]
+    behind = [float((best.scores - candidate.scores).sum()) * best.share for candidate in fitted]
     return [
-        one
-        for one, nats in zip(fitted, behind, strict=True)
-        if one is best or is_near(nats, len(one.optimum.point), most)
+        candidate
+        for candidate, nats in zip(fitted, behind, strict=True)
+        if candidate is best or is_near(nats, len(candidate.optimum.point), most)
     ]
 
 
@@ -98,22 +98,25 @@ def _rows(
     fitted: Sequence[FittedCandidate], signal_rms: float, negligible: float = 0.0
 ) -> tuple[CandidateRow, ...]:
     best = best_of(fitted)
-    accounts = [Account(np.stack([one.scores for one in fitted]) * best.share)]
+    accounts = [Account(np.stack([candidate.scores for candidate in fitted]) * best.share)]
     if len(fitted) > 1:
-        near = [id(one) for one in contenders(fitted)]
+        near = [id(candidate) for candidate in contenders(fitted)]
         scores = np.full_like(accounts[0].scores, np.nan)
         reliable = np.zeros(scores.shape, dtype=bool)
-        for index, one in enumerate(fitted):
-            if id(one) in near:
-                scores[index] = one.left_out.scores * best.share
-                reliable[index] = one.left_out.reliable
+        for index, candidate in enumerate(fitted):
+            if id(candidate) in near:
+                scores[index] = candidate.left_out.scores * best.share
+                reliable[index] = candidate.left_out.reliable
         accounts.append(Account(scores, reliable))
     limit = (negligible * signal_rms) ** 2
     return compare(
-        [one.name for one in fitted],
-        [len(one.optimum.point) for one in fitted],
+        [candidate.name for candidate in fitted],
+        [len(candidate.optimum.point) for candidate in fitted],
         accounts,
-        [limit > 0 and one.held_out_rms**2 - best.held_out_rms**2 <= limit for one in fitted],
+        [
+            limit > 0 and candidate.held_out_rms**2 - best.held_out_rms**2 <= limit
+            for candidate in fitted
+        ],
     )
 
 
@@ -131,31 +134,31 @@ def candidate_rows(
     are what a candidate's law is drawn from.
     """
     share = best_of(fitted).share
-    near = [id(one) for one in contenders(fitted)] if len(fitted) > 1 else []
+    near = [id(candidate) for candidate in contenders(fitted)] if len(fitted) > 1 else []
     rows = []
-    for row, one in zip(_rows(fitted, 0.0), fitted, strict=True):
-        used = one.name == chosen.name
-        row = replace(row, chosen=used, equivalent=used or one.name in chosen.equivalent)
-        count = float(np.log(one.observations * share))
-        natural = one.candidate.layout.natural(one.optimum.point)
+    for row, candidate in zip(_rows(fitted, 0.0), fitted, strict=True):
+        used = candidate.name == chosen.name
+        row = replace(row, chosen=used, equivalent=used or candidate.name in chosen.equivalent)
+        count = float(np.log(candidate.observations * share))
+        natural = candidate.candidate.layout.natural(candidate.optimum.point)
         rows.append(
             {
                 **asdict(row),
-                "bic": -2 * one.log_likelihood * share + row.parameters * count,
-                "held_out_rms": one.held_out_rms,
+                "bic": -2 * candidate.log_likelihood * share + row.parameters * count,
+                "held_out_rms": candidate.held_out_rms,
                 "held_out_score": row.score,
-                **_loo(one, share if id(one) in near else float("nan")),
-                "key": dict(one.candidate.key),
+                **_loo(candidate, share if id(candidate) in near else float("nan")),
+                "key": dict(candidate.candidate.key),
                 "values": {name: float(value) for name, value in natural.items()},
             }
         )
     return tuple(rows)
 
 
-def _loo(one: FittedCandidate, share: float) -> dict[str, float]:
+def _loo(candidate: FittedCandidate, share: float) -> dict[str, float]:
     if not np.isfinite(share):
         return {"loo": share, "loo_se": share, "loo_k_hat": share}
-    found = one.left_out
+    found = candidate.left_out
     return {
         "loo": float(found.scores.sum()) * share,
         "loo_se": standard_error(found.scores * share),
@@ -185,7 +188,11 @@ def comparison_text(
     ]
     text = comparison_sentence(rows, "strokes")
     doubt = _unreliable(fitted)
-    others = [one for one in fitted if one.name in chosen.equivalent and one.name != chosen.name]
+    others = [
+        candidate
+        for candidate in fitted
+        if candidate.name in chosen.equivalent and candidate.name != chosen.name
+    ]
     if not others:
         return text + doubt
     found = max((_apart(chosen, other, bins, contact) for other in others), key=lambda p: p.nats)

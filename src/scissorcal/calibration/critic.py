@@ -15,9 +15,9 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.candidates import POSITIVE_EVIDENCE
 from scissorcal.calibration.fit_candidate import FittedCandidate, split_strokes
+from scissorcal.calibration.fit_model import Design
 from scissorcal.calibration.leftover import DRAWS, Leftover, course_of, tabulate
 from scissorcal.calibration.result import Proposal
-from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.model.course_terms import LIBRARY
 from scissorcal.model.terms import Term
 from scissorcal.recording.recording import Joint
@@ -71,10 +71,8 @@ class Critique:
 
 
 def criticise(
-    what: Literal["friction", "cut"],
+    design: Design,
     chosen: FittedCandidate,
-    bins: Bins,
-    load: Array | None,
     joint: Joint,
     rng: np.random.Generator,
     known: Sequence[str] = (),
@@ -91,9 +89,12 @@ def criticise(
     (:meth:`Leftover.chances`), and is strong evidence on unseen strokes, the law's parameters being
     refitted with it, by one Gauss-Newton step, as they are without it.
 
-    ``bins`` (n,) are those that the law was fitted to, ``load`` (n,) what the joint bore. Terms
-    that are ``known`` by name are judged elsewhere and count as the law's.
+    The load of a cut is the torque that the law expects of the material. Terms that are ``known``
+    by name are judged elsewhere and count as the law's.
     """
+    what, bins, load = design.what, design.bins, None
+    if what == "cut":
+        load = design.observed - chosen.candidate.likelihood.residuals(chosen.optimum.point)
     labels = np.unique(chosen.strokes)
     if len(labels) < FEWEST_STROKES:
         return Critique(

@@ -9,16 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
+from scissorcal.calibration.candidates import LeftOut, leave_strokes_out
 from scissorcal.calibration.parameters import Layout
-from scissorcal.calibration.psis_loo import LeftOut, leave_strokes_out
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference.autocorrelation import ljung_box
-from scissorcal.inference.counting import Counter, Stop
-from scissorcal.inference.curvature import gradient, natural_step
-from scissorcal.inference.information import likelihood_information
+from scissorcal.inference.curvature import gradient, likelihood_information, natural_step
+from scissorcal.inference.noise import log_density
 from scissorcal.inference.optimise import Optimum, find_optimum
-from scissorcal.inference.problem import Problem
-from scissorcal.inference.tails import log_density
+from scissorcal.inference.problem import Counter, Problem, Stop
 
 FOLDS = 4
 SEARCH_REACH = 8.0
@@ -221,8 +219,7 @@ class FittedCandidate:
         return leave_strokes_out(
             self.candidate.problem(self.series),
             self.optimum.point,
-            self.information,
-            self.candidate.prior_precision,
+            self.share * self.information + self.candidate.prior_precision,
             labelled,
             self.share,
             self.candidate.reduced.by_stroke if self.candidate.reduced else None,

@@ -294,8 +294,8 @@ def _parted(
     rows: Callable[[Integers], Array], block: list[Integers], used: Integers
 ) -> list[Array]:
     """The columns ``used`` of each part of a block."""
-    every = rows(np.concatenate(block))[:, used]
-    return np.split(every, np.cumsum([len(part) for part in block])[:-1])
+    columns = rows(np.concatenate(block))[:, used]
+    return np.split(columns, np.cumsum([len(part) for part in block])[:-1])
 
 
 def _at(course: Course, here: Integers) -> Course:

@@ -221,7 +221,7 @@ def worst_stroke(errors: Sequence[StrokeError]) -> StrokeError | None:
     (Bonferroni): a stroke of a few samples is the worst only if chance would not make it so. Where
     no stroke states its independent samples, errors are compared.
     """
-    known = [one for one in errors if np.isfinite(one.relative_rms)]
+    known = [error for error in errors if np.isfinite(error.relative_rms)]
     if not known:
         return None
     tail = 0.05 / len(known)
@@ -334,7 +334,7 @@ class Predictive:
     parameters), columns in the order of ``parameters``, in SI, are the draws of the chosen
     candidate at which they hold, row by row: equally weighted draws of the posterior whose
     likelihood is taken to such a power
-    (:func:`scissorcal.calibration.psis_loo.leave_strokes_out`). The draws of the result are of
+    (:func:`scissorcal.calibration.candidates.leave_strokes_out`). The draws of the result are of
     another, which is wider by what recordings differ in and by what the law lacks.
     """
 
@@ -417,6 +417,20 @@ class FitResult(Result):
             if parameter.name == name:
                 return parameter
         raise KeyError(name)
+
+    @property
+    def best(self) -> dict[str, float]:
+        """Values by name: the most probable point, with nuisance parameters at their means."""
+        values = {p.name: float(v) for p, v in zip(self.parameters, self.map_point, strict=True)}
+        return values | {p.name: p.mean for p in self.nuisance}
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """Posterior draws (draws,) by name, those of nuisance parameters among them."""
+        columns = {p.name: self.draws[:, i] for i, p in enumerate(self.parameters)}
+        if self.nuisance_draws is None:
+            return columns
+        return columns | {p.name: self.nuisance_draws[:, i] for i, p in enumerate(self.nuisance)}
 
     def column(self, name: str) -> NDArray[np.float64]:
         """Return the posterior draws of one parameter, shape (draws,)."""

@@ -12,17 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.plateau import (
-    LEAST_PLATEAU,
-    Plateau,
-    drawn_strokes,
-    find_plateau,
-)
 from scissorcal.calibration.signals.sensors import channels_of
 from scissorcal.calibration.stroke_intervals import (
     FEWEST,
+    LEAST_PLATEAU,
     Interval,
+    Plateau,
     difference_interval,
+    drawn_strokes,
+    find_plateau,
     mean_interval,
     trend_interval,
 )

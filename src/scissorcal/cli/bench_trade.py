@@ -10,13 +10,12 @@ import typer
 
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import RIG, Folder, options_of
-from scissorcal.cli.output import Answer, command, note, table
+from scissorcal.cli.output import Answer, command, note
 from scissorcal.cli.progress import progress
 from scissorcal.cli.verify import CLUSTER, Processes
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
-    from scissorcal.bench.trade.point import Curve, Point
     from scissorcal.bench.trade.result import Trade
     from scissorcal.workday.workspace import Workspace
 
@@ -79,9 +78,9 @@ def trade(
     \b
     Example:
       $ scissorcal bench trade --knob effort --budget "2 min"
-      Effort of the fits
-      setting   processor time  worst band error
-      draft             3.81 s             1.70%  Pareto front
+      Effort of the fits: draft is enough: 1.67 s processor time in place of 2.65 s with ...
+                                     processor time [s]  worst band error [%]  ...
+        draft (recommended, Pareto front)          1.67                  0.14  ...
       ...
     """
     began = time.time()
@@ -102,7 +101,7 @@ def trade(
         began = time.time()
     settings = TradeSettings(tuple(options.knob or ()), allowed, options.seed, options.force)
     with progress() as tell:
-        found = trade_workspace(
+        outcome = trade_workspace(
             workspace,
             settings,
             workers=processes.workers,
@@ -110,9 +109,9 @@ def trade(
             progress=tell,
             began=began,
         )
-    for sentence in found.notes:
+    for sentence in outcome.notes:
         note(sentence)
-    return _answer(found.trade, (found.html, found.json))
+    return _answer(outcome.trade, (outcome.html, outcome.json))
 
 
 def seconds_of(words: str) -> float:
@@ -122,12 +121,12 @@ def seconds_of(words: str) -> float:
     (180.0, 5400.0, 90.0)
     """
     parts = _DURATION.findall(words)
-    found = sum(float(number) * _SECONDS[unit] for number, unit in parts)
-    if not found or _DURATION.sub("", words).strip():
+    seconds = sum(float(number) * _SECONDS[unit] for number, unit in parts)
+    if not seconds or _DURATION.sub("", words).strip():
         raise InputError(
             f'--budget {words}: give a time above zero with its unit, such as "3 min" or "90 s".'
         )
-    return found
+    return seconds
 
 
 def _day(name: str, seed: int) -> "Workspace":
@@ -155,54 +154,11 @@ def _stored(workspace: "Workspace") -> Answer:
     return _answer(read_trade(workspace.trade_json), ())
 
 
-def _answer(found: "Trade", files: tuple[Path, ...]) -> Answer:
+def _answer(trade: "Trade", files: tuple[Path, ...]) -> Answer:
+    from scissorcal.report import panels_text
+    from scissorcal.report.trade import trade_panels
     from scissorcal.workday.envelope import plain
 
-    return Answer({"trade": plain(found)}, _text(found), files=files)
-
-
-def _text(found: "Trade") -> str:
-    curves = [one for one in found.curves if one.points]
-    blocks = [_block(one) for one in (*curves, *([found.together] if found.together else []))]
-    closing = [
-        *found.sentences,
-        *found.notes,
-        f"measured {found.measured_now} of {found.measured} samples in this run, "
-        f"{found.seconds:.0f} s; page: bench/trade.html",
-    ]
-    return "\n\n".join([*blocks, "\n".join(closing)])
-
-
-def _block(found: "Curve") -> str:
-    costs = list(dict.fromkeys(name for p in found.points for name in p.costs))[:3]
-    errors = [found.error]
-    rows = [["setting", *costs, *errors, ""]]
-    rows += [_row(point, costs, errors) for point in found.points]
-    lines = [found.title, table(rows, right=range(1, len(costs) + 2))]
-    lines += [f"{p.setting.label}: {p.failed}" for p in found.points if p.failed]
-    if found.unmeasured:
-        lines.append(f"not measured within the budget: {'; '.join(found.unmeasured)}")
-    return "\n".join(lines)
-
-
-def _row(point: "Point", costs: list[str], errors: list[str]) -> list[str]:
-    cells = [point.setting.label]
-    for name in costs:
-        spread = point.costs.get(name)
-        cells.append(spread.words if spread else "-")
-    for name in errors:
-        error = point.errors.get(name)
-        if error is None:
-            cells.append("-")
-        elif error.share is not None:
-            cells.append(f"{error.share:.2%}")
-        else:
-            cells.append(f"{error.value:.3g} {error.unit}".rstrip())
-    marks = {
-        "failed": bool(point.failed),
-        "present": point.setting.present,
-        "recommended": point.recommended,
-        "Pareto front": point.front,
-        "reference": point.reference,
-    }
-    return [*cells, ", ".join(word for word, is_so in marks.items() if is_so)]
+    measured, *knobs = trade_panels(trade)
+    text = panels_text([*(knob for knob in knobs if knob.rows), measured])
+    return Answer({"trade": plain(trade)}, text, files=files)

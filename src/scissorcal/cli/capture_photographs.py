@@ -85,7 +85,7 @@ def camera(
         places 6 of 9, sizes 1 of 3, slants 1 of 5; wanted: upper left, left, lower left, ...
       ...
     """
-    from scissorcal.vision.targets.board_words import board_from_words
+    from scissorcal.vision.targets.boards import board_from_words
     from scissorcal.workday.runs.camera import capture_camera
 
     photographs.refuse_two_sources()

@@ -6,18 +6,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from scissorcal.cli.options import Seed
-from scissorcal.cli.output import Answer, command, table
+from scissorcal.cli.output import Answer, command
 from scissorcal.cli.progress import progress
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.verify.result import VerifyResult
+    from scissorcal.report import Panel
     from scissorcal.workday.demo.day import DemoResult
 
 VERIFY_FITS = 40
 """They find intervals that are one standard deviation off in 98 of 100 cases, and those that are
 half as wide as they should be in 78."""
-
-_ANSWERS = {True: "yes", False: "no", None: "-"}
 
 
 @command
@@ -54,96 +52,64 @@ def demo(
       friction: stribeck + angle, symmetric
       cut: power response, rippled fracture
       ...
-      parameter          unit           truth   estimate        5 %       95 %  inside?
-      inertia            kg m^2      0.000189  0.0001879  0.0001843  0.0001912  yes
+      Estimates beside the truth: 27 of 29 intervals (90 %) contain the truth.
+                     estimate                          truth             inside?
+        coulomb_pos  0.01334 (0.01327 to 0.01341) N m  0.01331 N m       yes
       ...
     """
     from scissorcal.recipe.library import recipe_path
+    from scissorcal.report import panel_text
     from scissorcal.workday.demo.day import run_demo
     from scissorcal.workday.workspace import demo_folder
 
     recipe_path(recipe)
     made = demo_folder(folder)
     with progress() as tell:
-        found = run_demo(
-            made, recipe_name=recipe, seed=seed, effort=effort, fits=fits, progress=tell
-        )
+        day = run_demo(made, recipe_name=recipe, seed=seed, effort=effort, fits=fits, progress=tell)
+    panel = _panel(day)
     result = {
-        "workspace": found.workspace,
-        "specimen": found.specimen,
+        "workspace": day.workspace,
+        "specimen": day.specimen,
         "seed": seed,
-        "rungs": found.rungs,
-        "parameters": [
-            {**row.parameter.as_dict(), "truth": row.truth, "inside": row.inside}
-            for row in found.judged
-        ],
-        "geometry": [
-            {
-                "name": row.name,
-                "unit": row.unit,
-                "truth": row.truth,
-                "estimate": row.estimate,
-                "sd": row.sd,
-                "inside": row.inside,
-            }
-            for row in found.geometry
-        ],
-        "share_inside": found.share_inside,
-        "verified": [
-            {
-                "what": check.what,
-                "fits": check.calibration.fits if check.calibration else 0,
-                "passed": not any(verdict.status == "fail" for verdict in check.verdicts),
-            }
-            for check in found.verified
-        ],
-        "torque_error": found.torque_error,
-        "rendering": found.rendering,
+        "rungs": day.rungs,
+        "panels": [panel],
+        "share_inside": day.share_inside,
+        "torque_error": day.torque_error,
+        "rendering": day.rendering,
     }
-    return Answer(result, _text(found), found.verdicts, found.files)
+    report = _shown(day.workspace / "report" / "report.html")
+    text = "\n".join([*day.rungs, "", panel_text(panel), "", f"report: {report}"])
+    return Answer(result, text, day.verdicts, day.files)
 
 
-def _text(found: "DemoResult") -> str:
-    rows = [["parameter", "unit", "truth", "estimate", "5 %", "95 %", "inside?"]]
-    for row in found.judged:
-        parameter = row.parameter
-        truth = "-" if row.truth is None else f"{row.truth:.4g}"
-        centre = parameter.moments[0] if parameter.moments else parameter.q50
-        estimate = [f"{value:.4g}" for value in (centre, parameter.q05, parameter.q95)]
-        rows.append([parameter.name, parameter.unit, truth, *estimate, _ANSWERS[row.inside]])
-    for seen in found.geometry:
-        reach = 1.6449 * seen.sd
-        numbers = (seen.truth, seen.estimate, seen.estimate - reach, seen.estimate + reach)
-        cells = [f"{value:.4g}" for value in numbers]
-        rows.append([seen.name, seen.unit, *cells, _ANSWERS[seen.inside]])
-    inside = [row.inside for row in found.judged if row.inside is not None]
-    inside += [seen.inside for seen in found.geometry]
-    lines = [
-        *found.rungs,
-        "",
-        table(rows, right=[2, 3, 4, 5]),
-        "",
-        f"{sum(inside)} of {len(inside)} intervals (90 %) contain the truth",
-        *(_verified(check) for check in found.verified),
-        f"torque error of the package {100 * found.torque_error:.2f} % (rms over the scene)",
-        f"rendered {found.rendering.strokes} strokes in {found.rendering.seconds:.1f} s",
-        found.rendering.admission.summary,
-        "",
-        f"report: {_shown(found.workspace / 'report' / 'report.html')}",
+def _panel(day: "DemoResult") -> "Panel":
+    """Each estimate beside the truth, then what came of checks, package and rendering."""
+    from scissorcal.report.panel import Panel, Row, number, words
+    from scissorcal.report.subjects.trust import coverage_found
+
+    rows = []
+    for estimate in day.judged:
+        unit, ends = estimate.unit, {"low": estimate.low, "high": estimate.high}
+        values = [number("estimate", estimate.estimate, unit, **ends)]
+        if estimate.truth is not None:
+            inside = words("inside?", "yes" if estimate.inside else "no")
+            values += [number("truth", estimate.truth, unit, digits=4), inside]
+        rows.append(Row(estimate.name, tuple(values), marked=estimate.inside is False))
+    known = [estimate.inside for estimate in day.judged if estimate.inside is not None]
+    notes = []
+    for check in day.verified:
+        failed = [verdict.check for verdict in check.verdicts if verdict.status == "fail"]
+        outcome = f"failed: {', '.join(failed)}" if failed else "passed"
+        coverage = coverage_found(check)
+        notes.append(f"{check.what}: trust check {outcome}{coverage and f'; {coverage}'}.")
+    notes += [
+        f"Torque error of the package: {100 * day.torque_error:.2f} % (rms over the scene).",
+        f"Rendered {day.rendering.strokes} strokes in {day.rendering.seconds:.1f} s.",
+        day.rendering.admission.summary,
     ]
-    return "\n".join(lines)
-
-
-def _verified(check: "VerifyResult") -> str:
-    failed = [verdict.check for verdict in check.verdicts if verdict.status == "fail"]
-    outcome = f"failed: {', '.join(failed)}" if failed else "passed"
-    if check.calibration is None:
-        return f"{check.what}: trust check {outcome}"
-    shares = [one.share for row in check.calibration.quantities for one in row.coverage[1:]]
-    return (
-        f"{check.what}: trust check {outcome}; in {check.calibration.fits} fits to simulated data "
-        f"the 90 % intervals contain the truth in {min(shares):.0%} to {max(shares):.0%}"
-    )
+    sentence = f"{sum(known)} of {len(known)} intervals (90 %) contain the truth."
+    title = "Estimates beside the truth"
+    return Panel("truth", "demo", title, sentence, tuple(rows), notes=tuple(notes))
 
 
 def _shown(path: Path) -> Path:

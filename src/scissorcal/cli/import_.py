@@ -48,7 +48,7 @@ class TableOptions:
         self, path: Path, joint: "Joint", kind: "Kind" = "friction", *, motion_only: bool = False
     ) -> "Recording":
         """Read a log as `import_table` does."""
-        from scissorcal.recording import import_table
+        from scissorcal.recording import ImportOptions, import_table
 
         radius_mm = self.handle_radius_mm
         return import_table(
@@ -57,14 +57,16 @@ class TableOptions:
             units=dict(pairs("unit", self.units)),
             scale=dict(pairs("scale", self.scales)),
             rate_Hz=self.rate_Hz,
-            joint=joint,
-            kind=kind,
-            handle_radius_m=radius_mm * 1e-3 if radius_mm else math.nan,
-            min_travel=self.min_travel,
-            allow_gaps=self.allow_gaps,
-            drop_last_line=self.drop_last_line,
-            delimiter=self.delimiter,
-            motion_only=motion_only,
+            options=ImportOptions(
+                joint=joint,
+                kind=kind,
+                handle_radius_m=radius_mm * 1e-3 if radius_mm else math.nan,
+                min_travel=self.min_travel,
+                allow_gaps=self.allow_gaps,
+                drop_last_line=self.drop_last_line,
+                delimiter=self.delimiter,
+                motion_only=motion_only,
+            ),
         )
 
 

@@ -1,27 +1,13 @@
 """``scissorcal device probe``"""
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from scissorcal.cli.options import RIG, Folder, Yes, options_of
-from scissorcal.cli.output import Answer, command, note, table
+from scissorcal.cli.output import Answer, command, note
 from scissorcal.workday.options import RigOptions
-
-if TYPE_CHECKING:
-    from scissorcal.device.probe.result import ProbeResult
-
-_FACTS = (
-    ("breakaway", "breakaway_Nm", 1e3, "mN m"),
-    ("encoder step", "encoder_step_rad", 1e6, "urad"),
-    ("command to flag", "command_lag_ticks", 1.0, "ticks"),
-    ("torque noise (sd)", "torque_noise_Nm", 1e3, "mN m"),
-    ("force noise (sd)", "force_noise_N", 1.0, "N"),
-    ("largest torque used", "largest_torque_Nm", 1e3, "mN m"),
-    ("largest rate seen", "largest_rate_rad_per_s", 1.0, "rad/s"),
-)
 
 
 @command
@@ -48,13 +34,19 @@ def probe(
     \b
     Example:
       $ scissorcal device probe --device sim
-      scissorcal-sim office-paper: no fault found
-      ...
+      No fault found.
+    \b
+      The rig as it was probed: scissorcal-sim office-paper, probed at 2026-11-22T09:15:00+00:00.
+                        value
+        torque zero     0.033 +- 0.067 (-0.077 to 0.143) mN m
+        ...
     """
     from scissorcal.cli.live_view import LiveView
     from scissorcal.cli.opening import open_workspace
     from scissorcal.device.probe.probe import ProbeRefusedError
     from scissorcal.recipe.load import load_recipe
+    from scissorcal.report import panel_text
+    from scissorcal.report.subjects.rig import rig_panel
     from scissorcal.workday.runs.probe import probe_device
 
     workspace = None if recipe else open_workspace(folder)
@@ -63,24 +55,8 @@ def probe(
         with LiveView(ask=not yes) as view:
             result = probe_device(given, rig, view.operator, workspace=workspace)
     except ProbeRefusedError as error:
-        note(_text(error.result))
+        note(panel_text(rig_panel(error.result)))
         raise
     files = [workspace.probe_path] if workspace else []
-    head = f"{result.device}: no fault found\n\n"
-    return Answer(result.as_dict(), head + _text(result), result.verdicts, files)
-
-
-def _text(result: "ProbeResult") -> str:
-    """Estimates with their standard deviation, and the facts that people ask for."""
-    from scissorcal.recording.probe import ESTIMATES
-
-    rows = [["", "estimate", "sd", ""]]
-    for label, name, scale, unit in ESTIMATES:
-        estimate = getattr(result, name)
-        if estimate is not None:
-            rows.append([label, f"{scale * estimate.mean:.4g}", f"{scale * estimate.sd:.2g}", unit])
-    facts = result.facts
-    for label, name, scale, unit in _FACTS:
-        if math.isfinite(facts.get(name, math.nan)):
-            rows.append([label, f"{scale * facts[name]:.4g}", "", unit])
-    return table(rows, right=[1, 2])
+    text = f"No fault found.\n\n{panel_text(rig_panel(result))}"
+    return Answer(result.as_dict(), text, result.verdicts, files)

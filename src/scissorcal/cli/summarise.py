@@ -123,24 +123,24 @@ def summarise(
             "compare logs of one quantity (--handle-radius-mm makes a force a torque)."
         )
     pair = [(recording, effort), *([(second, second_effort)] if second is not None else [])]
-    places = common_places([one for one, _ in pair])
-    found, *rest = sum_up(pair, places)
+    places = common_places([logged for logged, _ in pair])
+    summary, *rest = sum_up(pair, places)
     other = rest[0] if rest else None
-    surveys = [survey(one, ("opening", used)) for one, used in pair]
+    surveys = [survey(logged, ("opening", used)) for logged, used in pair]
     notes = tuple(
-        f"{one.source}: {said}"
-        for (one, _), seen in zip(pair, surveys, strict=True)
-        for said in (*_said(one), *seen.notes)
+        f"{logged.source}: {said}"
+        for (logged, _), look in zip(pair, surveys, strict=True)
+        for said in (*_said(logged), *look.notes)
     )
     rng = np.random.default_rng(0)  # one log gives one page
     shown = Shown(
-        log=found,
+        log=summary,
         second=other,
         against="blank" if blank else "other" if logs.compare else "",
-        apart=difference(found, other, rng) if other else None,
-        plateau=plateau_in(found, rng),
-        slope=slope_in(found),
-        friction=friction_of(other if blank and other else found),
+        apart=difference(summary, other, rng) if other else None,
+        plateau=plateau_in(summary, rng),
+        slope=slope_in(summary),
+        friction=friction_of(other if blank and other else summary),
         unit=unit,
         place=recording.joint.position_unit,
         cut_length_m=cut_length_mm * 1e-3 if cut_length_mm else None,
@@ -149,17 +149,18 @@ def summarise(
         notes=notes,
     )
     panels = summary_panels(shown)
-    page = summary_page(shown)
+    page = summary_page(shown, panels)
     with replacing(output) as part:
         part.write_text(page, encoding="utf-8")
-    seen = [
+    sensors = [
         line
-        for (one, _), look in zip(pair, surveys, strict=True)
-        for line in (f"Sensors in {one.source}", *survey_lines(look), "")
+        for (logged, _), look in zip(pair, surveys, strict=True)
+        for line in (f"Sensors in {logged.source}", *survey_lines(look), "")
     ]
-    text = "\n".join([panels_text(panels), "", *seen])
+    text = "\n".join([panels_text(panels), "", *sensors])
     looks = [
-        {"log": one.source, "survey": look} for (one, _), look in zip(pair, surveys, strict=True)
+        {"log": logged.source, "survey": look}
+        for (logged, _), look in zip(pair, surveys, strict=True)
     ]
     result = {"panels": panels, "notes": notes, "surveys": looks}
     return Answer(result, f"{text}{output}", files=[output])

@@ -32,8 +32,7 @@ def target(
       target-blade-A4.pdf, target-blade-A4.png: blade mat (markers 40-69)
       Print at 100 % (actual size); the rulers must be 200.0 mm across and 150.0 mm down.
     """
-    from scissorcal.vision.targets.sheet import RULERS_MM, target_sheet
-    from scissorcal.vision.targets.sheet_files import write_target
+    from scissorcal.vision.targets.sheet import RULERS_MM, target_sheet, write_target
 
     names: tuple[SheetName, ...] = ("camera", "blade", "plate") if what == "all" else (what,)
     written: list[Path] = []

@@ -55,7 +55,7 @@ class TrackView:
 
 def track_line(mark: "TrackMark", seconds: float | None) -> str:
     """State, pose with its standard deviation, NIS, rows used and refused, ages: in one line."""
-    from scissorcal.vision.located_frames import STATES
+    from scissorcal.vision.live import STATES
 
     passed = time_words(mark.seconds) + (f" of {time_words(seconds)}" if seconds else "")
     share = "" if math.isnan(mark.done) else f", {100 * mark.done:.0f} % of the pictures"

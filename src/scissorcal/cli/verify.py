@@ -7,19 +7,13 @@ import typer
 
 from scissorcal.cli.opening import writes_in
 from scissorcal.cli.options import RIG, Axis, Folder, options_of
-from scissorcal.cli.output import Answer, command, note, table
+from scissorcal.cli.output import Answer, command, note
 from scissorcal.cli.progress import progress
 from scissorcal.errors import InputError
 from scissorcal.workday.options import VerifySettings
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.verify.result import (
-        Calibration,
-        CheckKind,
-        Halves,
-        Sensitivity,
-        VerifyResult,
-    )
+    from scissorcal.calibration.verify.result import CheckKind
     from scissorcal.workday.workspace import FitKind
 
 _CHECKS: "tuple[CheckKind, ...]" = ("sbc", "halves", "prior")
@@ -86,18 +80,21 @@ def verify(
       $ scissorcal verify friction
       friction: coulomb + viscous, symmetric (standard)
     \b
-      100 fits to simulated data (truths: a normal distribution around the posterior, ...
-      quantity    in 50 %  in 90 %  width  shift     p
-      inertia       52.0%    90.5%   0.98   0.03  0.71
-      ...
-      two halves: whole strokes of a kind, alternating by speed
-      parameter  unit      first half  second half        sd     z
-      inertia    kg m^2     9.492e-05    0.0001172  2.93e-05   0.8
-      ...
+      Trust check: intervals on simulated data: Intervals hold the truth as often as they claim.
+                 50 % interval holds [%]  90 % interval holds [%]  uniformity p  too narrow by  ...
+        inertia  52 (32 to 68)            90 (78 to 98)            0.71          0.981          ...
+        ...
+      Trust check: two halves of the data: Fitted to each half alone, the predicted effort ...
+                 first half         second half        sd of the difference  z
+        inertia  0.000192 kg m^2    0.000190 kg m^2    0.0000047 kg m^2      0.34
+        ...
     \b
-    width: factor by which intervals are too narrow (above 1) or too wide; shift: their offset from
-    the truth; p: probability of such ranks if the intervals are right.
+    in brackets: the range of correct intervals; too narrow by: the factor, below 1 for intervals
+    that are too wide; shift: their offset from the truth; uniformity p: probability of such ranks
+    if the intervals are right.
     """
+    from scissorcal.report import panels_text
+    from scissorcal.report.subjects.trust import check_panels
     from scissorcal.workday.runs.verify import verify_workspace
 
     workers, cluster = processes.workers, processes.cluster
@@ -116,10 +113,15 @@ def verify(
         )
     for sentence in [sentence for outcome in outcomes for sentence in outcome.notes]:
         note(sentence)
+    checked = [outcome.result for outcome in outcomes]
     return Answer(
-        {"checks": [outcome.result for outcome in outcomes]},
-        "\n\n".join(_text(outcome.result) for outcome in outcomes),
-        verdicts=[verdict for outcome in outcomes for verdict in outcome.result.verdicts],
+        {"checks": checked},
+        "\n\n".join(
+            f"{check.what}: {check.rung} ({check.effort})\n\n"
+            f"{panels_text(check_panels(check, check.what))}"
+            for check in checked
+        ),
+        verdicts=[verdict for check in checked for verdict in check.verdicts],
         files=[outcome.path for outcome in outcomes],
     )
 
@@ -133,53 +135,3 @@ def _checks(value: str) -> "tuple[CheckKind, ...]":
             f"{', '.join(_CHECKS)}."
         )
     return tuple(check for check in _CHECKS if check in named)
-
-
-def _text(result: "VerifyResult") -> str:
-    parts = [f"{result.what}: {result.rung} ({result.effort})"]
-    if result.calibration:
-        parts.append(_calibration(result.calibration))
-    if result.halves:
-        parts.append(_halves(result.halves))
-    if result.sensitivity:
-        parts.append(_sensitivity(result.sensitivity))
-    return "\n\n".join(parts)
-
-
-def _calibration(found: "Calibration") -> str:
-    rows = [["quantity", "in 50 %", "in 90 %", "width", "shift", "p"]]
-    for quantity in found.quantities:
-        fifty, ninety = quantity.coverage
-        rows.append(
-            [
-                quantity.name,
-                f"{fifty.share:.1%}",
-                f"{ninety.share:.1%}",
-                f"{quantity.width:.2f}",
-                f"{quantity.shift:.2f}",
-                f"{quantity.ecdf_p:.2g}",
-            ]
-        )
-    fifty, ninety = found.quantities[0].coverage
-    head = (
-        f"{found.fits} fits to simulated data (truths: {found.generating}; noise: {found.noise}); "
-        f"expected {fifty.low:.0%} to {fifty.high:.0%} and {ninety.low:.0%} to {ninety.high:.0%}"
-    )
-    return f"{head}\n{table(rows, right=range(1, 6))}"
-
-
-def _halves(found: "Halves") -> str:
-    rows = [["parameter", "unit", "first half", "second half", "sd", "z"]]
-    for row in found.rows:
-        numbers = [f"{number:.4g}" for number in (row.first, row.second, row.sd)]
-        rows.append([row.name, row.unit, *numbers, "-" if row.z is None else f"{row.z:.1f}"])
-    return f"two halves: {found.split}\n{table(rows, right=range(2, 6))}"
-
-
-def _sensitivity(found: "Sensitivity") -> str:
-    rows = [["quantity", "prior", "likelihood", ""]]
-    rows += [
-        [row.name, f"{row.prior:.3f}", f"{row.likelihood:.3f}", row.diagnosis] for row in found.rows
-    ]
-    head = f"power-scaling sensitivity to prior and likelihood (limit {found.threshold:g})"
-    return f"{head}\n{table(rows, right=(1, 2))}"

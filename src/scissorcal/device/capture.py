@@ -26,7 +26,7 @@ from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import Joint, RecordingWriter, Stroke
+from scissorcal.recording import Joint, RecordingFacts, RecordingWriter, Stroke
 from scissorcal.recording.probe import UNKNOWN_REST, RestFacts
 
 SUPERVISOR_S = 0.3
@@ -71,11 +71,13 @@ def open_writer(
         path,
         kind,
         Joint(recipe.rig.joint),
-        session.recipe_toml,
-        rig_facts(identity, recipe.rig.motor_sign, session.probe),
-        identity.handle_radius,
-        () if hand or by_parts else planned(recipe, identity, kind).strokes,
-        min_travel=hand_travel(recipe, identity) if hand else None,
+        facts=RecordingFacts(
+            recipe_toml=session.recipe_toml,
+            device=rig_facts(identity, recipe.rig.motor_sign, session.probe),
+            handle_radius_m=identity.handle_radius,
+            strokes=() if hand or by_parts else planned(recipe, identity, kind).strokes,
+            min_travel=hand_travel(recipe, identity) if hand else None,
+        ),
     )
 
 

@@ -1,22 +1,21 @@
 """Posteriors of any model: optima, curvature, autocorrelation, sampling by effort."""
 
-from scissorcal.inference.ar_noise import ArNoise, fit_ar
 from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
-from scissorcal.inference.counting import Counter, Stop
 from scissorcal.inference.curvature import gradient, hessian
+from scissorcal.inference.importance import smooth_weights
 from scissorcal.inference.infer import infer
+from scissorcal.inference.noise import ArNoise, fit_ar, log_density, tails_of
 from scissorcal.inference.optimise import Cluster, Optimum, find_optimum
-from scissorcal.inference.pareto import smooth_weights
-from scissorcal.inference.posterior import Effort, Posterior
-from scissorcal.inference.problem import Problem
+from scissorcal.inference.posterior import Effort, InferOptions, Posterior
+from scissorcal.inference.problem import Counter, Problem, Stop
 from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus
-from scissorcal.inference.tails import log_density, tails_of
 
 __all__ = [
     "ArNoise",
     "Cluster",
     "Counter",
     "Effort",
+    "InferOptions",
     "NotFiniteError",
     "Optimum",
     "Posterior",

@@ -70,6 +70,7 @@ def between_groups(
     covariances = np.linalg.inv(held)
     p = means.shape[1]
     state = _State(
+        scale=scale,
         theta=np.broadcast_to(means.mean(axis=0), (CHAINS, p)).copy(),
         tau=scale * rng.choice(GRID[5:35], (CHAINS, p)),
         common=np.ones(CHAINS),
@@ -80,8 +81,8 @@ def between_groups(
         inverse = np.asarray(np.linalg.inv(covariances + spread), dtype=np.float64)
         _move_population(state, means, inverse, rng)
         for j in range(p):
-            _move_sd(state, j, float(scale[j]) * grids[j], grids[j], means, inverse, rng)
-        _move_common(state, scale, rng)
+            _move_sd(state, j, grids[j], means, inverse, rng)
+        _move_common(state, rng)
         if sweep >= BURN:
             kept.append((state.tau.copy(), state.theta.copy()))
     return Between(*(np.concatenate(parts) for parts in zip(*kept, strict=True)))
@@ -112,8 +113,12 @@ def one_normal(variances: Array) -> Array:
 
 @dataclass
 class _State:
-    """Where every chain is: population (c, p), standard deviations (c, p), common scale (c,)."""
+    """Where every chain is: population (c, p), standard deviations (c, p), common scale (c,).
 
+    ``scale`` (p,) is the one in whose units standard deviations have their grids.
+    """
+
+    scale: Array
     theta: Array
     tau: Array
     common: Array
@@ -136,18 +141,13 @@ def _grid(apart: float) -> Array:
 
 
 def _move_sd(
-    state: _State,
-    j: int,
-    grid: Array,
-    sizes: Array,
-    means: Array,
-    inverse: Array,
-    rng: np.random.Generator,
+    state: _State, j: int, sizes: Array, means: Array, inverse: Array, rng: np.random.Generator
 ) -> None:
-    """Draw tau_j from ``grid`` given all else, and bring ``inverse`` up to date.
+    """Draw tau_j from a grid of ``sizes``, in units of its scale, given all else.
 
-    ``sizes`` are those of ``grid`` in units of the scale (Sherman and Morrison).
+    ``inverse`` is brought up to date (Sherman and Morrison).
     """
+    grid = float(state.scale[j]) * sizes
     away = means - state.theta[:, None, :]
     pulled = np.einsum("crk,crk->cr", inverse[..., j, :], away)
     own = inverse[..., j, j]
@@ -163,8 +163,8 @@ def _move_sd(
     state.tau[:, j] = grid[chosen]
 
 
-def _move_common(state: _State, scale: Array, rng: np.random.Generator) -> None:
-    log = _log_prior((state.tau / scale)[:, :, None], COMMON_GRID).sum(axis=1)
+def _move_common(state: _State, rng: np.random.Generator) -> None:
+    log = _log_prior((state.tau / state.scale)[:, :, None], COMMON_GRID).sum(axis=1)
     log = log + np.log(COMMON_GRID) - np.log1p(COMMON_GRID**2)
     state.common = COMMON_GRID[_drawn(log, rng)]
 

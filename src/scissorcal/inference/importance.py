@@ -1,4 +1,4 @@
-"""Importance sampling around optima, Pareto-smoothed, with its own check."""
+"""Importance sampling from mixtures of Student-t, with Pareto-smoothed weights."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -7,7 +7,6 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.inference.mixture import Mixture, fit_mixture, wide_mixture
-from scissorcal.inference.pareto import smooth_weights
 
 Many = Callable[[Array], Array]
 
@@ -92,35 +91,27 @@ class Sampled:
 
 
 def sample_by_importance(
-    log_posterior: Callable[[Array], float],
+    log_posteriors: Many,
     proposal: Mixture,
     count: int,
     rng: np.random.Generator,
-    rounds: int | None = None,
-    many: Many | None = None,
+    rounds: int = ROUNDS,
 ) -> Sampled:
     """Sample a posterior near its Laplace approximation.
 
-    ``many`` gives the log-posterior of draws (n, p) at once, shape (n,), where that is cheaper.
-    Draws come from a mixture of multivariate Student-t (7 degrees of freedom), one for each known
-    optimum; weights are Pareto-smoothed (Vehtari et al. 2024, JMLR 25:72). Where k-hat lies between
-    0.5 and 0.7 as many draws are added first: of 2,000 draws k-hat has an error of 0.1. Where it
-    still exceeds 0.5 the proposal is moved to the mean and covariance of the weighted draws,
-    ``rounds`` times at most (four if not given), and kept where that served. Each fit is to the
-    draws of all rounds so far.
+    ``log_posteriors`` gives the log-posterior of draws (n, p), shape (n,). Draws come from a
+    mixture of multivariate Student-t (7 degrees of freedom), one for each known optimum; weights
+    are Pareto-smoothed (Vehtari et al. 2024, JMLR 25:72). Where k-hat lies between 0.5 and 0.7 as
+    many draws are added first: of 2,000 draws k-hat has an error of 0.1. Where it still exceeds 0.5
+    the proposal is moved to the mean and covariance of the weighted draws, ``rounds`` times at
+    most, and kept where that served. Each fit is to the draws of all rounds so far.
     """
-    rounds = ROUNDS if rounds is None else rounds
-    log_posteriors = many or _one_by_one(log_posterior)
-    first = _once(log_posteriors, proposal, count, rng)
+    sampler = _Sampler(log_posteriors, count, rng)
+    first = sampler.once(proposal)
     if rounds < 2:
         return first
     if GOOD_K < first.k_hat <= K_HAT_LIMIT:
-        more = _once(log_posteriors, proposal, count, rng)
-        first = _weigh(
-            np.concatenate([first.draws, more.draws]),
-            np.concatenate([first.log_ratio, more.log_ratio]),
-            proposal,
-        )
+        first = _joined(first, sampler.once(proposal), proposal)
     if first.k_hat <= GOOD_K:
         return first
     components = len(proposal.weights)
@@ -128,20 +119,19 @@ def sample_by_importance(
     def refit(sampled: Sampled) -> Mixture:
         return fit_mixture(sampled.draws, sampled.weights, components, rng)
 
-    adapted = _adapted(log_posteriors, first, refit, count, rng, rounds - 1, GOOD_K)
+    adapted = _adapted(sampler, first, refit, rounds - 1, GOOD_K)
     if first.trusted and not adapted.trusted:
         return replace(first, evaluations=adapted.evaluations)
     return adapted
 
 
 def sample_by_mixture(
-    log_posterior: Callable[[Array], float],
+    log_posteriors: Many,
     first: Sampled,
     proposal: Mixture,
     count: int,
     rng: np.random.Generator,
     budget: int,
-    many: Many | None = None,
 ) -> Sampled | None:
     """Sample a posterior that one Student-t does not fit, from a mixture of several.
 
@@ -160,8 +150,8 @@ def sample_by_mixture(
         fitted = fit_mixture(sampled.draws, sampled.weights, COMPONENTS, rng)
         return wide_mixture(fitted, WIDER).joined(guard, DEFENSIVE)
 
-    log_posteriors = many or _one_by_one(log_posterior)
-    return _adapted(log_posteriors, first, refit, count, rng, rounds, GOOD_MIXTURE_K, batches)
+    sampler = _Sampler(log_posteriors, count, rng)
+    return _adapted(sampler, first, refit, rounds, GOOD_MIXTURE_K, batches)
 
 
 def sample_by_proposal(
@@ -173,20 +163,19 @@ def sample_by_proposal(
     others from ``proposal``, so that no region that it has is lost. It takes about ``budget``
     evaluations at most.
     """
-    first = _once(log_posteriors, proposal, 2 * count, rng)
+    sampler = _Sampler(log_posteriors, count, rng)
+    first = sampler.once(proposal, 2)
     fitted = fit_mixture(first.draws, first.weights, COMPONENTS, rng)
     batches = max(min(MORE_BATCHES, budget // (2 * count) - 2), 0)
     joined = fitted.joined(proposal, 0.5)
-    found = _enough(log_posteriors, joined, count, rng, batches, NO_MEAN)
-    return replace(found, wanted=float(count))
+    sampled = sampler.enough(joined, batches, NO_MEAN)
+    return replace(sampled, wanted=float(count))
 
 
 def _adapted(
-    log_posteriors: Many,
+    sampler: "_Sampler",
     first: Sampled,
     refit: Callable[[Sampled], Mixture],
-    count: int,
-    rng: np.random.Generator,
     rounds: int,
     good: float,
     batches: int | None = None,
@@ -198,61 +187,71 @@ def _adapted(
     The lowest of several k-hats is too low by its very choice, and a proposal that was fitted to
     draws looks better on them than it is; so what was adapted is drawn from afresh, twice as often.
     Where ``batches`` are given, half of these draws come from farther out than it reaches, and as
-    many are drawn again, so often at most, until ``count`` are effective. A k-hat up to ``good``
-    ends the search.
+    many are drawn again, so often at most, until as many as were asked for are effective. A k-hat
+    up to ``good`` ends the search.
     """
     sampled, lowest, used = first, np.inf, first.evaluations
     chosen = refit(first)
-    proposal, seen = chosen, [first]
+    proposal, earlier = chosen, [first]
     for left in range(rounds - 1, -1, -1):
-        sampled = _once(log_posteriors, proposal, count, rng)
-        seen.append(sampled)
-        used += count
+        sampled = sampler.once(proposal)
+        earlier.append(sampled)
+        used += sampler.count
         if sampled.k_hat < lowest:
             lowest, chosen = sampled.k_hat, proposal
         if sampled.k_hat <= good or left == 0:
             break
-        proposal = refit(pooled(seen))
+        proposal = refit(pooled(earlier))
     beyond = batches is not None
     judging = chosen.joined(wide_mixture(chosen, LOOKED_BEYOND), 0.5) if beyond else chosen
-    fresh = _enough(log_posteriors, judging, count, rng, batches or 0, ADAPTED_LIMIT)
+    fresh = sampler.enough(judging, batches or 0, ADAPTED_LIMIT)
     if first.proposal is not None and _width(fresh, first.proposal) < COLLAPSED:
         fresh = replace(fresh, k_hat=np.inf)
     return replace(
         fresh,
         evaluations=used + len(fresh.draws),
         limit=ADAPTED_LIMIT,
-        wanted=float(count) if beyond else 0.0,
+        wanted=float(sampler.count) if beyond else 0.0,
     )
 
 
-def _enough(
-    log_posteriors: Many,
-    proposal: Mixture,
-    count: int,
-    rng: np.random.Generator,
-    batches: int,
-    limit: float,
-) -> Sampled:
-    """Twice ``count`` draws, and as many again until ``count`` of all are effective.
+@dataclass(frozen=True)
+class _Sampler:
+    """Draws ``count`` at a time."""
 
-    It ends after so many ``batches`` more, where k-hat is beyond ``limit``, and where there is no
-    hope of as many.
-    """
-    fresh = _once(log_posteriors, proposal, 2 * count, rng)
-    for left in range(batches, 0, -1):
-        drawn = len(fresh.draws)
-        # they grow in jumps, so go on while half of what is wanted is expected
-        hopeless = 2.0 * fresh.effective * (drawn + 2 * count * left) < count * drawn
-        if fresh.k_hat > limit or fresh.effective >= count or hopeless:
-            break
-        more = _once(log_posteriors, proposal, 2 * count, rng)
-        fresh = _weigh(
-            np.concatenate([fresh.draws, more.draws]),
-            np.concatenate([fresh.log_ratio, more.log_ratio]),
-            proposal,
-        )
-    return fresh
+    log_posteriors: Many
+    count: int
+    rng: np.random.Generator
+
+    def once(self, proposal: Mixture, times: int = 1) -> Sampled:
+        """So many ``times`` the count, weighed."""
+        draws = proposal.draw(times * self.count, self.rng)
+        return _weigh(draws, self.log_posteriors(draws) - proposal.log_density(draws), proposal)
+
+    def enough(self, proposal: Mixture, batches: int, limit: float) -> Sampled:
+        """Twice the count, and as many again until the count of all are effective.
+
+        It ends after so many ``batches`` more, where k-hat is beyond ``limit``, and where there is
+        no hope of as many.
+        """
+        count, fresh = self.count, self.once(proposal, 2)
+        for left in range(batches, 0, -1):
+            drawn = len(fresh.draws)
+            # they grow in jumps, so go on while half of what is wanted is expected
+            hopeless = 2.0 * fresh.effective * (drawn + 2 * count * left) < count * drawn
+            if fresh.k_hat > limit or fresh.effective >= count or hopeless:
+                break
+            fresh = _joined(fresh, self.once(proposal, 2), proposal)
+        return fresh
+
+
+def _joined(sampled: Sampled, more: Sampled, proposal: Mixture) -> Sampled:
+    """Draws of one proposal together."""
+    return _weigh(
+        np.concatenate([sampled.draws, more.draws]),
+        np.concatenate([sampled.log_ratio, more.log_ratio]),
+        proposal,
+    )
 
 
 def _width(sampled: Sampled, proposal: Mixture) -> float:
@@ -263,23 +262,14 @@ def _width(sampled: Sampled, proposal: Mixture) -> float:
     return float(np.sqrt(max(values[0], 0.0)))
 
 
-def _one_by_one(log_posterior: Callable[[Array], float]) -> Many:
-    return lambda draws: np.array([log_posterior(draw) for draw in draws])
-
-
-def _once(log_posteriors: Many, proposal: Mixture, count: int, rng: np.random.Generator) -> Sampled:
-    draws = proposal.draw(count, rng)
-    return _weigh(draws, log_posteriors(draws) - proposal.log_density(draws), proposal)
-
-
-def pooled(seen: list[Sampled]) -> Sampled:
+def pooled(parts: list[Sampled]) -> Sampled:
     """All draws, weighed as if each had come from the mixture of all proposals by their shares."""
-    known = [(one, one.proposal) for one in seen if one.proposal is not None]
-    if len(known) < len(seen):
+    known = [(part, part.proposal) for part in parts if part.proposal is not None]
+    if len(known) < len(parts):
         raise ValueError("draws are pooled by their proposals, and some have none")
-    draws = np.concatenate([one.draws for one, _ in known])
-    heights = [one.log_ratio + own.log_density(one.draws) for one, own in known]
-    densities = [np.log(len(one.draws)) + own.log_density(draws) for one, own in known]
+    draws = np.concatenate([part.draws for part, _ in known])
+    heights = [part.log_ratio + proposal.log_density(part.draws) for part, proposal in known]
+    densities = [np.log(len(part.draws)) + proposal.log_density(draws) for part, proposal in known]
     joined = np.logaddexp.reduce(densities, axis=0) - np.log(len(draws))
     return _weigh(draws, np.concatenate(heights) - joined)
 
@@ -296,3 +286,83 @@ def _weigh(draws: Array, log_ratio: Array, proposal: Mixture | None = None) -> S
     effective = float(1.0 / np.sum(weights**2))
     k = float(k_hat) if effective >= FEWEST_EFFECTIVE else np.inf
     return Sampled(draws, weights, k, effective, len(draws), log_ratio=log_ratio, proposal=proposal)
+
+
+LARGEST_TAIL = 0.2
+"""Share of the weights that may count as their tail."""
+
+FEWEST_IN_TAIL = 5
+PRIOR_DRAWS = 10
+PRIOR_K = 0.5
+"""Weak prior on the tail index: as much as ten draws, at a half."""
+
+QUARTILES = 3.0
+
+
+def smooth_weights(log_ratios: Array) -> tuple[Array, Array]:
+    """Pareto-smoothed normalised log weights of log ratios (..., n), and their k-hats (...,).
+
+    The largest 3 sqrt(n) ratios, a fifth of them at most, are replaced by quantiles of a
+    generalised Pareto distribution that is fitted to them; its shape is k-hat, infinite where the
+    tail is too short to be fitted (Vehtari et al. 2024, JMLR 25:72). Ratios must be finite;
+    ValueError where they are not, or where there are none.
+
+    >>> draws = np.random.default_rng(0).standard_normal(1000)
+    >>> weights, k_hat = smooth_weights(0.1 * draws)
+    >>> round(float(np.exp(weights).sum()), 6), bool(k_hat < 0.5)
+    (1.0, True)
+    """
+    rows = np.atleast_2d(log_ratios)
+    if rows.size == 0 or not np.all(np.isfinite(rows)):
+        raise ValueError("importance ratios are smoothed where there are some, and all are finite")
+    smoothed = [_smoothed(row) for row in rows]
+    weights = np.stack([row for row, _ in smoothed]).reshape(np.shape(log_ratios))
+    return weights, np.array([k_hat for _, k_hat in smoothed]).reshape(np.shape(log_ratios)[:-1])
+
+
+def _smoothed(log_ratios: Array) -> tuple[Array, float]:
+    logs = log_ratios - log_ratios.max()
+    count = len(logs)
+    length = int(np.ceil(min(LARGEST_TAIL * count, 3.0 * np.sqrt(count))))
+    order = np.argsort(logs)
+    cutoff = max(
+        float(logs[order[-min(length, count - 1) - 1]]), float(np.log(np.finfo(float).tiny))
+    )
+    tail = order[logs[order] > cutoff]
+    k_hat = float("inf")
+    if len(tail) >= FEWEST_IN_TAIL:
+        above = np.exp(logs[tail]) - np.exp(cutoff)
+        k_hat, scale = _fit_pareto(above)
+        if np.isfinite(k_hat) and scale > 0.0:
+            places = (np.arange(len(tail)) + 0.5) / len(tail)
+            logs[tail] = np.log(_pareto_quantiles(places, k_hat, scale) + np.exp(cutoff))
+            logs = np.minimum(logs, 0.0)
+    return logs - float(np.logaddexp.reduce(logs)), k_hat
+
+
+def _fit_pareto(sample: Array) -> tuple[float, float]:
+    """Shape and scale of a generalised Pareto distribution for a sorted sample (n,) above zero.
+
+    The empirical Bayes estimate of Zhang and Stephens 2009 (doi:10.1198/tech.2009.08017), its shape
+    drawn to a half by a weak prior.
+    """
+    count = len(sample)
+    points = 30 + int(np.sqrt(count))
+    quartile = sample[int(count / 4 + 0.5) - 1]
+    grid = (1.0 - np.sqrt(points / (np.arange(points) + 0.5))) / (QUARTILES * quartile)
+    grid = grid + 1.0 / sample[-1]
+    shapes = np.mean(np.log1p(-grid[:, None] * sample), axis=1)
+    heights = count * (np.log(-grid / shapes) - shapes - 1.0)
+    weights = np.exp(heights - np.logaddexp.reduce(heights))
+    weights = np.where(weights >= 10 * np.finfo(float).eps, weights, 0.0)
+    best = float(np.sum(grid * weights) / np.sum(weights))
+    shape = float(np.mean(np.log1p(-best * sample)))
+    scale = -shape / best
+    return (count * shape + PRIOR_DRAWS * PRIOR_K) / (count + PRIOR_DRAWS), scale
+
+
+def _pareto_quantiles(places: Array, shape: float, scale: float) -> Array:
+    if abs(shape) < np.finfo(float).eps:
+        return np.asarray(-scale * np.log1p(-places))
+    with np.errstate(over="ignore"):  # an infinite quantile is cut to the largest ratio
+        return np.asarray(scale * np.expm1(-shape * np.log1p(-places)) / shape)

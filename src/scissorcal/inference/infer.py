@@ -2,27 +2,26 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from scissorcal.aliases import Array, Progress
-from scissorcal.inference.counting import Counter, Stop, TimeUsedUpError
+from scissorcal.aliases import Array
+from scissorcal.inference.autocorrelation import long_run_covariance
 from scissorcal.inference.importance import (
     DEFENSIVE,
     GOOD_K,
+    ROUNDS,
     Sampled,
     sample_by_importance,
     sample_by_mixture,
     sample_by_proposal,
 )
 from scissorcal.inference.laplace import Laplace, Shape, laplace, local_covariance, polish
-from scissorcal.inference.long_run import long_run_covariance
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.nested import nested_mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
-from scissorcal.inference.posterior import Effort, Posterior
-from scissorcal.inference.problem import Problem
+from scissorcal.inference.posterior import Effort, InferOptions, Posterior
+from scissorcal.inference.problem import Counter, Problem, TimeUsedUpError
 from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus, about, picked
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 
@@ -53,11 +52,7 @@ def infer(
     *,
     count: int = 2000,
     optimum: Optimum | None = None,
-    progress: Progress | None = None,
-    escalate: bool = True,
-    checkpoint: Path | None = None,
-    budget: int | None = None,
-    stop: Stop | None = None,
+    options: InferOptions = InferOptions(),
 ) -> Posterior:
     """Infer a posterior whose likelihood terms may be autocorrelated.
 
@@ -70,24 +65,22 @@ def infer(
 
     ``effort`` draft draws from the normal approximation; standard draws by Pareto-smoothed
     importance sampling around every optimum; thorough runs independent ensembles. Where standard
-    does not do well (k-hat above 0.5) it goes on by itself, unless ``escalate`` is false: with a
+    does not do well (k-hat above 0.5) it goes on by itself, unless ``options`` forbid it: with a
     proposal that follows the posterior along its ``curved`` parameters (:func:`nested_mixture`), if
     the problem names any, then with a mixture that adapts to it. Where that still fails its check
     (k-hat above 0.7, or 0.5 for a proposal that was adapted to draws and for the normal
     approximation of a problem with ``curved`` parameters; fewer effective draws of a mixture than
-    ``count``), and ``budget`` allows, it goes on with ensembles. What it became is said in the
+    ``count``), and the budget allows, it goes on with ensembles. What it became is said in the
     result.
-    ``optimum`` may be passed if it is known already, ``count`` is the number of draws, ``budget``
-    the evaluations that sampling may take, ``checkpoint`` the file that ensembles resume from (see
-    :func:`run_ensembles`). ``stop`` is asked before every evaluation of search and sampling whether
-    the time allowed is used up; what is there by then is returned, with the status for it, and
-    draws of the normal approximation where there are no better ones. The curvature is measured
-    whatever the time.
+    ``optimum`` may be passed if it is known already, ``count`` is the number of draws. Where the
+    time allowed is used up, what is there by then is returned, with the status for it, and draws of
+    the normal approximation where there are no better ones. The curvature is measured whatever the
+    time.
 
     Raises NotFiniteError (a ValueError) where the log-posterior is not finite at any start or
     beside the optimum, or so large that rounding hides its shape.
     """
-    tell = progress or (lambda done, sentence: None)
+    tell, stop = options.progress or (lambda done, sentence: None), options.stop
     counter = Counter()
     counted = counter.over(problem)
     tell(0.0, "searching the optimum")
@@ -105,33 +98,34 @@ def infer(
     proposal = _proposal(counted, best, local)
     if stop is not None:
         local = laplace(counter.over(problem, stop), shape, spread)
-    beside = 0 if budget else FOLLOWING
-    run = _Run(problem, local, proposal, counter, rng, count, tell, beside)
+    beside = 0 if options.budget else FOLLOWING
+    limits = replace(options, budget=options.budget or BUDGET[effort], progress=tell)
+    run = _Run(problem, local, proposal, counter, rng, count, limits, beside)
     try:
-        found = run.at(effort, budget or BUDGET[effort], escalate, checkpoint)
+        outcome = run.at(effort)
     except NotFiniteError as error:
         if best.success:
             raise
         raise NotFiniteError(f"{best.sentence} So nothing could be sampled: {error}") from None
-    tell(1.0, found.sentence)
+    tell(1.0, outcome.sentence)
     return Posterior(
         names=problem.names,
         optimum=best,
-        draws=found.draws,
+        draws=outcome.draws,
         covariance=local.covariance,
-        k_hat=found.k_hat,
-        effective=found.effective,
+        k_hat=outcome.k_hat,
+        effective=outcome.effective,
         inflation=local.inflation,
         null=local.null,
         effort=effort,
-        effort_reached=found.reached,
-        status=found.status,
-        sentence=found.sentence,
+        effort_reached=outcome.reached,
+        status=outcome.status,
+        sentence=outcome.sentence,
         evaluations=best.evaluations + counter.calls,
-        r_hat=found.r_hat,
-        tau=found.tau,
-        ensembles=found.ensembles,
-        acceptance=found.acceptance,
+        r_hat=outcome.r_hat,
+        tau=outcome.tau,
+        ensembles=outcome.ensembles,
+        acceptance=outcome.acceptance,
         log_posterior=laplace(problem, shape, spread).log_posterior,
         noise_orders=worth.orders if worth else (),
         dispersion=worth.dispersion if worth else 1.0,
@@ -219,23 +213,25 @@ class _Run:
     counter: Counter
     rng: np.random.Generator
     count: int
-    tell: Progress
+    limits: InferOptions
     beside: int
     """Evaluations beside the budget that following a bend may take."""
 
-    def at(
-        self,
-        effort: Effort,
-        budget: int,
-        escalate: bool,
-        checkpoint: Path | None,
-    ) -> _Found:
+    @property
+    def budget(self) -> int:
+        return self.limits.budget or 0
+
+    def tell(self, done: float, sentence: str) -> None:
+        if self.limits.progress:
+            self.limits.progress(done, sentence)
+
+    def at(self, effort: Effort) -> _Found:
         try:
             if effort == "draft":
                 return self.draft()
             if effort == "standard":
-                return self.standard(budget, escalate, checkpoint)
-            return self.thorough(budget, checkpoint)
+                return self.standard()
+            return self.thorough()
         except TimeUsedUpError:
             return self.out_of_time()
 
@@ -256,30 +252,27 @@ class _Run:
         sentence = f"{status.value} The time ended first: the draws are the normal approximation's."
         return replace(self.draft(), status=status, sentence=sentence)
 
-    def standard(self, budget: int, escalate: bool, checkpoint: Path | None) -> _Found:
+    def standard(self) -> _Found:
         self.tell(0.4, "sampling")
-        target, proposal = self.local.log_posterior, self.proposal
-        first = self.counter.calls
-        many = self.local.log_posteriors
-
-        beside = self.beside
+        proposal, first, escalate = self.proposal, self.counter.calls, self.limits.escalate
+        many, beside = self.local.log_posteriors, self.beside
 
         def left() -> int:
-            return max(budget + beside - (self.counter.calls - first), 0)
+            return max(self.budget + beside - (self.counter.calls - first), 0)
 
         bends = bool(self.problem.curved) and escalate
-        rounds = 1 if bends else None
-        sampled = sample_by_importance(target, proposal, self.count, self.rng, rounds, many)
+        rounds = 1 if bends else ROUNDS
+        sampled = sample_by_importance(many, proposal, self.count, self.rng, rounds)
         said = f"k-hat {sampled.k_hat:.2f}"
         if bends and sampled.k_hat > GOOD_K:
             self.tell(0.45, f"{said}: following the posterior where it bends")
             before = self.counter.calls
             for mixture in _following(self.local, self.problem.curved, left):
                 joined = mixture.joined(proposal, DEFENSIVE)
-                found = sample_by_proposal(many, joined, self.count, self.rng, left())
-                said += f", {found.k_hat:.2f} with a proposal that follows the bend"
-                if found.trusted:
-                    return self._weighed(found, said)
+                outcome = sample_by_proposal(many, joined, self.count, self.rng, left())
+                said += f", {outcome.k_hat:.2f} with a proposal that follows the bend"
+                if outcome.trusted:
+                    return self._weighed(outcome, said)
             beside = min(beside, self.counter.calls - before)
             sampled = replace(sampled, limit=GOOD_K)
         if sampled.k_hat > GOOD_K and escalate:
@@ -287,7 +280,7 @@ class _Run:
             after = left() - fewest_evaluations(len(self.problem.names))
             # where those are enough, ensembles can follow
             most = after if after >= MIXTURE_TAKES * self.count else left()
-            mixed = sample_by_mixture(target, sampled, proposal, self.count, self.rng, most, many)
+            mixed = sample_by_mixture(many, sampled, proposal, self.count, self.rng, most)
             if mixed is not None:
                 said += f", {mixed.k_hat:.2f} with an adapted mixture"
                 said += f" and {mixed.effective:.0f} effective draws ({mixed.wanted:.0f} wanted)"
@@ -301,19 +294,13 @@ class _Run:
             said += f"; ensembles need at least {wanted} evaluations and {left()} are left"
             return self._weighed(sampled, said)
         self.tell(0.6, f"{said}: running ensembles")
-        return self._walked(left(), checkpoint, sampled, f"Escalated from standard ({said}). ")
+        return self._walked(left(), sampled, f"Escalated from standard ({said}). ")
 
-    def thorough(self, budget: int, checkpoint: Path | None) -> _Found:
+    def thorough(self) -> _Found:
         self.tell(0.4, "checking the approximation")
-        sampled = sample_by_importance(
-            self.local.log_posterior,
-            self.proposal,
-            self.count,
-            self.rng,
-            rounds=1,
-            many=self.local.log_posteriors,
-        )
-        return self._walked(budget, checkpoint, sampled, "")
+        many = self.local.log_posteriors
+        sampled = sample_by_importance(many, self.proposal, self.count, self.rng, rounds=1)
+        return self._walked(self.budget, sampled, "")
 
     def _weighed(self, sampled: Sampled, said: str) -> _Found:
         status = SamplingStatus.WEIGHED if sampled.trusted else SamplingStatus.HEAVY_WEIGHTS
@@ -331,17 +318,15 @@ class _Run:
             tau=nothing,
         )
 
-    def _walked(
-        self, budget: int, checkpoint: Path | None, sampled: Sampled, before: str
-    ) -> _Found:
-        chains = run_ensembles(
-            self.local.log_posterior,
-            self.proposal,
-            self.rng,
+    def _walked(self, budget: int, sampled: Sampled, before: str) -> _Found:
+        limits = replace(
+            self.limits,
             budget=budget,
-            checkpoint=checkpoint,
-            many=self.local.log_posteriors,
             progress=lambda done, sentence: self.tell(0.5 + 0.5 * done, sentence),
+        )
+        local = self.local
+        chains = run_ensembles(
+            local.log_posterior, self.proposal, self.rng, limits, local.log_posteriors
         )
         return _Found(
             draws=_thinned(chains, self.count, self.rng),

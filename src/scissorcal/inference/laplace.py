@@ -7,8 +7,14 @@ from functools import cached_property
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.inference.curvature import gradient, hessian, natural_step
-from scissorcal.inference.information import Slopes, likelihood_information, slopes_at
+from scissorcal.inference.curvature import (
+    Slopes,
+    gradient,
+    hessian,
+    likelihood_information,
+    natural_step,
+    slopes_at,
+)
 from scissorcal.inference.optimise import Optimum, move_optimum
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import NotFiniteError, picked

@@ -7,8 +7,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.inference.ascent import ascend
-from scissorcal.inference.counting import Counter, Stop
-from scissorcal.inference.problem import Problem
+from scissorcal.inference.problem import Counter, Problem, Stop
 from scissorcal.inference.squares import descend, has_squares
 from scissorcal.inference.status import NotFiniteError, SearchStatus, about, picked
 

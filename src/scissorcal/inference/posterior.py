@@ -1,14 +1,33 @@
-"""What inference returns, whatever the effort."""
+"""What inference takes beside the problem, and what it returns, whatever the effort."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
-from scissorcal.aliases import Array
+from scissorcal.aliases import Array, Progress
 from scissorcal.inference.optimise import Cluster, Optimum
+from scissorcal.inference.problem import Stop
 from scissorcal.inference.status import SamplingStatus
 
 Effort = Literal["draft", "standard", "thorough"]
+
+
+@dataclass(frozen=True)
+class InferOptions:
+    """How far an inference goes, and who follows it.
+
+    ``budget`` is the number of evaluations that sampling may take; None leaves it to the effort.
+    Standard effort goes on with other samplers where it does not do well, unless ``escalate`` is
+    false. ``checkpoint`` is the file that ensembles resume from. ``stop`` is asked before every
+    evaluation of search and sampling whether the time allowed is used up.
+    """
+
+    budget: int | None = None
+    escalate: bool = True
+    checkpoint: Path | None = None
+    stop: Stop | None = None
+    progress: Progress | None = None
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.inference.counting import Stop, TimeUsedUpError
 from scissorcal.inference.curvature import gradient, hessian
-from scissorcal.inference.problem import Problem
+from scissorcal.inference.problem import Problem, Stop, TimeUsedUpError
 
 ALTERNATIONS = 8
 """Rounds of least squares with the standard deviations held, each followed by scoring."""

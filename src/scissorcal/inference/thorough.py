@@ -2,15 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import cast
 
 import numpy as np
 
-from scissorcal.aliases import Array, Progress
+from scissorcal.aliases import Array
 from scissorcal.inference.checkpoint import RandomState, Walk, load_walks, save_walks
-from scissorcal.inference.counting import TimeUsedUpError
 from scissorcal.inference.mixture import Mixture
+from scissorcal.inference.posterior import InferOptions
+from scissorcal.inference.problem import TimeUsedUpError
 from scissorcal.inference.status import NotFiniteError, SamplingStatus
 
 ENSEMBLES = 4
@@ -81,10 +81,7 @@ def run_ensembles(
     log_posterior: Callable[[Array], float],
     proposal: Mixture,
     rng: np.random.Generator,
-    *,
-    budget: int,
-    checkpoint: Path | None = None,
-    progress: Progress | None = None,
+    options: InferOptions,
     many: Callable[[Array], Array] | None = None,
 ) -> Chains:
     """Sample a posterior with four independent ensembles of walkers (emcee).
@@ -93,8 +90,8 @@ def run_ensembles(
     doi:10.1007/s11222-006-8769-1), one is by a whole such difference, two stretch the line to one
     other walker (Goodman and Weare 2010, doi:10.2140/camcos.2010.5.65). Walkers begin as draws of
     ``proposal``. The run ends when what follows the burn-in is longer than 100 autocorrelation
-    times of every parameter, those times have settled, and the ensembles agree; or when
-    ``budget`` evaluations are used up. ``checkpoint`` is written after every 256 steps; where it
+    times of every parameter, those times have settled, and the ensembles agree; or when the
+    budget of ``options`` is used up. Its checkpoint is written after every 256 steps; where it
     exists, the run goes on from there exactly as if it had never stopped. Randomness comes from
     ``rng`` alone. ``many`` gives the log-posterior of points (k, p) at once, shape (k,), where that
     is cheaper. An evaluation that raises TimeUsedUpError ends the run as a used-up budget does; it
@@ -104,7 +101,8 @@ def run_ensembles(
     checkpoint belongs to another posterior or cannot be read, and ValueError where the budget is
     less than one block.
     """
-    tell = progress or (lambda done, sentence: None)
+    tell = options.progress or (lambda done, sentence: None)
+    budget, checkpoint = options.budget or 0, options.checkpoint
     walks = [_begin(log_posterior, proposal, rng) for _ in range(ENSEMBLES)]
     if checkpoint is not None and checkpoint.exists():
         walks = load_walks(checkpoint, log_posterior, walks[0].coords.shape)

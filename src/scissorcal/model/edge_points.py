@@ -37,7 +37,7 @@ def edge_through(points_m: ArrayLike) -> tuple[Edge, float]:
     (4, True)
     """
     points = np.asarray(points_m, dtype=np.float64)
-    refuse_unfit(points)
+    _refuse_unfit(points)
     station, offset = points.T
     start, end = float(station[0]), float(station[-1])
     found: list[tuple[Edge, float]] = []
@@ -61,7 +61,7 @@ def edge_through(points_m: ArrayLike) -> tuple[Edge, float]:
     return edge, misfit
 
 
-def refuse_unfit(points: Array) -> None:
+def _refuse_unfit(points: Array) -> None:
     """ValueError, a sentence, for points that are no edge from the pivot to a tip beyond it."""
     if not FEWEST_POINTS <= len(points) <= MOST_POINTS:
         raise ValueError(

@@ -393,21 +393,3 @@ def side_of(name: str, known: Container[str]) -> str | None:
     """
     stem = name.removesuffix("_pos").removesuffix("_neg")
     return name if name in known else stem if stem in known else None
-
-
-def evaluate(names: tuple[str, ...], motion: Motion) -> Array:
-    """Columns of the named terms over a motion, shape (n, len(names)).
-
-    KeyError for a name that is not in :data:`TERMS`; ValueError for a term of the load where none
-    was measured.
-
-    >>> import numpy as np
-    >>> motion = Motion(np.array([0.3]), np.array([-2.0]), np.array([0.0]))
-    >>> evaluate(("rate^2", "sign"), motion)
-    array([[ 4., -1.]])
-    """
-    import numpy as np
-
-    if not names:
-        return np.zeros((len(motion.rate), 0))
-    return np.stack([TERMS[name].column(motion) for name in names], axis=1)

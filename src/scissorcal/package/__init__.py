@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scissorcal.package.archive import read_manifest
-    from scissorcal.package.build import PackageSummary, build_package, put_review
+    from scissorcal.package.build import PackageOptions, PackageSummary, build_package, put_review
     from scissorcal.package.check import check_package
     from scissorcal.package.manifest import Manifest, manifest_schema_text
     from scissorcal.package.model_package import (
@@ -22,6 +22,7 @@ __all__ = [
     "Manifest",
     "ModelPackage",
     "OutsideCoverageWarning",
+    "PackageOptions",
     "PackageSummary",
     "Review",
     "build_package",
@@ -35,7 +36,7 @@ __all__ = [
 
 _HOMES = {
     "archive": ("read_manifest",),
-    "build": ("PackageSummary", "build_package", "put_review"),
+    "build": ("PackageOptions", "PackageSummary", "build_package", "put_review"),
     "check": ("check_package",),
     "manifest": ("Manifest", "manifest_schema_text"),
     "model_package": (

@@ -92,13 +92,20 @@ class ExactTorque:
         return self.away(average.torque(points.opening, points.opening_rate, points.contact))
 
 
+@dataclass(frozen=True)
+class SearchGrid:
+    """Where tables are compared with the model: ranges, number of places, slowest rate (rad/s)."""
+
+    scene: Ranges
+    count: int
+    slowest: float
+
+
 def deviation(
     model: ExactModel,
     average: AverageTorque,
-    scene: Ranges,
+    search: SearchGrid,
     limit: float,
-    count: int,
-    slowest: float,
     *,
     largest: float = 0.0,
 ) -> Deviation:
@@ -107,14 +114,14 @@ def deviation(
     First on the places of `telling_points`; then in shrinking neighbourhoods of the worst.
     With ``largest``, the scene's largest torque, differences are weighed as `ExactTorque` does.
     """
-    points = telling_points(model, scene, count, slowest)
+    points, scene = telling_points(model, search), search.scene
     exact = ExactTorque.at(model, points, limit, largest)
     away, torque = exact.deviation(average), exact.torque
     scene_torque, total = float(np.max(np.abs(torque))), len(away)
-    reach = count ** (-1.0 / 3.0)
+    reach = search.count ** (-1.0 / 3.0)
     for _ in range(ROUNDS):
         worst = np.argsort(-away, kind="stable")[:WORST]
-        near = nearby_points(scene, points.at(worst), NEIGHBOURS, reach, slowest)
+        near = nearby_points(scene, points.at(worst), NEIGHBOURS, reach, search.slowest)
         points = points.at(worst).joined(near)
         away = ExactTorque.at(model, points, limit, largest).deviation(average)
         total += len(near.opening)
@@ -128,21 +135,20 @@ def deviation(
     return Deviation(float(away[first]), where, scene_torque, total)
 
 
-def telling_points(model: ExactModel, scene: Ranges, count: int, slowest: float) -> Points:
-    """At least ``count`` places spread over the scene and its faces, and beside the seams.
-
-    None of them slower than ``slowest``.
-    """
-    return spread_points(scene, count, slowest).joined(_seams(model, scene, count, slowest))
+def telling_points(model: ExactModel, search: SearchGrid) -> Points:
+    """Places spread over the scene and its faces, at least as many as asked for, and the seams."""
+    spread = spread_points(search.scene, search.count, search.slowest)
+    return spread.joined(_seams(model, search))
 
 
-def _seams(model: ExactModel, scene: Ranges, count: int, slowest: float) -> Points:
+def _seams(model: ExactModel, search: SearchGrid) -> Points:
     """Points close beside where the edge begins to touch, and where the crack begins to run.
 
     There the torque bends or, for a power below one, rises infinitely steeply, in regions so thin
     that points spread evenly would miss them.
     """
-    shift = (count % 97) / 97.0
+    scene = search.scene
+    shift = (search.count % 97) / 97.0
     low, high = scene.opening_rad
     opening = low + (high - low) * (np.arange(SEAM_OPENINGS) + shift) / SEAM_OPENINGS
     cutting = model.cutting
@@ -152,7 +158,7 @@ def _seams(model: ExactModel, scene: Ranges, count: int, slowest: float) -> Poin
     contact = (np.concatenate(seams)[:, None] + SEAM_OFFSETS_m).ravel()
     opening = np.repeat(np.tile(opening, len(seams)), len(SEAM_OFFSETS_m))
     inside = (contact >= scene.contact_m[0]) & (contact <= scene.contact_m[1])
-    rate = np.full(contact.shape, -max(scene.opening_rate_rad_per_s[0], slowest))
+    rate = np.full(contact.shape, -max(scene.opening_rate_rad_per_s[0], search.slowest))
     return Points(opening[inside], rate[inside], contact[inside])
 
 

@@ -16,7 +16,7 @@ from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.identity import VERSION, bytes_digest
 from scissorcal.package.archive import member_of, write_archive
 from scissorcal.package.compile import scene_ranges
-from scissorcal.package.exact import FitDraws, central_model
+from scissorcal.package.exact import FitDraws, central_model, pick_draws
 from scissorcal.package.friction_tables import cut_left_out, left_out
 from scissorcal.package.layer_pieces import piece_records
 from scissorcal.package.manifest import (
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import LayerPiece
     from scissorcal.package.simplest.model import Simplified
 
-MOST_DRAWS = 200
 SAME_M = 1e-9
 """Curves that are closer than this are one: solved on other computers they differ by rounding."""
 UNHASHED = "0" * 64
@@ -69,21 +68,39 @@ class PackageSummary:
     simplified: "Simplified"
 
 
+@dataclass(frozen=True)
+class PackageOptions:
+    """What goes into a package beside recipe and fits.
+
+    ``tolerance``, each table's as a share of its value, overrides what recipe and scene ask for.
+    ``review`` is the signature under the fits' report; it changes nothing else in the package.
+    ``plate`` is where the plate stands, stored as a pose with its covariance. ``drawn`` are the
+    pieces of the recipe's drawn plate on the line of the cut, none for a uniform sheet. ``rig`` is
+    that of the recordings: a rendering on another one is refused. ``inputs_hash`` is the identity
+    that a workspace gives to recipe, fits and algorithm (`workday.engine`); where it has another
+    one now, the package is stale. With ``allow_failed`` a fit may have failed checks; the manifest
+    then lists them, and whatever uses the package reports it
+    (docs/decisions/109-packages-from-failed-fits.md). ``sign`` signs content hash and review
+    (`signature.signed_text`), such as `keys.signer` of a private key.
+    """
+
+    tolerance: float | None = None
+    review: Review | None = None
+    plate: PlateFit | None = None
+    drawn: Sequence["LayerPiece"] = ()
+    rig: RigRecord | None = None
+    inputs_hash: str = NO_IDENTITY
+    allow_failed: bool = False
+    sign: Sign | None = None
+
+
 def build_package(
     recipe: Recipe,
     friction: FitResult | None,
     cut: FitResult | None,
     path: Path,
     rng: np.random.Generator,
-    *,
-    tolerance: float | None = None,
-    review: Review | None = None,
-    plate: PlateFit | None = None,
-    drawn: Sequence["LayerPiece"] = (),
-    rig: RigRecord | None = None,
-    inputs_hash: str = NO_IDENTITY,
-    allow_failed: bool = False,
-    sign: Sign | None = None,
+    options: PackageOptions = PackageOptions(),
 ) -> PackageSummary:
     """Compile the fits that a scene needs, check the result, and write it to ``path``.
 
@@ -94,20 +111,11 @@ def build_package(
     simplest laws that are enough for the scene
     (:func:`~scissorcal.package.simplest.model.simplest_model`), the manifest says what was left
     out, and the tables are the smallest whose bound fits; else they are those of a fixed fine
-    tolerance. ``tolerance``, each table's as a share of its value, overrides both. ``review`` is
-    the signature under the fits' report; it changes nothing else in the package. ``plate`` is
-    where the plate stands, stored as a pose with its covariance. ``drawn`` are the pieces of the
-    recipe's drawn plate on the line of the cut, none for a uniform sheet. ``rig`` is that of the
-    recordings: a rendering on another one is refused. ``inputs_hash`` is the
-    identity that a workspace gives to recipe, fits and algorithm (`workday.engine`); where it has
-    another one now, the package is stale. ``sign`` signs its content hash and review
-    (`signature.signed_text`), such as `keys.signer` of a private key.
+    tolerance.
 
     Raises MissingError where a fit that the scene needs is not given, InputError where a fit
     belongs to another recipe or cannot be compiled, and VerdictError, writing nothing, where a fit
-    failed a check or the tables are further from the model than the scene allows. With
-    ``allow_failed`` a fit may have failed checks; the manifest then lists them, and whatever uses
-    the package reports it (docs/decisions/109-packages-from-failed-fits.md).
+    failed a check or the tables are further from the model than the scene allows.
     """
     # the report imports this module to read packages; only a build needs what follows
     from scissorcal.package.by_load import rendered_fits
@@ -116,17 +124,18 @@ def build_package(
     from scissorcal.package.simplest.model import simplest_model
     from scissorcal.package.stated_bound import stated_bound
 
+    plate, sign = options.plate, options.sign
     cut, friction = _wanted(recipe, friction, cut)
-    if not allow_failed:
+    if not options.allow_failed:
         _refuse_failed_fits(path, cut, friction, plate)
     cut, friction = rendered_fits(cut, friction)
     picked = pick_draws(cut, friction, rng)
-    simplified = simplest_model(recipe, cut, friction, picked, tolerance=tolerance)
+    simplified = simplest_model(recipe, cut, friction, picked, tolerance=options.tolerance)
     compiled = simplified.tables[-1]
     ranges = scene_ranges(recipe)
     bound = stated_bound(simplified.central, compiled, recipe)
     arrays: dict[str, NDArray[Any]] = {**compiled.arrays, **simplified.draws}
-    record = _provenance(recipe, simplified.cut, simplified.friction, inputs_hash)
+    record = _provenance(recipe, simplified.cut, simplified.friction, options.inputs_hash)
     record = _with_left_out(record, cut, friction, bound)
     manifest = _hashed(
         Manifest(
@@ -145,11 +154,11 @@ def build_package(
             ),
             plate_pose=recipe.scene.plate_pose,
             plate=_plate_record(plate) if plate else None,
-            pieces=piece_records(recipe, drawn, _energy(compiled.mechanics.fracture)),
+            pieces=piece_records(recipe, options.drawn, _energy(compiled.mechanics.fracture)),
             simplification=simplified.record,
-            rig=rig,
+            rig=options.rig,
             reach=data_reach(recipe, cut),
-            review=review,
+            review=options.review,
             content_hash=UNHASHED,
         )
     )
@@ -350,29 +359,6 @@ def _record(fit: FitResult) -> dict[str, Any]:
 
 def _warnings(verdicts: tuple[Verdict, ...]) -> tuple[str, ...]:
     return tuple(f"{verdict.scope}, {verdict.check}: {verdict.why}" for verdict in failed(verdicts))
-
-
-def pick_draws(
-    cut: FitResult, friction: FitResult | None, rng: np.random.Generator
-) -> dict[str, NDArray[Any]]:
-    """Equally many draws of each fit, at most 200.
-
-    A cut's fit draws friction's parameters jointly with its own, so those draws are used: torque
-    that a draw attributes to the material is then not attributed to friction too. Parameters that
-    it did not draw (the inertia, or all of them) are paired at random.
-    """
-    count = min(MOST_DRAWS, len(cut.draws), *([len(friction.draws)] if friction else []))
-    rows = rng.permutation(len(cut.draws))[:count]
-    picked = {"draws/cut.npy": np.asarray(cut.draws[rows], dtype=np.float64)}
-    if friction is None:
-        return picked
-    own = friction.draws[rng.permutation(len(friction.draws))[:count]].astype(np.float64)
-    if cut.nuisance_draws is not None:
-        names = [parameter.name for parameter in cut.nuisance]
-        for column, parameter in enumerate(friction.parameters):
-            if parameter.name in names:
-                own[:, column] = cut.nuisance_draws[rows, names.index(parameter.name)]
-    return {**picked, "draws/friction.npy": own}
 
 
 def _hashed(manifest: Manifest) -> Manifest:

@@ -13,7 +13,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult
-from scissorcal.calibration.friction.typical import at_typical
+from scissorcal.calibration.friction.layout import at_typical
 from scissorcal.calibration.result import FittedParameter
 from scissorcal.package.friction_tables import LOAD_SHARE, share_of
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scissorcal.package.bound import deviation
+from scissorcal.package.bound import SearchGrid, deviation
 from scissorcal.package.grid import spread_points
 from scissorcal.package.model_package import ModelPackage, open_package
 from scissorcal.package.signature import against as review_refusal
@@ -64,10 +64,8 @@ def _bound(package: ModelPackage) -> tuple[Verdict, Verdict]:
     found = deviation(
         package.exact,
         package.average,
-        manifest.ranges,
+        SearchGrid(manifest.ranges, GRID_POINTS, stated.from_rate_rad_per_s),
         manifest.limits.torque_Nm,
-        GRID_POINTS,
-        stated.from_rate_rad_per_s,
     )
     opening, rate, contact = found.where
     why = (

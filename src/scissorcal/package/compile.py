@@ -1,6 +1,6 @@
 """Compile the model to the arrays and scalars that a kernel evaluates."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -13,7 +13,6 @@ from scissorcal.errors import InputError
 from scissorcal.kernel import ModelTables, Table
 from scissorcal.model import damped, edge_height, mean_share, settled_contact
 from scissorcal.model.curvature import (
-    Bounds,
     cubic_curvature,
     edge_breaks,
     edge_curvature,
@@ -25,7 +24,7 @@ from scissorcal.package.friction_tables import friction_functions, friction_tabl
 from scissorcal.package.grid import NOTHING_TOUCHED, Points, spread_points
 from scissorcal.package.layer_pieces import hardest_layer
 from scissorcal.package.manifest import Fracture, Friction, Mechanics, Ranges
-from scissorcal.package.tables import Fitted, Function, NumberFormat, Rows, fit_table
+from scissorcal.package.tables import Fitted, Function, NumberFormat, Rows, TableLaw, fit_table
 from scissorcal.recipe.schema import Recipe
 
 TOLERANCE = 1e-4
@@ -70,24 +69,6 @@ class Compiled:
     mechanics: Mechanics
     rows: dict[str, Rows] = field(default_factory=dict)
     choices: dict[str, TableChoice] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class TableLaw:
-    """One law that becomes a table: what `fit_table` takes of it.
-
-    ``curvature`` bounds its second derivative over intervals, none of which contains one of
-    ``breaks``; None where no bound is known.
-    """
-
-    law: Function
-    derivative: Function
-    low: float
-    high: float
-    monotone: bool = False
-    scale: float | None = None
-    curvature: Callable[[Array, Array], Bounds] | None = None
-    breaks: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def scene_ranges(recipe: Recipe) -> Ranges:
@@ -137,16 +118,7 @@ def compile_tables(
 def table_of_law(name: str, law: TableLaw, choice: TableChoice) -> Fitted:
     """One table; InputError where the law cannot be held by any."""
     try:
-        return fit_table(
-            law.law,
-            law.derivative,
-            law.low,
-            law.high,
-            monotone=law.monotone,
-            scale=law.scale,
-            tolerance=choice.tolerance,
-            number_format=choice.number_format,
-        )
+        return fit_table(law, tolerance=choice.tolerance, number_format=choice.number_format)
     except ValueError as error:
         raise InputError(
             f"The fitted {name.replace('_', ' ')} cannot be made into a table: {error}. "

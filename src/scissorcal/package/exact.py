@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.structure import cutting_from
@@ -18,6 +18,7 @@ from scissorcal.model import (
 )
 from scissorcal.model.cutting import contact_after_run, torque_at
 
+MOST_DRAWS = 200
 MOST_AT_ONCE = 500_000
 """Draws times points evaluated in one sweep, to limit the memory of a large grid."""
 
@@ -133,3 +134,26 @@ def _join(
         if friction is None
         else FrictionLaw.of_fit(friction_values, float(friction.structure["angle_center"])),
     )
+
+
+def pick_draws(
+    cut: FitResult, friction: FitResult | None, rng: np.random.Generator
+) -> dict[str, NDArray[Any]]:
+    """Equally many draws of each fit, at most 200.
+
+    A cut's fit draws friction's parameters jointly with its own, so those draws are used: torque
+    that a draw attributes to the material is then not attributed to friction too. Parameters that
+    it did not draw (the inertia, or all of them) are paired at random.
+    """
+    count = min(MOST_DRAWS, len(cut.draws), *([len(friction.draws)] if friction else []))
+    rows = rng.permutation(len(cut.draws))[:count]
+    picked = {"draws/cut.npy": np.asarray(cut.draws[rows], dtype=np.float64)}
+    if friction is None:
+        return picked
+    own = friction.draws[rng.permutation(len(friction.draws))[:count]].astype(np.float64)
+    if cut.nuisance_draws is not None:
+        names = [parameter.name for parameter in cut.nuisance]
+        for column, parameter in enumerate(friction.parameters):
+            if parameter.name in names:
+                own[:, column] = cut.nuisance_draws[rows, names.index(parameter.name)]
+    return {**picked, "draws/friction.npy": own}

@@ -256,10 +256,10 @@ class ModelPackage:
     def _drawn(self) -> ExactModel:
         record = self.manifest.provenance
         return exact_model(
-            _fit_draws(record.cut, self.arrays["draws/cut.npy"]),
+            record_draws(record.cut, self.arrays["draws/cut.npy"]),
             None
             if record.friction is None
-            else _fit_draws(record.friction, self.arrays["draws/friction.npy"]),
+            else record_draws(record.friction, self.arrays["draws/friction.npy"]),
         )
 
 
@@ -309,9 +309,10 @@ def _broadcast(*values: ArrayLike) -> tuple[Array, ...]:
 
 def _centre(record: CutRecord | FrictionRecord) -> FitDraws:
     values = [[parameter.value for parameter in record.parameters]]
-    return _fit_draws(record, np.array(values))
+    return record_draws(record, np.array(values))
 
 
-def _fit_draws(record: CutRecord | FrictionRecord, draws: Array) -> FitDraws:
+def record_draws(record: CutRecord | FrictionRecord, draws: Array) -> FitDraws:
+    """The law of a package's fit at draws (draws, parameters) of its parameters."""
     names = tuple(parameter.name for parameter in record.parameters)
     return FitDraws(record.structure.model_dump(), names, draws)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.model.curvature import Span
-from scissorcal.package.compile import TableLaw
 from scissorcal.package.proved_tables import running_maxima
+from scissorcal.package.tables import TableLaw
 
 CELLS = 1024
 

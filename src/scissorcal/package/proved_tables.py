@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.kernel import Table
-from scissorcal.package.compile import TableLaw
-from scissorcal.package.tables import hermite
+from scissorcal.package.tables import TableLaw, hermite
 
 CELLS = 32
 """Cells of each interval between knots."""

@@ -24,11 +24,12 @@ from scissorcal.aliases import Array
 from scissorcal.model import edge_height, settled_contact
 from scissorcal.model.curvature import Span
 from scissorcal.package.bound import PARALLEL
-from scissorcal.package.compile import STRONGEST_N, Compiled, TableLaw, kernel_tables, table_file
+from scissorcal.package.compile import STRONGEST_N, Compiled, kernel_tables, table_file
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.manifest import Ranges
 from scissorcal.package.profile import profiles
 from scissorcal.package.proved_tables import ProvedTable
+from scissorcal.package.tables import TableLaw
 
 OPENINGS, CONTACTS = 240, 240
 STEEPEST = 0.05

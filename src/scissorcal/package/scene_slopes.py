@@ -9,7 +9,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.design.band import SceneSlopes, TorqueKnowledge
-from scissorcal.calibration.design.knowledge import Knowledge
+from scissorcal.calibration.design.information import Knowledge
 from scissorcal.calibration.design.state import CutState, FrictionState, sharing_of
 from scissorcal.calibration.parameters import Layout
 from scissorcal.errors import InputError

@@ -13,13 +13,13 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.model import edge_height
 from scissorcal.model.cutting import within_thickness
-from scissorcal.package.build import pick_draws
 from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.exact import (
     ExactModel,
     FitDraws,
     central_model,
     exact_model,
+    pick_draws,
     torque_quantiles,
 )
 from scissorcal.package.grid import FELT_SHARE

@@ -12,6 +12,7 @@ from scissorcal.package.bound import (
     SHARE_OF_TOLERANCE,
     STATED_OVER_SEEN,
     ExactTorque,
+    SearchGrid,
     deviation,
     telling_points,
 )
@@ -110,7 +111,7 @@ class _Search:
         self._scene, self._limit = scene_ranges(recipe), recipe.limits.torque_Nm
         friction = self._mechanics.friction
         self._slowest = friction.rate_eps_rad_per_s if friction else 0.0
-        points = telling_points(model, self._scene, SEARCH_POINTS, self._slowest)
+        points = telling_points(model, SearchGrid(self._scene, SEARCH_POINTS, self._slowest))
         exact = ExactTorque.at(model, points, self._limit)
         self.scene_torque = float(np.max(np.abs(exact.torque)))
         self._exact = ExactTorque.at(model, points, self._limit, self.scene_torque)
@@ -142,10 +143,8 @@ class _Search:
         found = deviation(
             self._model,
             average,
-            self._scene,
+            SearchGrid(self._scene, GRID_POINTS, self._slowest),
             self._limit,
-            GRID_POINTS,
-            self._slowest,
             largest=self.scene_torque,
         )
         return found.largest <= budget

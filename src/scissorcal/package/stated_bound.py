@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 
 from scissorcal.package.average import AverageTorque
-from scissorcal.package.bound import SHARE_OF_TOLERANCE, STATED_OVER_SEEN, deviation
-from scissorcal.package.compile import Compiled, TableLaw, scene_ranges, table_file, table_laws
+from scissorcal.package.bound import SHARE_OF_TOLERANCE, STATED_OVER_SEEN, SearchGrid, deviation
+from scissorcal.package.compile import Compiled, scene_ranges, table_file, table_laws
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.proved_tables import ProvedTable, proved_table, seen_deviation
 from scissorcal.package.proved_torque import proved_torque
 from scissorcal.package.table_record import Bound, TableBound
+from scissorcal.package.tables import TableLaw
 from scissorcal.recipe.schema import Recipe
 
 GRID_POINTS = 40_000
@@ -26,7 +27,7 @@ def stated_bound(model: ExactModel, compiled: Compiled, recipe: Recipe) -> Bound
     friction = compiled.mechanics.friction
     slowest = friction.rate_eps_rad_per_s if friction else 0.0
     average = AverageTorque(compiled.mechanics, scene, compiled.arrays)
-    found = deviation(model, average, scene, limit, GRID_POINTS, slowest)
+    found = deviation(model, average, SearchGrid(scene, GRID_POINTS, slowest), limit)
     stated = STATED_OVER_SEEN * found.largest
     laws = table_laws(model, recipe)
     proofs = {

@@ -1,13 +1,14 @@
 """Compile a law, given as a function and its derivative, to a small cubic table."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.kernel import Row16, Table
+from scissorcal.model.curvature import Bounds
 
 Function = Callable[[Array], Array]
 NumberFormat = Literal["float32", "int16", "float64"]
@@ -48,15 +49,28 @@ class Fitted:
         return self.error <= 1.0
 
 
+@dataclass(frozen=True)
+class TableLaw:
+    """One law that becomes a table: what `fit_table` takes of it.
+
+    ``curvature`` bounds its second derivative over intervals, none of which contains one of
+    ``breaks``; None where no bound is known.
+    """
+
+    law: Function
+    derivative: Function
+    low: float
+    high: float
+    monotone: bool = False
+    scale: float | None = None
+    curvature: Callable[[Array, Array], Bounds] | None = None
+    breaks: Array = field(default_factory=lambda: np.zeros(0))
+
+
 def fit_table(
-    law: Function,
-    derivative: Function,
-    low: float,
-    high: float,
+    law: TableLaw,
     *,
     tolerance: float,
-    monotone: bool = False,
-    scale: float | None = None,
     largest: int = LARGEST_TABLE,
     number_format: NumberFormat = "float32",
 ) -> Fitted:
@@ -73,20 +87,22 @@ def fit_table(
     Raises ValueError where the law is not finite, falls although ``monotone``, or the range is
     empty.
 
-    >>> fitted = fit_table(np.sqrt, lambda x: 0.5 / np.sqrt(x), 0.01, 1.0, tolerance=1e-3)
+    >>> root = TableLaw(np.sqrt, lambda x: 0.5 / np.sqrt(x), 0.01, 1.0)
+    >>> fitted = fit_table(root, tolerance=1e-3)
     >>> fitted.met, len(fitted.table.x)
     (True, 9)
     """
+    low, high, scale = law.low, law.high, law.scale
     ends = np.array([low, high], dtype=np.float32).astype(np.float64)
     if not (np.isfinite(ends).all() and ends[0] < ends[1]):
         raise ValueError(f"a table needs low < high, both finite; got {low:g} and {high:g}")
     if scale is None:
-        scale = float(np.max(np.abs(law(np.linspace(ends[0], ends[1], 257)))))
+        scale = float(np.max(np.abs(law.law(np.linspace(ends[0], ends[1], 257)))))
     rounding = _Rounding(number_format, ends)
     knots = rounding.knots(ends)
     while True:
-        at = _at_knots(law, derivative, knots, monotone, rounding)
-        ratios = _errors(law, knots, at, _SPARE * tolerance, scale, at.resolution)
+        at = _at_knots(law, knots, rounding)
+        ratios = _errors(law.law, knots, at, _SPARE * tolerance, scale, at.resolution)
         middles = rounding.knots(0.5 * (knots[:-1] + knots[1:]))
         splittable = (middles > knots[:-1]) & (middles < knots[1:])
         worst = np.argsort(-np.where(splittable, ratios, 0.0), kind="stable")
@@ -95,7 +111,7 @@ def fit_table(
             break
         knots = np.sort(np.concatenate([knots, middles[worst]]))
     if at.resolution:
-        ratios = _errors(law, knots, at, _SPARE * tolerance, scale, 0.0)
+        ratios = _errors(law.law, knots, at, _SPARE * tolerance, scale, 0.0)
     array = np.stack([knots, at.values, at.slopes])
     return Fitted(Table(*array), float(ratios.max()), array, at.rows)
 
@@ -148,19 +164,17 @@ class _AtKnots:
     resolution: float
 
 
-def _at_knots(
-    law: Function, derivative: Function, knots: Array, monotone: bool, rounding: _Rounding
-) -> _AtKnots:
+def _at_knots(law: TableLaw, knots: Array, rounding: _Rounding) -> _AtKnots:
     """Values and slopes at the knots, rounded; ``resolution`` is what more knots do not reduce."""
     with np.errstate(divide="ignore", over="ignore"):
-        exact = np.asarray(law(knots), dtype=np.float64)
+        exact = np.asarray(law.law(knots), dtype=np.float64)
         finite = np.isfinite(exact.astype(np.float32))
-        slopes = np.asarray(derivative(knots), dtype=np.float64)
+        slopes = np.asarray(law.derivative(knots), dtype=np.float64)
     if not finite.all():
         place = knots[~finite][0]
         raise ValueError(f"the law is not finite in single precision at {place:g}")
     values = rounding.values(exact)
-    if monotone:
+    if law.monotone:
         chords = np.diff(values) / np.diff(knots)
         if np.any(chords < 0):
             place = knots[:-1][chords < 0][0]
@@ -175,7 +189,7 @@ def _at_knots(
     value_row, slope_row = rounding.row_of(exact), rounding.row_of(slopes)
     resolution = 2.0 * value_row.scale if rounding.fixed else 0.0
     rows = rounding.rows(value_row, slope_row)
-    return _AtKnots(values, rounding.values(slopes, down=monotone), rows, resolution)
+    return _AtKnots(values, rounding.values(slopes, down=law.monotone), rows, resolution)
 
 
 def _errors(

@@ -7,8 +7,8 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.package.compile import law_functions, mean_energy, table_file
-from scissorcal.package.exact import FitDraws, central_model, exact_model
-from scissorcal.package.model_package import ModelPackage
+from scissorcal.package.exact import central_model, exact_model
+from scissorcal.package.model_package import ModelPackage, record_draws
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,10 @@ def variations(package: ModelPackage, cut: Array, friction: Array | None) -> Var
     it, so the rows at the package's own parameters differ from its tables by their tolerance.
     """
     record = package.manifest.provenance
-    of_cut = _draws_of(package, cut)
+    of_cut = record_draws(record.cut, cut)
     of_friction = None
     if record.friction is not None and friction is not None:
-        names = tuple(parameter.name for parameter in record.friction.parameters)
-        of_friction = FitDraws(record.friction.structure.model_dump(), names, friction)
+        of_friction = record_draws(record.friction, friction)
     model = exact_model(of_cut, of_friction)
     rows = {}
     for name, (law, derivative) in law_functions(model).items():
@@ -62,7 +61,7 @@ def variations(package: ModelPackage, cut: Array, friction: Array | None) -> Var
     file = table_file("mean_energy")
     if file in package.arrays:
         knots = package.arrays[file][0].astype(np.float64)
-        each = [_draws_of(package, row[None, :]) for row in cut]
+        each = [record_draws(record.cut, row[None, :]) for row in cut]
         rows["mean_energy"] = np.array(
             [[mean_energy(central_model(one, None), knots)] for one in each]
         )
@@ -71,12 +70,6 @@ def variations(package: ModelPackage, cut: Array, friction: Array | None) -> Var
     return Variations(
         rows, *(_flat(value, len(cut)) for value in (energy, cutting.kappa, cutting.rate_damping))
     )
-
-
-def _draws_of(package: ModelPackage, cut: Array) -> FitDraws:
-    record = package.manifest.provenance.cut
-    names = tuple(parameter.name for parameter in record.parameters)
-    return FitDraws(record.structure.model_dump(), names, cut)
 
 
 def _flat(value: Array | float, count: int) -> Array:

@@ -12,10 +12,10 @@ from scissorcal.kernel.tables import TABLE_NAMES
 from scissorcal.kernel.web_module import web_numbers
 from scissorcal.package.average import energy_levels
 from scissorcal.package.compile import table_file
-from scissorcal.package.exact import FitDraws, exact_model, torque_quantiles
+from scissorcal.package.exact import exact_model, torque_quantiles
 from scissorcal.package.layer_pieces import PieceRecord
 from scissorcal.package.manifest import Parameter, PoseRecord
-from scissorcal.package.model_package import ModelPackage
+from scissorcal.package.model_package import ModelPackage, record_draws
 from scissorcal.package.variations import Variations, central_values, variations
 from scissorcal.prototype.page_parts import (
     Band,
@@ -257,7 +257,9 @@ def _bands(package: ModelPackage) -> "list[Band]":
     rate = float(np.sqrt(max(slow, 0.05 * fast) * fast))
     place = opening[:, None], -rate, contact[None, :]
     limit = manifest.limits.torque_Nm
-    drawn = exact_model(_cut_draws(package), None)
+    drawn = exact_model(
+        record_draws(package.manifest.provenance.cut, package.arrays["draws/cut.npy"]), None
+    )
     alone = np.clip(torque_quantiles(drawn, *place, (0.05, 0.95)), -limit, limit)
     bands = [(-rate, False, alone)]
     if manifest.provenance.friction:
@@ -274,12 +276,6 @@ def _bands(package: ModelPackage) -> "list[Band]":
         )
         for signed, with_friction, (low, high) in bands
     ]
-
-
-def _cut_draws(package: ModelPackage) -> FitDraws:
-    record = package.manifest.provenance.cut
-    names = tuple(parameter.name for parameter in record.parameters)
-    return FitDraws(record.structure.model_dump(), names, package.arrays["draws/cut.npy"])
 
 
 def _pose_part(plate: PoseRecord | None) -> PosePart | None:

@@ -5,13 +5,10 @@ In an installed wheel that is beside the code; in a checkout, at the top of the 
 
 import difflib
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.load import load_recipe
-
-if TYPE_CHECKING:
-    from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe.schema import Recipe
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -63,7 +60,7 @@ def specimen_path(name: str) -> Path:
     return _named(specimens_dir(), name, "specimen")
 
 
-def builtin_recipe(name: str) -> "Recipe":
+def builtin_recipe(name: str) -> Recipe:
     """Load one of the recipes that come with scissorcal."""
     return load_recipe(recipe_path(name))
 

@@ -3,24 +3,21 @@
 import sys
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
 
 from scissorcal.errors import InputError
 from scissorcal.foreign import read_foreign_text
 from scissorcal.foreign.formats import RECIPE, Format
-from scissorcal.recipe.locate import broken_statement
+from scissorcal.recipe.explain import Mistakes, broken_statement, explain
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe.unlikely import Unlikely, unlikely_numbers
 
-if TYPE_CHECKING:
-    from pydantic import BaseModel
-
-    from scissorcal.recipe.explain import Mistakes
-    from scissorcal.recipe.schema import Recipe
-    from scissorcal.recipe.unlikely import Unlikely
-
-    Model = TypeVar("Model", bound=BaseModel)
+Model = TypeVar("Model", bound=BaseModel)
 
 
-def load_recipe(path: Path | str) -> "Recipe":
+def load_recipe(path: Path | str) -> Recipe:
     """Read and check a recipe file.
 
     Raises InputError naming file, line, key, what is allowed and a suggestion, for the first 20
@@ -34,21 +31,18 @@ def load_recipe(path: Path | str) -> "Recipe":
     return parse_recipe(read_foreign_text(Path(path), RECIPE), str(path))
 
 
-def parse_recipe(text: str, source: str = "recipe", *, judged: bool = True) -> "Recipe":
+def parse_recipe(text: str, source: str = "recipe", *, judged: bool = True) -> Recipe:
     """Check a recipe given as text; ``source`` names it in messages.
 
     ``judged`` is false for a text that a capture wrote or a recording holds: its numbers were
     judged where a person wrote them, and what was captured by them stays readable.
     """
-    from scissorcal.recipe.schema import Recipe
-    from scissorcal.recipe.unlikely import unlikely_numbers
-
     document = _parse(text, source)
     unlikely = unlikely_numbers(document) if judged else []
     return _checked(document, unlikely, text, Recipe, source)
 
 
-def load_toml(path: Path, model: "type[Model]", kind: Format = RECIPE) -> "Model":
+def load_toml(path: Path, model: type[Model], kind: Format = RECIPE) -> Model:
     """Read a TOML file into ``model``; mistakes raise InputError as in `load_recipe`.
 
     A file of another known kind than ``kind`` is refused by its name.
@@ -59,20 +53,16 @@ def load_toml(path: Path, model: "type[Model]", kind: Format = RECIPE) -> "Model
 
 def _checked(
     document: dict[str, Any],
-    unlikely: "list[Unlikely]",
+    unlikely: list[Unlikely],
     text: str,
-    model: "type[Model]",
+    model: type[Model],
     source: str,
-) -> "Model":
-    from pydantic import ValidationError
-
-    from scissorcal.recipe.explain import explain
-
+) -> Model:
     error = None
     try:
-        found = model.model_validate(document)
+        checked = model.model_validate(document)
         if not unlikely:
-            return found
+            return checked
     except ValidationError as raised:
         error = raised
     raise InputError(_message(source, explain(error, unlikely, document, text, model)))
@@ -101,19 +91,19 @@ def _parse(text: str, source: str) -> dict[str, Any]:
         line = broken_statement(text)
         where = f", in what begins on line {line}"
     shown = text.splitlines()[line - 1].strip() if line and line <= len(text.splitlines()) else ""
-    seen = f' It reads: "{shown[:80]}".' if shown else ""
+    reads = f' It reads: "{shown[:80]}".' if shown else ""
     hint = _syntax_hint(shown, reason)
-    raise InputError(f"{source}{where}: this is not valid TOML: {reason}.{seen}{hint}")
+    raise InputError(f"{source}{where}: this is not valid TOML: {reason}.{reads}{hint}")
 
 
 def _bounded(document: dict[str, Any]) -> dict[str, Any]:
     """The document; ValueError where a whole number is larger than any float."""
     waiting: list[Any] = [document]
     while waiting:
-        one = waiting.pop()
-        if isinstance(one, dict | list):
-            waiting += one.values() if isinstance(one, dict) else one
-        elif isinstance(one, int) and abs(one) > sys.float_info.max:
+        item = waiting.pop()
+        if isinstance(item, dict | list):
+            waiting += item.values() if isinstance(item, dict) else item
+        elif isinstance(item, int) and abs(item) > sys.float_info.max:
             raise ValueError("a whole number has more than 308 digits")
     return document
 
@@ -132,7 +122,7 @@ def _syntax_hint(line: str, reason: str) -> str:
     return ""
 
 
-def _message(source: str, mistakes: "Mistakes") -> str:
+def _message(source: str, mistakes: Mistakes) -> str:
     if mistakes.count == 1:
         return f"{source}, {mistakes.sentences[0]}"
     lines = "".join(f"\n  {sentence}" for sentence in mistakes.sentences)

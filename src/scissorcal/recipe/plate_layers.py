@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import Field, Strict, model_validator
 
 from scissorcal.errors import InputError
+from scissorcal.recipe.drawing import Drawing, read_drawing
 from scissorcal.recipe.fields import Finite, Range, Thickness_mm
-from scissorcal.recipe.plate_surface import PlateSurface, Touch
-from scissorcal.recipe.plate_tracking import PlateTracking
+from scissorcal.recipe.plate_surface import PlateSurface, PlateTracking, Touch
 from scissorcal.recipe.priors import Section
 
 if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import Layer, LayerPiece, Outline
-    from scissorcal.recipe.drawing import Drawing
 
 MOST_PIECES = 16
 MOST_STRIPS = 64
@@ -194,8 +193,6 @@ def drawn_layers(plate: Plate, folder: Path) -> tuple[Layer, ...]:
     ``folder`` is the recipe's, for its drawings. Raises InputError, with the file, where a drawing
     cannot be read, or lacks a shape.
     """
-    from scissorcal.recipe.drawing import read_drawing
-
     shapes = {name: read_drawing(folder / name) for name in plate.drawings}
     try:
         return tuple(_layer(layer, shapes) for layer in plate.layers)
@@ -210,8 +207,6 @@ def plate_pieces(plate: Plate, folder: Path) -> tuple[LayerPiece, ...]:
     ``folder`` is the recipe's, for its drawings. Raises InputError, with the file, where a drawing
     cannot be read, or the layers make no plate that can be cut.
     """
-    from scissorcal.recipe.drawing import read_drawing
-
     if not plate.layers:
         return ()
     shapes = {name: read_drawing(folder / name) for name in plate.drawings}
@@ -235,7 +230,7 @@ def plate_sentence(
     ratios = sorted({strip.toughness_ratio for strip in strips})
     thick = sorted({piece.thickness_m * 1e3 for piece in pieces})
     gaps = len(pieces) - len(layers)
-    said = (
+    sentence = (
         f"The plate is drawn: {_counted(len(layers), 'layer')} and, on the line of the cut, "
         f"{_counted(len(pieces), 'piece')} with {_counted(gaps, 'gap')} within layers, from "
         f"{min(piece.begin_m for piece in pieces) * 1e3:.4g} to "
@@ -244,37 +239,37 @@ def plate_sentence(
         "plate is taken to be of that one material."
     )
     if thick != [thickness_mm]:
-        said += (
+        sentence += (
             f" Layers of {', '.join(f'{one:g}' for one in thick)} mm rest on an assumption: "
             "response and fracture energy proportional to the thickness."
         )
     if ratios != [1.0]:
-        said += (
+        sentence += (
             f" Toughness ratios of {', '.join(f'{one:g}' for one in ratios)} are declared in the "
             "recipe, not measured."
         )
-    return said
+    return sentence
 
 
 def _pieces(plate: Plate, shapes: dict[str, Drawing]) -> tuple[LayerPiece, ...]:
     from scissorcal.model.plate_pieces import SMALLEST_M, layer_pieces
 
     layers = [_layer(layer, shapes) for layer in plate.layers]
-    found = layer_pieces(layers, plate.cut_line_mm * 1e-3)
-    first = min(found, key=lambda piece: piece.begin_m)
+    pieces = layer_pieces(layers, plate.cut_line_mm * 1e-3)
+    first = min(pieces, key=lambda piece: piece.begin_m)
     if first.begin_m < -SMALLEST_M:
         raise ValueError(
             f'the layer "{first.layer}" begins at x = {first.begin_m * 1e3:.4g} mm; x = 0 is where '
             "the cut begins, so move the drawing to x of 0 and more"
         )
-    strips = sum(len(piece.strips) for piece in found)
-    if len(found) > MOST_PIECES or strips > MOST_STRIPS:
+    strips = sum(len(piece.strips) for piece in pieces)
+    if len(pieces) > MOST_PIECES or strips > MOST_STRIPS:
         raise ValueError(
-            f"on the line of the cut there are {len(found)} pieces with {strips} stretches of "
+            f"on the line of the cut there are {len(pieces)} pieces with {strips} stretches of "
             f"toughness, and a plate holds {MOST_PIECES} and {MOST_STRIPS}: draw fewer holes and "
             "regions"
         )
-    return found
+    return pieces
 
 
 def _layer(layer: PlateLayer, shapes: dict[str, Drawing]) -> Layer:
@@ -283,7 +278,8 @@ def _layer(layer: PlateLayer, shapes: dict[str, Drawing]) -> Layer:
     holes = [_written(corners) for corners in layer.holes_mm]
     holes += [_drawn(layer.outline, name, shapes) for name in layer.holes]
     regions = tuple(
-        Region(_outline(one, layer.outline, shapes), one.toughness_ratio) for one in layer.regions
+        Region(_outline(region, layer.outline, shapes), region.toughness_ratio)
+        for region in layer.regions
     )
     outline = _outline(layer, layer.outline, shapes)
     return Layer(

@@ -33,9 +33,15 @@ from scissorcal.recipe.friction import CaptureFriction as CaptureFriction
 from scissorcal.recipe.friction import FitFriction as FitFriction
 from scissorcal.recipe.friction import FrictionRung as FrictionRung
 from scissorcal.recipe.friction import FrictionTerm as FrictionTerm
-from scissorcal.recipe.photograph_priors import BladePriors, CameraPriors, PlatePriors
 from scissorcal.recipe.plate_layers import Plate, refuse_impossible_layers
-from scissorcal.recipe.priors import CutPriors, LogNormalPrior, Section
+from scissorcal.recipe.priors import (
+    BladePriors,
+    CameraPriors,
+    CutPriors,
+    LogNormalPrior,
+    PlatePriors,
+    Section,
+)
 
 Rendered = Literal["torque", "handle_force", "translation_force"]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from scissorcal.recipe.locate import key_lines
+from scissorcal.recipe.explain import key_lines
 from scissorcal.recipe.priors import AnyPrior
 from scissorcal.recipe.schema import Recipe
 
@@ -43,10 +43,10 @@ def recipe_settings(recipe: Recipe, text: str, *, defaults: bool = True) -> tupl
 
     ``defaults`` lists those too that the file does not give.
     """
-    found = list(_walk(recipe, ()))
-    lines = key_lines(text, [(*table, name) for table, name, _, _, _ in found])
+    keys = list(_walk(recipe, ()))
+    lines = key_lines(text, [(*table, name) for table, name, _, _, _ in keys])
     settings = []
-    for (table, name, value, given, why), line in zip(found, lines, strict=True):
+    for (table, name, value, given, why), line in zip(keys, lines, strict=True):
         if given:
             settings.append(Setting(table, name, value, line, f"recipe, line {line}"))
         elif defaults:
@@ -78,8 +78,8 @@ def with_designed_captures(recipe: Recipe, text: str) -> str:
     settings = recipe_settings(planned, text, defaults=False)
     return as_toml(
         tuple(
-            replace(one, origin="designed") if one.table[:1] == ("capture",) else one
-            for one in settings
+            replace(setting, origin="designed") if setting.table[:1] == ("capture",) else setting
+            for setting in settings
         )
     )
 
@@ -107,9 +107,9 @@ def _walk(
 def _toml(value: Any) -> str:
     """A value of a recipe as TOML."""
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(one)}" for key, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_toml(one) for one in value) + "]"
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
         StrokeKind,
     )
     from scissorcal.recording.header_reader import read_header
-    from scissorcal.recording.importing import import_table
+    from scissorcal.recording.importing import ImportOptions, import_table
     from scissorcal.recording.layout import SAMPLE_DTYPE
     from scissorcal.recording.reader import (
         content_hash,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from scissorcal.recording.recording import Recording
     from scissorcal.recording.recovering import Recovered, recover
     from scissorcal.recording.scan import Attachment
-    from scissorcal.recording.schema import recording_schema
+    from scissorcal.recording.schema import RecordingFacts, recording_schema
     from scissorcal.recording.strokes import StrokeLabels, TurningPoints, label_strokes
     from scissorcal.recording.summarising import RecordingSummary, summary
     from scissorcal.recording.writer import RecordingWriter, write_recording
@@ -32,9 +32,11 @@ if TYPE_CHECKING:
 __all__ = [
     "SAMPLE_DTYPE",
     "Attachment",
+    "ImportOptions",
     "Joint",
     "Kind",
     "Recording",
+    "RecordingFacts",
     "RecordingHeader",
     "RecordingSummary",
     "RecordingWriter",
@@ -62,13 +64,13 @@ _HOMES = {
     "exporting": ("export_channel", "export_table"),
     "header": ("Joint", "Kind", "RecordingHeader", "Stroke", "StrokeKind"),
     "header_reader": ("read_header",),
-    "importing": ("import_table",),
+    "importing": ("ImportOptions", "import_table"),
     "layout": ("SAMPLE_DTYPE",),
     "reader": ("content_hash", "read_attachments", "read_recording", "read_telemetry"),
     "recording": ("Recording",),
     "recovering": ("Recovered", "recover"),
     "scan": ("Attachment",),
-    "schema": ("recording_schema",),
+    "schema": ("RecordingFacts", "recording_schema"),
     "strokes": ("StrokeLabels", "TurningPoints", "label_strokes"),
     "summarising": ("RecordingSummary", "summary"),
     "writer": ("RecordingWriter", "write_recording"),

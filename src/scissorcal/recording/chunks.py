@@ -9,6 +9,10 @@ from io import BytesIO
 from typing import Any
 
 import numpy as np
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.records import Chunk
+from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
 
 from scissorcal.recording.header import HEAD
 
@@ -26,10 +30,6 @@ class DamageError(Exception):
 
 def open_chunk(body: bytes, room: int) -> bytes:
     """Return a chunk's bytes, at most ``room``, after checking its size and checksum."""
-    import zstandard
-    from mcap.records import Chunk
-    from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
-
     chunk = parse_record(Chunk, body)
     if len(body) != 40 + len(chunk.compression) + len(chunk.data):
         raise DamageError("a chunk whose length is wrong")
@@ -55,8 +55,6 @@ def _check_size(frame: Any, stated: int) -> None:
 
 def parse_record(record: Any, body: bytes) -> Any:
     """A record of the library ``mcap`` from its bytes; DamageError whatever that raises."""
-    from mcap.data_stream import ReadDataStream
-
     try:
         return record.read(ReadDataStream(BytesIO(body)))
     except Exception as error:
@@ -102,10 +100,10 @@ class ChunkPlaces:
 
     def _search(self) -> Iterator[int]:
         data = self._data
-        found = data.find(_ZSTD_FIELD, _ZSTD_FIELD_AT)
-        while found >= 0:
-            offset = found - _ZSTD_FIELD_AT
+        field = data.find(_ZSTD_FIELD, _ZSTD_FIELD_AT)
+        while field >= 0:
+            offset = field - _ZSTD_FIELD_AT
             opcode, length = HEAD.unpack_from(data, offset)
             if opcode == 6 and offset + HEAD.size + length <= len(data):
                 yield offset
-            found = data.find(_ZSTD_FIELD, found + 1)
+            field = data.find(_ZSTD_FIELD, field + 1)

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from scissorcal.errors import InputError, file_error
 from scissorcal.files import replacing
 from scissorcal.recipe.euler_angles import euler_deg, singular_within_deg
-from scissorcal.recording.channels import CHANNELS
 from scissorcal.recording.header import METADATA_NAME
-from scissorcal.recording.parquetfile import require_pyarrow
 from scissorcal.recording.recording import Recording, columns
 from scissorcal.recording.scan import scan_file
-from scissorcal.recording.schema import describe
-from scissorcal.recording.telemetry import TelemetryChannel
+from scissorcal.recording.schema import RecordingFacts, describe
+from scissorcal.recording.table_file import require_pyarrow
+from scissorcal.recording.telemetry import CHANNELS, TelemetryChannel
 
 
 def export_table(recording: Recording, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -35,10 +34,9 @@ def export_table(recording: Recording, path: str | Path, *, overwrite: bool = Fa
     metadata = describe(
         recording.kind,
         recording.joint,
-        recording.handle_radius_m,
-        recording.strokes,
-        recording.recipe_toml,
-        recording.device,
+        RecordingFacts(
+            recording.recipe_toml, recording.device, recording.handle_radius_m, recording.strokes
+        ),
     )
     about = {
         METADATA_NAME: metadata.model_dump_json(),
@@ -73,19 +71,21 @@ def export_channel(
 
 def channel_columns(channel: TelemetryChannel, rows: NDArray[np.void]) -> dict[str, NDArray[Any]]:
     """Rows of a channel by column, each (n,), the unit in each column's name."""
-    found: dict[str, NDArray[Any]] = {"host_time_ns": np.ascontiguousarray(rows["host_time_ns"])}
+    columns_of_channel: dict[str, NDArray[Any]] = {
+        "host_time_ns": np.ascontiguousarray(rows["host_time_ns"])
+    }
     for name, _, unit, _ in channel.fields:
         values = rows[name]
         plain = unit.replace(" ", "").replace("/", "_per_")
         end = f"_{plain}" if plain and not name.endswith(f"_{plain}") else ""
         parts = _PARTS.get(values.shape[1], ()) if values.ndim > 1 else ()
         for index, part in enumerate(parts):
-            found[f"{name}_{part}{end}"] = np.ascontiguousarray(values[:, index])
+            columns_of_channel[f"{name}_{part}{end}"] = np.ascontiguousarray(values[:, index])
         if not parts:
-            found[f"{name}{end}"] = np.ascontiguousarray(values)
+            columns_of_channel[f"{name}{end}"] = np.ascontiguousarray(values)
         if name.endswith("quaternion"):
-            found |= _angles(rows, name)
-    return found
+            columns_of_channel |= _angles(rows, name)
+    return columns_of_channel
 
 
 def _angles(rows: NDArray[np.void], name: str) -> dict[str, NDArray[Any]]:
@@ -101,11 +101,11 @@ def _angles(rows: NDArray[np.void], name: str) -> dict[str, NDArray[Any]]:
     if "covariance" in known and not before:
         turns = rows["covariance"].reshape(-1, 6, 6)[:, :3, :3]
     free = 90.0 - np.abs(degrees[:, 1]) > singular_within_deg(turns)
-    found: dict[str, NDArray[Any]] = {
+    angles: dict[str, NDArray[Any]] = {
         f"{before}{part}_deg": np.ascontiguousarray(degrees[:, index])
         for index, part in enumerate(("yaw", "pitch", "roll"))
     }
-    return found | {f"{before}yaw_and_roll_determined": free.astype(np.int8)}
+    return angles | {f"{before}yaw_and_roll_determined": free.astype(np.int8)}
 
 
 _PARTS = {

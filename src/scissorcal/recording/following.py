@@ -112,9 +112,9 @@ class RecordingFollower:
 
     def newest_row(self, channel: TelemetryChannel) -> NDArray[np.void]:
         """The last row (at most one) of a channel beside the samples that the last read found."""
-        found = [e for e in self._walk.events if isinstance(e, Telemetry) and e.channel == channel]
+        events = [e for e in self._walk.events if isinstance(e, Telemetry) and e.channel == channel]
         none = np.zeros(0, channel.message_dtype)
-        return rows_of(channel, found[-1].messages[-1:] if found else none)
+        return rows_of(channel, events[-1].messages[-1:] if events else none)
 
     def _whole_records(self) -> list[tuple[int, int, int]]:
         """Place, kind and length of the records that were completed since the last call.

@@ -54,7 +54,7 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
             return None
         stream.seek(start)
         summary = stream.read(end - start)
-        found: dict[str, list[dict[str, str]]] = {}
+        records: dict[str, list[dict[str, str]]] = {}
         count = duration_ns = None
         room = end
         for opcode, body in _records(summary):
@@ -69,11 +69,11 @@ def _from_index(stream: IO[bytes]) -> RecordingHeader | None:
                     return None
                 stream.seek(offset + HEAD.size)
                 name, entries = _metadata(stream.read(length - HEAD.size))
-                found.setdefault(name, []).append(entries)
-        described = [e for e in found.get(METADATA_NAME, ()) if _is_sound(e)]
+                records.setdefault(name, []).append(entries)
+        described = [e for e in records.get(METADATA_NAME, ()) if _is_sound(e)]
         if count is None or duration_ns is None or not described:
             return None
-        notes = tuple(entries.get("note", "") for entries in found.get(NOTE_NAME, ()))
+        notes = tuple(entries.get("note", "") for entries in records.get(NOTE_NAME, ()))
         return _header(described[-1], notes, count, duration_ns * 1e-9)
     except Exception:  # noqa: BLE001 - without a sound index, the scan says what is wrong
         return None

@@ -4,17 +4,24 @@ import difflib
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.recording.faulty_values import (
+    COUNTERS,
+    continued,
+    continued_clock,
+    jumps_in,
+    lone_excursion,
+    marks_in,
+    overflows,
+)
 from scissorcal.recording.layout import MEASURED, empty_samples
-from scissorcal.recording.marks import lone_excursion, marks_in
-from scissorcal.recording.plausible import size_note
-from scissorcal.recording.quantities import Quantity, describe, quantity
+from scissorcal.recording.quantities import Quantity, describe, quantity, size_note
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
 from scissorcal.recording.resolution import (
@@ -29,13 +36,6 @@ from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_cost, gap_note
 from scissorcal.recording.table import Table, shortened
 from scissorcal.recording.table_file import read_table, refuse_no_table
-from scissorcal.recording.wraps import (
-    COUNTERS,
-    continued,
-    continued_clock,
-    jumps_in,
-    overflows,
-)
 
 MOST_PLACES = 3
 """Places that a note lists."""
@@ -45,6 +45,30 @@ SHORT_SHARE, MANY = 0.25, 20
 """More strokes than MANY, half of them shorter than this share of the range, are worth a note."""
 
 
+@dataclass(frozen=True)
+class ImportOptions:
+    """What a table does not say of itself, and how strictly it is read.
+
+    ``joint``, ``kind`` and ``handle_radius_m`` (NaN: not known) are the recording's. A stroke
+    travels at least ``min_travel`` [rad, or m]; where that is not given, so far that neither noise
+    nor steps of the sensor make a stroke (`stroke_threshold`), which a note states.
+
+    A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
+    it and notes it. ``delimiter`` is the text's (None: found). The last line of a text file is
+    left out where it has no end, unless ``drop_last_line`` is false. ``motion_only`` says that
+    neither force nor torque was measured.
+    """
+
+    joint: Joint = Joint()
+    kind: Kind = "friction"
+    handle_radius_m: float = math.nan
+    min_travel: float | None = None
+    allow_gaps: bool = False
+    delimiter: str | None = None
+    drop_last_line: bool = True
+    motion_only: bool = False
+
+
 def import_table(
     path: str | Path,
     *,
@@ -52,14 +76,7 @@ def import_table(
     units: Mapping[str, str] | None = None,
     scale: Mapping[str, str | float] | None = None,
     rate_Hz: float | None = None,
-    joint: Joint | None = None,
-    kind: Kind = "friction",
-    handle_radius_m: float = math.nan,
-    min_travel: float | None = None,
-    allow_gaps: bool = False,
-    delimiter: str | None = None,
-    drop_last_line: bool = True,
-    motion_only: bool = False,
+    options: ImportOptions = ImportOptions(),
 ) -> Recording:
     """Read a table as a recording, in SI, with strokes found from the motion.
 
@@ -74,15 +91,11 @@ def import_table(
     may also stand in the headings; ``scale`` multiplies a column: a number, or single variables
     of the .mat file joined by * and /, as in ``{"motor_torque": "gtau"}`` for a gain in N/V.
 
-    A stroke travels at least ``min_travel`` [rad, or m]; where that is not given, so far that
-    neither noise nor steps of the sensor make a stroke (`stroke_threshold`), which a note states.
-    The last line of a text file is left out where it has no end, unless ``drop_last_line`` is
-    false. A clock that begins again after a counter's last number, a second, minute, hour or day is
+    A clock that begins again after a counter's last number, a second, minute, hour or day is
     continued, with a note; so is an angle that begins again after a full turn, or a counter after
     its last number. Other jumps of the opening, and forces that pass a counter's end, are noted.
 
-    A step of more than 1.5 times the usual one is a gap and refused, unless ``allow_gaps`` keeps
-    it and notes it. Both clocks begin at 0 and are rounded to 1 us.
+    Both clocks begin at 0 and are rounded to 1 us. `ImportOptions` has the rest.
 
     Raises InputError, naming the line (or row), the column and the remedy: text, empty cells, NaN,
     time that repeats or decreases, gaps, unknown columns and units.
@@ -92,14 +105,13 @@ def import_table(
     ...     columns={"time": "t", "opening": "qm", "motor_torque": "vir"},
     ...     units={"time": "s", "opening": "m", "motor_torque": "V"},
     ...     scale={"motor_torque": "gtau"},
-    ...     joint=Joint("linear"),
+    ...     options=ImportOptions(joint=Joint("linear")),
     ... )
     """
-    path, joint = Path(path), joint or Joint()
+    path, joint = Path(path), options.joint
     units, scale = units or {}, scale or {}
-    wanted = () if motion_only else ("motor_torque", "handle_force")
-    _check_request(path, columns, units, scale, rate_Hz, handle_radius_m, min_travel, wanted)
-    table = read_table(path, columns, delimiter, drop_last_line=drop_last_line)
+    _check_request(path, columns, (*units, *scale), rate_Hz, options)
+    table = read_table(path, columns, options.delimiter, drop_last_line=options.drop_last_line)
     quantities = {
         channel: quantity(table, channel, units.get(channel), scale.get(channel), joint)
         for channel in columns
@@ -107,29 +119,30 @@ def import_table(
     samples = empty_samples(table.length)
     for channel in set(columns) - {"time"}:
         samples[channel] = table.columns[channel].values * quantities[channel].factor
-    said = list(table.notes)
-    said += _opening_goes_on(samples, table, joint)
+    sentences = list(table.notes)
+    sentences += _opening_goes_on(samples, table, joint)
     if rate_Hz is not None:
-        _set_regular_clock(samples, rate_Hz)
+        samples["sequence"] = np.arange(table.length)
+        _set_times(samples, np.rint(samples["sequence"] * (1e6 / rate_Hz)).astype(np.int64))
     else:
         table, wrapped = _clock_goes_on(table, quantities["time"].factor)
-        said += wrapped
-        _set_clock(samples, table, quantities["time"].factor, allow_gaps=allow_gaps)
-    said += _told_of_jumps(samples, table, joint)
-    strokes, found, odd = _label(samples, joint, min_travel)
-    said += [*odd, *_sizes(samples, quantities, joint)]
+        sentences += wrapped
+        _set_clock(samples, table, quantities["time"].factor, allow_gaps=options.allow_gaps)
+    sentences += _told_of_jumps(samples, table, joint)
+    strokes, stroke_sentence, odd = _label(samples, joint, options.min_travel)
+    sentences += [*odd, *_sizes(samples, quantities, joint)]
     digest = content_hash(path)
     source = f"{path.name} (sha256:{digest[:16]})"
-    particular = _particular(quantities, samples, said)
+    particular = _particular(quantities, samples, sentences)
     return Recording(
-        kind=kind,
+        kind=options.kind,
         samples=samples,
         strokes=strokes,
         joint=joint,
-        handle_radius_m=handle_radius_m,
+        handle_radius_m=options.handle_radius_m,
         source=str(path),
         content_hash=digest,
-        notes=(*_general(source, columns, quantities), found, *particular),
+        notes=(*_general(source, columns, quantities), stroke_sentence, *particular),
         particular=particular,
     )
 
@@ -137,16 +150,15 @@ def import_table(
 def _check_request(
     path: Path,
     columns: Mapping[str, str | int],
-    units: Mapping[str, str],
-    scale: Mapping[str, str | float],
+    converted: tuple[str, ...],
     rate_Hz: float | None,
-    handle_radius_m: float,
-    min_travel: float | None,
-    wanted: tuple[str, ...],
+    options: ImportOptions,
 ) -> None:
-    """Check the arguments; of the channels ``wanted``, if any, one must be named."""
+    """Check the arguments; ``converted`` are the channels with a unit or scale."""
+    wanted = () if options.motion_only else ("motor_torque", "handle_force")
+    min_travel = options.min_travel
     known = ("time", *MEASURED)
-    for name in (*columns, *units, *scale):
+    for name in (*columns, *converted):
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
             hint = f"Did you mean {near[0]!r}? " if near else ""
@@ -163,7 +175,7 @@ def _check_request(
             f"{path}: no column is given for {' or '.join(wanted)}. Name one of them with "
             "-c CHANNEL=COLUMN."
         )
-    if wanted and "handle_force" in columns and not handle_radius_m > 0:
+    if wanted and "handle_force" in columns and not options.handle_radius_m > 0:
         raise InputError(
             f"{path}: handle_force needs the handle radius, which is not known. Give it."
         )
@@ -173,12 +185,6 @@ def _check_request(
         raise InputError(f"A rate of {rate_Hz} Hz is not possible; give 1 MHz or less.")
     if min_travel is not None and not 0 < min_travel < math.inf:
         raise InputError(f"A least travel of {min_travel} is not possible; give a positive number.")
-
-
-def _set_regular_clock(samples: NDArray[np.void], rate_Hz: float) -> None:
-    index = np.arange(len(samples))
-    samples["sequence"] = index
-    _set_times(samples, np.rint(index * (1e6 / rate_Hz)).astype(np.int64))
 
 
 def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_gaps: bool) -> None:
@@ -244,11 +250,12 @@ def _clock_goes_on(table: Table, factor: float) -> tuple[Table, list[str]]:
     begins = "0" if clock.values.min() >= 0.0 else f"{-0.5 * period:.10g}"
     bits = math.log2(period)
     length = f"2^{bits:.0f}" if bits in COUNTERS else f"{period * factor:.10g} s"
-    said = (
+    sentence = (
         f"The clock begins at {begins} again at {_listed(table, places)}, after {length}: it was "
         "continued."
     )
-    return replace(table, columns={**table.columns, "time": replace(clock, values=values)}), [said]
+    columns = {**table.columns, "time": replace(clock, values=values)}
+    return replace(table, columns=columns), [sentence]
 
 
 def _opening_goes_on(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
@@ -256,11 +263,11 @@ def _opening_goes_on(samples: NDArray[np.void], table: Table, joint: Joint) -> l
     turn = 2.0 * math.pi if joint.kind == "rotary" else None
     position = np.asarray(samples["opening"], dtype=np.float64)
     counts = table.columns["opening"].values
-    found, places = continued(position, counts, turn)
+    continued_position, places = continued(position, counts, turn)
     if not len(places):
         _refuse_marks(counts, table)
         return []
-    samples["opening"] = found
+    samples["opening"] = continued_position
     where = _listed(table, places)
     return [f"The opening begins again at {where}, after its period: it was continued."]
 
@@ -286,21 +293,21 @@ def _told_of_jumps(samples: NDArray[np.void], table: Table, joint: Joint) -> lis
     whole = step_us <= GAP_FACTOR * float(np.median(step_us))
     unit = "deg" if joint.kind == "rotary" else "m"
     factor = math.degrees(1.0) if joint.kind == "rotary" else 1.0
-    said = []
+    sentences = []
     jumps = jumps_in(position)
     jumps = jumps[whole[jumps - 1]]
     lone = lone_excursion(position) if len(jumps) == 0 else None
     if len(jumps):
         size = factor * float(np.median(np.abs(np.diff(position)[jumps - 1])))
         others = factor * float(np.delete(np.abs(np.diff(position)), jumps - 1).max())
-        said.append(
+        sentences.append(
             f"The opening jumps by {size:.4g} {unit} from one sample to the next at "
             f"{_listed(table, jumps)}, and by {others:.3g} {unit} at most elsewhere. If this is no "
             "motion (a sensor of an unknown period, or one that lost its place), correct or remove "
             "those rows: strokes are found from it."
         )
     elif lone is not None and np.all(whole[max(lone - 1, 0) : lone + 1]):
-        said.append(
+        sentences.append(
             f"The opening is {factor * position[lone]:.6g} {unit} at {_listed(table, [lone])} "
             "alone, farther from the samples before and after than it goes anywhere else. If this "
             "is no motion, remove that row: strokes are found from it."
@@ -309,12 +316,12 @@ def _told_of_jumps(samples: NDArray[np.void], table: Table, joint: Joint) -> lis
         if channel in table.columns:
             bits, places = overflows(table.columns[channel].values)
             if bits:
-                said.append(
+                sentences.append(
                     f"{channel} jumps between the ends of a counter of {bits} bits at "
                     f"{_listed(table, places)}: negative numbers read without their sign, or "
                     "numbers too large for it. Export them as signed numbers, or of more bits."
                 )
-    return said
+    return sentences
 
 
 def _listed(table: Table, places: Sequence[int] | NDArray[np.int64]) -> str:
@@ -336,25 +343,25 @@ def _label(
     samples["stroke"] = labels.stroke_of_sample
     counts = Counter(stroke.kind for stroke in labels.strokes)
     unit = joint.position_unit
-    found = (
+    stroke_sentence = (
         f"{counts['closing']} closing and {counts['opening']} opening strokes were found, of at "
         f"least {chosen.travel:.3g} {unit} ({chosen.reason})."
     )
-    said, span, noise = [], float(np.ptp(opening)), noise_of(opening)
+    sentences, span, noise = [], float(np.ptp(opening)), noise_of(opening)
     if NOISE_OF_STROKE * noise > max(MOST_NOISE_SHARE * span, chosen.travel):
-        said.append(
+        sentences.append(
             f"The opening goes to and fro by {noise:.3g} {unit} (standard deviation) from sample "
             f"to sample, in a range of {span:.3g} {unit}: strokes found in it may be noise. Check "
             "that the column is of one sensor."
         )
-    travels = [np.ptp(opening[labels.stroke_of_sample == one.index]) for one in labels.strokes]
+    travels = [np.ptp(opening[labels.stroke_of_sample == label.index]) for label in labels.strokes]
     if len(travels) > MANY and np.median(travels) < SHORT_SHARE * span:
-        said.append(
+        sentences.append(
             f"Half of the {len(travels)} strokes travel less than {np.median(travels):.3g} {unit}, "
             f"where the range is {span:.3g} {unit}: if these are no strokes of yours, give a "
             "larger --min-travel."
         )
-    return labels.strokes, found, said
+    return labels.strokes, stroke_sentence, sentences
 
 
 def _sizes(
@@ -378,10 +385,10 @@ def _general(
 
 
 def _particular(
-    quantities: Mapping[str, Quantity], samples: NDArray[np.void], said: Sequence[str]
+    quantities: Mapping[str, Quantity], samples: NDArray[np.void], sentences: Sequence[str]
 ) -> tuple[str, ...]:
     """What is particular in a log."""
-    notes = [*(entry.note for entry in quantities.values() if entry.note), *said]
+    notes = [*(entry.note for entry in quantities.values() if entry.note), *sentences]
     if samples["stroke"].max() < 0:
         notes.append("No stroke was found: the joint moves less than the least travel.")
     gaps = gap_note(samples)

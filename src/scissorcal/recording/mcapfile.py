@@ -12,6 +12,23 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 import numpy as np
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
 from numpy.typing import NDArray
 
 from scissorcal.recording import layout
@@ -43,8 +60,6 @@ class McapFile:
     """
 
     def __init__(self, stream: IO[bytes], library: str, chunk_bytes: int) -> None:
-        from mcap.records import Header
-
         self._stream = stream
         self._chunk_bytes = chunk_bytes
         self._begun: list[bytes] = []  # of the chunk in progress
@@ -64,8 +79,6 @@ class McapFile:
         self, schema_name: str, encoding: str, schema: bytes, facts: Mapping[str, str]
     ) -> None:
         """State what the samples are; ``facts`` are the channel's metadata."""
-        from mcap.records import Channel, Schema
-
         self._schema = Schema(id=_SCHEMA, data=schema, encoding=encoding, name=schema_name)
         self._channel = Channel(
             id=_CHANNEL,
@@ -120,16 +133,12 @@ class McapFile:
 
     def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         """Add a named set of texts, in its place in the file."""
-        from mcap.records import Metadata, MetadataIndex
-
         offset = self._stream.tell()
         length = self._write([Metadata(name=name, metadata=dict(entries))])
         self._metadata.append(MetadataIndex(offset=offset, length=length, name=name))
 
     def attach(self, log_time: int, name: str, media_type: str, data: bytes) -> None:
         """Add a file, in its place in the file."""
-        from mcap.records import Attachment, AttachmentIndex
-
         offset = self._stream.tell()
         about: dict[str, Any] = {
             "create_time": 0,
@@ -148,8 +157,6 @@ class McapFile:
 
     def finish(self) -> None:
         """Write the index and the footer."""
-        from mcap.records import DataEnd, Footer, Statistics, SummaryOffset
-
         self._close_chunk()
         self._write([DataEnd(0)])
         start = self._stream.tell()
@@ -203,9 +210,6 @@ class McapFile:
                 other.head = b""
 
     def _write_chunk(self, data: bytes, entries: NDArray[np.void], channel: int) -> None:
-        import zstandard
-        from mcap.records import Chunk, ChunkIndex
-
         low, high = int(entries["time"].min()), int(entries["time"].max())
         self._first = min(self._first, low) if self._counts else low
         self._last = max(self._last, high)
@@ -254,8 +258,6 @@ class _Other:
 
 
 def _other(telemetry: TelemetryChannel, number: int) -> _Other:
-    from mcap.records import Channel, Schema
-
     schema = Schema(
         id=number,
         data=telemetry.definition.encode(),
@@ -281,8 +283,6 @@ def _entries(messages: NDArray[np.void], offset: int) -> NDArray[np.void]:
 
 
 def _bytes_of(records: Iterable[Any]) -> bytes:
-    from mcap.data_stream import RecordBuilder
-
     builder: Any = RecordBuilder()
     for record in records:
         record.write(builder)

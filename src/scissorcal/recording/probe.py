@@ -29,6 +29,17 @@ ESTIMATES = (
 )
 """Estimates of a probe as people read them: name, field, factor to the unit, unit."""
 
+FACTS = (
+    ("breakaway", "breakaway_Nm", 1e3, "mN m"),
+    ("encoder step", "encoder_step_rad", 1e6, "urad"),
+    ("command to flag", "command_lag_ticks", 1.0, "ticks"),
+    ("torque noise (sd)", "torque_noise_Nm", 1e3, "mN m"),
+    ("force noise (sd)", "force_noise_N", 1.0, "N"),
+    ("largest torque used", "largest_torque_Nm", 1e3, "mN m"),
+    ("largest rate seen", "largest_rate_rad_per_s", 1.0, "rad/s"),
+)
+"""Facts of a probe that people ask for, in the same way."""
+
 
 @dataclass(frozen=True)
 class Estimate:

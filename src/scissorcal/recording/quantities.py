@@ -1,15 +1,41 @@
-"""Conversion of a column's numbers to SI: units, and scales such as newtons per volt."""
+"""Conversion of a column's numbers to SI: units, newtons per volt and the like, and size."""
 
 import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
+import numpy as np
+
+from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.recipe.units import conversion, parse_unit, split_unit
+from scissorcal.recipe.unlikely import EVERYDAY, MARGIN
 from scissorcal.recording.layout import unit_of
 from scissorcal.recording.recording import Joint
 from scissorcal.recording.table import Table, in_brackets, shortened
+
+MOST_BEYOND = 0.1
+"""Share of the samples that may be marks or spikes: a size is what the others have."""
+
+
+class _Slip(NamedTuple):
+    """A channel's everyday range, the unit that people read, and the smaller one it may be in."""
+
+    quantity: str
+    unit: str
+    per_si: float
+    smaller: str
+    factor: float
+
+
+_SLIPS = {
+    "opening": _Slip("opening", "deg", math.degrees(1.0), "deg", math.degrees(1.0)),
+    "motor_torque": _Slip("torque_limit", "N m", 1.0, "mN m", 1e3),
+    "handle_force": _Slip("force_limit", "N", 1.0, "mN", 1e3),
+}
+
 
 G_N_PER_KG = 9.80665
 """Standard gravity: load cells and servos state grams and kilograms of force."""
@@ -42,7 +68,7 @@ def quantity(
     """
     column = table.columns[channel]
     target = "s" if channel == "time" else unit_of(channel, joint)
-    factor = 1.0 if scale is None else scale_factor(table, channel, scale)
+    factor = 1.0 if scale is None else _scale_factor(table, channel, scale)
     heading_unit = _unit_in(column.heading)
     stated = heading_unit if unit is None else unit
     heading = shortened(column.heading)
@@ -68,7 +94,7 @@ def quantity(
     )
 
 
-def scale_factor(table: Table, channel: str, scale: str | float) -> float:
+def _scale_factor(table: Table, channel: str, scale: str | float) -> float:
     """Work out a scale: a number, or numbers and single variables of the file joined by * and /.
 
     "gtau", "-1*gtau", "gtau/1000". Raises InputError where a name is unknown or the result is
@@ -138,11 +164,11 @@ def _of_force(unit: str) -> tuple[str, float]:
     """
     if unit in _POUNDS_N:
         return "N", _POUNDS_N[unit]
-    found = _GRAMS.match(unit)
-    if not found:
+    grams_unit = _GRAMS.match(unit)
+    if not grams_unit:
         return unit, 1.0
-    grams = {"": 1.0, "k": 1e3, "m": 1e-3}[found["prefix"]]
-    return f"N{found['length'] or ''}", grams * 1e-3 * G_N_PER_KG
+    grams = {"": 1.0, "k": 1e3, "m": 1e-3}[grams_unit["prefix"]]
+    return f"N{grams_unit['length'] or ''}", grams * 1e-3 * G_N_PER_KG
 
 
 def _contradiction(table: Table, channel: str, heading: str | None, stated: str | None) -> str:
@@ -197,3 +223,31 @@ def _plain(unit: str) -> str:
 def describe(quantities: Mapping[str, Quantity]) -> str:
     """One sentence on how each channel was converted."""
     return "; ".join(entry.sentence for entry in quantities.values())
+
+
+def size_note(channel: str, values: Array, joint: Joint) -> str:
+    """A sentence where a channel (m,), in SI, is as large as in a smaller unit; else empty.
+
+    Too large is what lies within a factor of 1.5 of the least everyday value written in that unit,
+    or beyond, as in a recipe (:mod:`scissorcal.recipe.unlikely`). Of an opening the range counts,
+    of others the magnitude. Of a linear joint only the force on the handle is judged.
+
+    >>> size_note("handle_force", np.array([1200.0, 2900.0, 2400.0]), Joint())[:44]
+    'handle_force reaches 2900 N, where scissors '
+    """
+    slip = _SLIPS.get(channel)
+    if slip is None or (joint.kind == "linear" and channel != "handle_force"):
+        return ""
+    everyday = EVERYDAY[slip.quantity]
+    tail = 0.5 * MOST_BEYOND
+    low, high = np.quantile(values, (tail, 1.0 - tail), method="nearest")
+    size = float(high - low if channel == "opening" else max(abs(low), abs(high)))
+    if not size >= everyday.low * slip.factor / MARGIN:
+        return ""
+    verb = "covers" if channel == "opening" else "reaches"
+    least, most = (f"{slip.per_si * value:.3g}" for value in everyday.ends)
+    return (
+        f"{channel} {verb} {slip.per_si * size:.4g} {slip.unit}, where scissors have {least} to "
+        f"{most} {slip.unit} ({everyday.why}). If its numbers are in {slip.smaller}, import it "
+        f"with -u {channel}={slip.smaller.replace(' ', '')}."
+    )

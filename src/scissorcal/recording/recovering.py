@@ -10,8 +10,7 @@ from scissorcal.errors import InputError
 from scissorcal.foreign import open_foreign
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording import layout
-from scissorcal.recording.partfile import explained, is_same_file, seal
-from scissorcal.recording.samplefile import SampleFile
+from scissorcal.recording.samplefile import SampleFile, explained, is_same_file, seal
 from scissorcal.recording.scan import Attachment, Mark, Note, Scan, Sheet, Telemetry, scan_file
 
 KEPT_SUFFIX = ".interrupted"

@@ -1,10 +1,14 @@
 """Read the bytes of a recording and keep every complete part, whatever happened to the rest."""
 
+import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Attachment as Record
+from mcap.records import Channel, Metadata, Statistics
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
@@ -12,7 +16,6 @@ from scissorcal.foreign import read_foreign, reading
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.identity import bytes_digest
 from scissorcal.recording import layout
-from scissorcal.recording.channels import CHANNELS
 from scissorcal.recording.chunks import (
     LARGEST_CHUNK,
     ChunkPlaces,
@@ -23,7 +26,7 @@ from scissorcal.recording.chunks import (
 )
 from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
 from scissorcal.recording.schema import RecordingMetadata, from_entries
-from scissorcal.recording.telemetry import TelemetryChannel, rows_of
+from scissorcal.recording.telemetry import CHANNELS, TelemetryChannel, rows_of
 
 LARGEST_RATIO = 100
 """Unpacked bytes for each byte of a file, beyond one chunk: samples of a rig at rest, without any
@@ -102,19 +105,19 @@ class Scan:
 
     def telemetry(self, channel: TelemetryChannel) -> NDArray[np.void]:
         """All rows of a channel beside the samples, shape (N,), each with its ``host_time_ns``."""
-        found = [e for e in self.events if isinstance(e, Telemetry) and e.channel == channel]
-        blocks = [rows_of(channel, event.messages) for event in found]
+        events = [e for e in self.events if isinstance(e, Telemetry) and e.channel == channel]
+        blocks = [rows_of(channel, event.messages) for event in events]
         none = rows_of(channel, np.zeros(0, dtype=channel.message_dtype))
         return np.concatenate([none, *blocks])
 
     def telemetry_rows(self) -> dict[str, int]:
         """How many rows each channel beside the samples has, by its topic."""
-        found: dict[str, int] = {}
+        rows: dict[str, int] = {}
         for event in self.events:
             if isinstance(event, Telemetry):
                 topic = event.channel.topic
-                found[topic] = found.get(topic, 0) + len(event.messages)
-        return found
+                rows[topic] = rows.get(topic, 0) + len(event.messages)
+        return rows
 
     def notes(self) -> tuple[str, ...]:
         """The sentences that the writer left."""
@@ -139,10 +142,10 @@ def scan_file(path: Path) -> Scan:
     if walk.metadata is None:
         raise InputError(_why_no_recording(path, walk))
     if walk.finished:
-        found = sum(len(event) for event in walk.events if isinstance(event, np.ndarray))
-        if walk.stated_count is not None and walk.stated_count != found:
+        read = sum(len(event) for event in walk.events if isinstance(event, np.ndarray))
+        if walk.stated_count is not None and walk.stated_count != read:
             walk.damage.append(
-                f"{walk.stated_count - found} of {walk.stated_count} samples cannot be read."
+                f"{walk.stated_count - read} of {walk.stated_count} samples cannot be read."
             )
     more = len(walk.damage) - MOST_DAMAGE
     if more > 1:
@@ -193,9 +196,6 @@ class Walk:
 
     def take(self, offset: int, opcode: int, body: bytes) -> None:
         """Take one record, which begins at ``offset`` of the file."""
-        from mcap.opcode import Opcode
-        from mcap.records import Statistics
-
         if opcode == Opcode.CHUNK:
             self._take_chunk(open_chunk(body, self.room))
         elif opcode == Opcode.CHANNEL:
@@ -210,8 +210,6 @@ class Walk:
             self.stated_count = stated.message_count - others
 
     def _take_metadata(self, offset: int, body: bytes) -> None:
-        from mcap.records import Metadata
-
         record = parse_record(Metadata, body)
         if record.name == NOTE_NAME:
             self.events.append(Note(record.metadata.get("note", "")))
@@ -232,8 +230,6 @@ class Walk:
             self.metadata = metadata
 
     def _take_channel(self, body: bytes) -> None:
-        from mcap.records import Channel
-
         if body in self.channels:
             return
         self.channels.add(body)
@@ -246,8 +242,6 @@ class Walk:
 
     def _take_chunk(self, data: bytes) -> None:
         """Take a chunk's records: runs of messages of one size and channel in one sweep each."""
-        from mcap.opcode import Opcode
-
         self.room -= len(data)
         runs: dict[int | None, list[memoryview]] = {}
         view, at, count = memoryview(data), 0, 0
@@ -332,10 +326,6 @@ def _too_long(data: bytes, chunks: "ChunkPlaces", offset: int, end: int) -> bool
 
 
 def _open_attachment(body: bytes) -> Attachment:
-    import zlib
-
-    from mcap.records import Attachment as Record
-
     record = parse_record(Record, body)
     if zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
         raise DamageError(f"attachment {record.name!r}, whose checksum does not match")

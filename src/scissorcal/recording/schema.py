@@ -4,6 +4,7 @@ import json
 import math
 import platform
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -57,24 +58,34 @@ class RecordingMetadata(BaseModel):
         )
 
 
-def describe(
-    kind: Kind,
-    joint: Joint,
-    handle_radius_m: float,
-    strokes: tuple[Stroke, ...],
-    recipe_toml: str,
-    device: Mapping[str, Any],
-    min_travel: float | None = None,
-) -> RecordingMetadata:
+@dataclass(frozen=True)
+class RecordingFacts:
+    """What is known of a recording before its first sample, as in Recording.
+
+    ``recipe_toml`` is the recipe's text, ``device`` the rig's identity (plain numbers and
+    strings), ``handle_radius_m`` NaN where it is not known. ``min_travel`` [rad, or m] is for
+    motion that was not planned, in place of ``strokes``: they are then found from the motion
+    (``label_strokes``) whenever the file is read.
+    """
+
+    recipe_toml: str = ""
+    device: Mapping[str, Any] = field(default_factory=dict)
+    handle_radius_m: float = math.nan
+    strokes: tuple[Stroke, ...] = ()
+    min_travel: float | None = None
+
+
+def describe(kind: Kind, joint: Joint, facts: RecordingFacts) -> RecordingMetadata:
     """Describe a recording, as its file and a table of it hold it (NaN becomes null)."""
+    radius_m = facts.handle_radius_m
     return RecordingMetadata(
         kind=kind,
         joint=joint.kind,
-        handle_radius_m=handle_radius_m if math.isfinite(handle_radius_m) else None,
-        strokes=stroke_records(strokes),
-        min_travel=min_travel,
-        recipe_toml=recipe_toml,
-        device=dict(device),
+        handle_radius_m=radius_m if math.isfinite(radius_m) else None,
+        strokes=stroke_records(facts.strokes),
+        min_travel=facts.min_travel,
+        recipe_toml=facts.recipe_toml,
+        device=dict(facts.device),
         versions=versions(),
     )
 

@@ -1,21 +1,19 @@
 """Write a recording so that a killed capture loses at most 0.25 s."""
 
 import contextlib
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import DeviceError, ScissorcalError
 from scissorcal.recording import layout
-from scissorcal.recording.partfile import create_locked, explained, seal
 from scissorcal.recording.recording import STOP_MARK, Joint, Kind, Recording, Stroke
-from scissorcal.recording.samplefile import SampleFile
-from scissorcal.recording.schema import describe, stroke_records
+from scissorcal.recording.samplefile import SampleFile, create_locked, explained, seal
+from scissorcal.recording.schema import RecordingFacts, describe, stroke_records
 from scissorcal.recording.telemetry import TelemetryChannel
 
 
@@ -26,10 +24,7 @@ class RecordingWriter:
     Samples appended more than 0.25 s ago (by their host clock) have been handed to the operating
     system, so that killing the process does not lose them.
 
-    ``kind``, ``joint``, ``handle_radius_m`` (NaN: not known) and ``strokes`` are as in Recording;
-    ``recipe_toml`` is the recipe's text, ``device`` the rig's identity (plain numbers
-    and strings). ``min_travel`` [rad, or m] is for motion that was not planned: strokes are then
-    found from the motion (``label_strokes``) whenever the file is read.
+    ``kind`` and ``joint`` are as in Recording.
 
     Raises InputError if ``path`` or its ``.part`` exists, or the folder is missing;
     ScissorcalError if writing fails (what was written until then is kept).
@@ -42,22 +37,14 @@ class RecordingWriter:
         self,
         path: str | Path,
         kind: Kind,
-        joint: Joint | None = None,
-        recipe_toml: str = "",
-        device: Mapping[str, Any] | None = None,
-        handle_radius_m: float = math.nan,
-        strokes: tuple[Stroke, ...] = (),
-        *,
-        min_travel: float | None = None,
+        joint: Joint = Joint(),
+        facts: RecordingFacts = RecordingFacts(),
     ) -> None:
-        if strokes and min_travel is not None:
+        if facts.strokes and facts.min_travel is not None:
             raise ValueError("give strokes or min_travel, not both")
         self.path = Path(path)
         self.part = self.path.with_name(self.path.name + layout.PART_SUFFIX)
-        joint, device = joint or Joint(), device or {}
-        self._metadata = describe(
-            kind, joint, handle_radius_m, strokes, recipe_toml, device, min_travel
-        )
+        self._metadata = describe(kind, joint, facts)
         self._stream = create_locked(self.path, self.part)
         self._failed = False
         with self._writing():
@@ -178,10 +165,12 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
         path,
         recording.kind,
         recording.joint,
-        recording.recipe_toml,
-        recording.device,
-        recording.handle_radius_m,
-        recording.strokes,
+        facts=RecordingFacts(
+            recipe_toml=recording.recipe_toml,
+            device=recording.device,
+            handle_radius_m=recording.handle_radius_m,
+            strokes=recording.strokes,
+        ),
     ) as writer:
         for sentence in recording.notes:
             writer.note(sentence)

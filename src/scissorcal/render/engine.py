@@ -14,7 +14,7 @@ from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, PlateConfig, ServoConfig
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
-from scissorcal.recording import Joint, RecordingWriter
+from scissorcal.recording import Joint, RecordingFacts, RecordingWriter
 from scissorcal.recording.probe import UNKNOWN_REST, RestFacts
 from scissorcal.render.admission import (
     Admission,
@@ -235,10 +235,12 @@ def open_writer(session: RigSession, package: ModelPackage, path: Path) -> Recor
         path,
         "render",
         Joint("rotary"),
-        session.recipe_toml,
-        rig_facts(identity, session.recipe.rig.motor_sign, session.probe),
-        identity.handle_radius,
-        min_travel=_travel(package),
+        facts=RecordingFacts(
+            recipe_toml=session.recipe_toml,
+            device=rig_facts(identity, session.recipe.rig.motor_sign, session.probe),
+            handle_radius_m=identity.handle_radius,
+            min_travel=_travel(package),
+        ),
     )
     manifest = package.manifest.model_dump_json(indent=2).encode("utf-8")
     writer.attach("package-manifest.json", manifest, "application/json")

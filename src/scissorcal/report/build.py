@@ -134,11 +134,19 @@ def document_of_fit(fit: FitResult, recipe: Recipe | None) -> ReportDocument:
 
 def write_comparison(found: Comparison, output_dir: str | os.PathLike[str]) -> ReportFiles:
     """Write ``comparison.html`` and ``comparison.json``; InputError where that cannot be done."""
-    from scissorcal.report.html import comparison_page
+    from scissorcal.report.html import panels_page
 
     folder = Path(output_dir)
     files = ReportFiles(folder / "comparison.html", folder / "comparison.json", found)
-    _write_both(files, comparison_page(found), twin_text(found))
+    page = panels_page(
+        "Comparison of two runs",
+        "A and B",
+        found.panels,
+        made=(found.created, found.scissorcal_version),
+        facts={"A": found.first, "B": found.second},
+        findings=(found.sentence,),
+    )
+    _write_both(files, page, twin_text(found))
     return files
 
 

@@ -24,7 +24,8 @@ from scissorcal.report.text import limit_text
 from scissorcal.verdicts import Verdict
 
 if TYPE_CHECKING:
-    from scissorcal.report.comparison import Comparison
+    from datetime import datetime
+
     from scissorcal.report.document import ReportDocument
     from scissorcal.report.inputs import Geometry
 
@@ -56,20 +57,34 @@ def report_page(document: ReportDocument, geometry: Geometry) -> str:
     return page
 
 
-def comparison_page(found: Comparison) -> str:
-    """The page of a comparison: both runs' panels, row by row."""
-    sides = "".join(
-        f"<dt>{name}</dt><dd>{escape(source)}</dd>"
-        for name, source in (("A", found.first), ("B", found.second))
+def panels_page(
+    kicker: str,
+    heading: str,
+    panels: Sequence[Panel],
+    *,
+    made: tuple[datetime, str],
+    facts: Mapping[str, str] | None = None,
+    findings: Sequence[str] = (),
+) -> str:
+    """The offline page of panels without parts: ``facts`` and ``findings`` above, panels open.
+
+    ``made`` is when, with its time zone, and by which version.
+    """
+    when, version = made
+    listed = "".join(
+        f"<dt>{escape(name)}</dt><dd>{escape(text)}</dd>" for name, text in (facts or {}).items()
     )
-    made = made_line(found.created.strftime("%Y-%m-%d %H:%M %Z"), found.scissorcal_version)
+    said = "".join(f'<p class="finding">{prose(finding)}</p>' for finding in findings)
     body = (
-        f'<main><section id="decision" class="plain"><p class="kicker">Comparison of two runs</p>'
-        f'<h1>A and B</h1><dl>{sides}</dl><p class="finding">{prose(found.sentence)}</p>{made}'
-        f"</section>{parts_nav([(p.id, p.title) for p in found.panels])}"
+        f'<main><section id="decision" class="plain"><p class="kicker">{escape(kicker)}</p>'
+        f"<h1>{prose(heading)}</h1>{f'<dl>{listed}</dl>' if listed else ''}{said}"
+        f"{made_line(when.strftime('%Y-%m-%d %H:%M %Z'), version)}</section>"
+        f"{parts_nav([(panel.id, panel.title) for panel in panels])}"
     )
-    body += "".join(panel_section(panel, open_=True) for panel in found.panels)
-    return whole_page("Comparison of two calibration reports", body + "</main>")
+    for panel in panels:
+        above = panel.sentence if panel.sentence in findings else ""
+        body += panel_section(panel, open_=True, above=above)
+    return whole_page(f"{heading}: {kicker}", body + "</main>")
 
 
 def prose(sentence: str) -> str:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scissorcal.calibration.plateau import LEAST_PLATEAU, Plateau
-from scissorcal.calibration.stroke_intervals import Interval
-from scissorcal.report.html import made_line, panel_section, parts_nav, prose, whole_page
+from scissorcal.calibration.stroke_intervals import LEAST_PLATEAU, Interval, Plateau
+from scissorcal.report.html import panels_page
 from scissorcal.report.panel import (
     Axis,
     Chart,
@@ -65,23 +65,16 @@ class Shown:
         return not (self.unit == "N" and self.place == "rad")
 
 
-def summary_page(shown: Shown) -> str:
-    """The offline page."""
-    panels = summary_panels(shown)
-    made = made_line(shown.created.strftime("%Y-%m-%d %H:%M %Z"), shown.version)
-    title = "Force over angle" if shown.unit == "N" else "Torque over angle"
-    named = f"{shown.log.source}"
-    if shown.second:
-        named += f", against {shown.second.source}"
-    body = (
-        f'<main><section id="decision" class="plain"><p class="kicker">{title}</p>'
-        f"<h1>{prose(named)}</h1>"
-        f'<p class="finding">{prose(panels[0].sentence)}</p>{made}</section>'
-        f"{parts_nav([(panel.id, panel.title) for panel in panels])}"
+def summary_page(shown: Shown, panels: Sequence[Panel]) -> str:
+    """The offline page of `summary_panels`."""
+    against = f", against {shown.second.source}" if shown.second else ""
+    return panels_page(
+        "Force over angle" if shown.unit == "N" else "Torque over angle",
+        f"{shown.log.source}{against}",
+        panels,
+        made=(shown.created, shown.version),
+        findings=(panels[0].sentence,),
     )
-    said = panels[0].sentence
-    body += "".join(panel_section(panel, open_=True, above=said) for panel in panels)
-    return whole_page(f"{title}: {shown.log.source}", body + "</main>")
 
 
 def summary_panels(shown: Shown) -> list[Panel]:

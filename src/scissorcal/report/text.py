@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
 
 from scissorcal.report.numbers import short, unit_text
 from scissorcal.report.panel import Panel, columns
 from scissorcal.verdicts import Verdict
 
 MARKS = {"pass": "pass", "fail": "FAIL", "not_evaluated": "----"}
-MOST_ROWS = 20
+MOST_ROWS = 40
+LARGEST_WIDTH = 120
+"""Characters of a table without the notes of its rows; columns beyond it are left to the page."""
 
 
 def panels_text(panels: Sequence[Panel]) -> str:
@@ -42,9 +45,8 @@ def limit_text(verdict: Verdict) -> str:
 
 def verdict_line(verdict: Verdict) -> str:
     """One verdict: outcome, check, value with its limit, reason."""
-    value = "" if verdict.value is None else short(verdict.value)
-    judged = ", ".join(part for part in (value, limit_text(verdict)) if part)
-    parts = (f"  {MARKS[verdict.status]}", f"{verdict.scope} {verdict.check}", judged, verdict.why)
+    check = f"{verdict.scope} {verdict.check}"
+    parts = (f"  {MARKS[verdict.status]}", check, verdict.limited, verdict.why)
     return "  ".join(part for part in parts if part)
 
 
@@ -57,14 +59,19 @@ def _rows(panel: Panel) -> list[str]:
         cells = [row.name]
         for name, unit in heads:
             value = row.value(name)
-            own = unit_text(value.unit) if value and not unit and not value.text else ""
-            cells.append("" if value is None else f"{value} {own}".strip())
+            stated = unit_text(value.unit) if value and not unit and not value.text else ""
+            cells.append("" if value is None else f"{value} {stated}".strip())
         table.append(cells)
     widths = [max(len(line[i]) for line in table) for i in range(len(table[0]))]
+    ends = accumulate(2 + width for width in widths)
+    shown = max(2, sum(end <= LARGEST_WIDTH for end in ends))
+    notes = ["", *(row.note for row in panel.rows)]
     lines = [
-        "  " + "  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip()
-        for line in table
+        f"  {'  '.join([*map(str.ljust, line[:shown], widths), note])}".rstrip()
+        for line, note in zip(table, notes, strict=False)
     ]
+    if shown < len(widths):
+        lines.append(f"  ... and {len(widths) - shown} more columns")
     if len(panel.rows) > MOST_ROWS:
         lines.append(f"  ... and {len(panel.rows) - MOST_ROWS} more")
     return lines

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from html import escape
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from scissorcal.report.html import made_line, panel_section, parts_nav, prose, whole_page
+from scissorcal.report.html import panels_page
 from scissorcal.report.numbers import percent, short
 from scissorcal.report.panel import (
     Axis,
@@ -22,6 +20,7 @@ from scissorcal.report.panel import (
     number,
     percent_of,
     points,
+    words,
 )
 from scissorcal.report.svg import svg
 
@@ -40,6 +39,22 @@ LEVELS: Mapping[str, tuple[Look, Style]] = {
     "limit of one knob": ("muted", "dotted"),
 }
 """How the lines are drawn below which errors should stay."""
+
+MARKS: Mapping[str, Callable[[Point], bool]] = {
+    "present": lambda point: point.setting.present,
+    "recommended": lambda point: point.recommended,
+    "Pareto front": lambda point: point.front,
+    "reference": lambda point: point.reference,
+}
+"""What a setting is marked as."""
+
+LOOKS: Mapping[str, tuple[Look, Style]] = {
+    "dominated": ("muted", "full"),
+    "Pareto front": ("blue", "full"),
+    "present": ("vermillion", "open"),
+    "recommended": ("green", "open"),
+}
+"""How points are drawn, in this order; full ones carry their label."""
 
 ROOM = 1.6
 """Free room about the points of a diagram, as a factor on its logarithmic axes."""
@@ -63,50 +78,74 @@ stroke: currentColor; }
 
 def trade_page(trade: Trade) -> str:
     """The offline page: recommendations, all settings at once, then knob by knob."""
-    panels = [trade_panel(one, trade) for one in trade.curves]
-    if trade.together is not None:
-        panels.insert(0, trade_panel(trade.together, trade))
-    body = f'<main id="report">{_head(trade)}{parts_nav([(p.id, p.title) for p in panels])}'
-    body += "".join(panel_section(panel, open_=True) for panel in panels)
-    return whole_page(f"{trade.recipe_name}: what accuracy costs", body + "</main>")
+    return panels_page(
+        "What accuracy costs, measured",
+        trade.recipe_name,
+        trade_panels(trade),
+        made=(trade.created, trade.scissorcal_version),
+        findings=trade.sentences or ("Nothing can be recommended yet.",),
+    )
 
 
-def trade_panel(found: Curve, trade: Trade) -> Panel:
-    """One knob: its sentence, its diagram and the table of its settings."""
-    if found.missing:
-        return Panel(found.knob, "trade", found.title, notes=(found.missing,))
-    if not found.points:
-        return Panel(found.knob, "trade", found.title, notes=found.sentences)
-    sentence, *notes = found.sentences or ("",)
-    chart = trade_chart(found, trade)
+def trade_panels(trade: Trade) -> list[Panel]:
+    """How it was measured, all recommended settings at once, then knob by knob."""
+    curves = [*([trade.together] if trade.together else []), *trade.curves]
+    return [_measured(trade), *(_knob(curve, trade) for curve in curves)]
+
+
+def _measured(trade: Trade) -> Panel:
+    origin = "simulated data of the virtual rig" if trade.simulated else "data of a real rig"
+    allowed = f" of {short(trade.budget_s)} s allowed" if trade.budget_s is not None else ""
+    facts = {
+        "data": f"{trade.material}; {origin}",
+        "computer": trade.machine,
+        "measured": f"{trade.measured} samples, {trade.measured_now} of them by this run, in "
+        f"{short(trade.seconds)} s{allowed}, {trade.workers} at a time",
+        "limit of one knob": f"{percent(trade.limit)} of the scene's largest torque: the "
+        f"tolerance of {percent(trade.tolerance)} over the number of knobs whose main error is one "
+        "of torque; a convention, no guarantee",
+    }
+    rows = tuple(Row(name, (words("this run", text),)) for name, text in facts.items())
     return Panel(
-        found.knob,
+        "run", "trade", "How it was measured", rows=rows, notes=trade.notes, caption=HOW_TO_READ
+    )
+
+
+def _knob(knob: Curve, trade: Trade) -> Panel:
+    """One knob: its sentence, its diagram and the table of its settings, main figures first."""
+    if knob.missing or not knob.points:
+        why = (knob.missing,) if knob.missing else knob.sentences
+        return Panel(knob.knob, "trade", knob.title, notes=why)
+    sentence, *notes = knob.sentences or ("",)
+    chart = trade_chart(knob, trade)
+    return Panel(
+        knob.knob,
         "trade",
-        found.title,
+        knob.title,
         sentence,
-        rows=tuple(_row(point) for point in found.points),
+        rows=tuple(_row(point, knob) for point in knob.points),
         charts=(chart,) if chart else (),
-        notes=(f"Errors are counted against {found.against}.", *notes, *_notes(found)),
+        notes=(f"Errors are counted against {knob.against}.", *notes),
         caption="Median of the repeats, and their lowest and highest where there are several. "
         "Errors in % are of the scene's largest torque; × is the time as a multiple of the "
         f"baseline step ({short(trade.baseline.median)} ms of processor time).",
     )
 
 
-def trade_chart(found: Curve, trade: Trade) -> Chart | None:
+def trade_chart(knob: Curve, trade: Trade) -> Chart | None:
     """The work-precision diagram of a knob; None where no point has both a cost and an error."""
-    placed = [(p, *where) for p in found.points if (where := _place(found, p))]
+    placed = [(p, *where) for p in knob.points if (where := _place(knob, p))]
     if not placed:
         return None
-    in_percent = all(p.errors[found.error].share is not None for p, _, _ in placed)
-    unit = "% of the scene's torque" if in_percent else placed[0][0].errors[found.error].unit
-    known = [p.costs[found.cost].median for p in found.points if p.reference]
+    in_percent = all(p.errors[knob.error].share is not None for p, _, _ in placed)
+    unit = "% of the scene's torque" if in_percent else placed[0][0].errors[knob.error].unit
+    known = [p.costs[knob.cost].median for p in knob.points if p.reference]
     costs = [x for _, x, _ in placed] + [x for x in known if x > 0.0]
     errors = [y for _, _, y in placed]
     levels = {"tolerance": 100.0 * trade.tolerance, "limit of one knob": 100.0 * trade.limit}
     if not in_percent:
         levels = {}
-    elif found == trade.together:
+    elif knob == trade.together:
         del levels["limit of one knob"]
     low, high = min(costs) / ROOM, max(costs) * ROOM
     least, most = min([*errors, *levels.values()]) / ROOM, max([*errors, *levels.values()]) * ROOM
@@ -117,12 +156,12 @@ def trade_chart(found: Curve, trade: Trade) -> Chart | None:
     for name, level in levels.items():
         look, style = LEVELS[name]
         series.append(curve(name, (low, high), (level, level), look, style=style))
-    failed = [p.setting.label for p in found.points if p.failed]
+    failed = [p.setting.label for p in knob.points if p.failed]
     return Chart(
-        id=f"{found.knob}-diagram",
-        title=f"{found.title}: error over cost",
-        x=Axis(found.cost, placed[0][0].costs[found.cost].unit, log=True, low=low, high=high),
-        y=Axis(found.error, unit, log=True, low=least, high=most),
+        id=f"{knob.knob}-diagram",
+        title=f"{knob.title}: error over cost",
+        x=Axis(knob.cost, placed[0][0].costs[knob.cost].unit, log=True, low=low, high=high),
+        y=Axis(knob.error, unit, log=True, low=least, high=most),
         series=tuple(series),
         caption=f"Failed: {', '.join(failed)}." if failed else "",
     )
@@ -135,61 +174,27 @@ def standalone_svg(chart: Chart) -> str:
     return f"{head}{end}<style>{STANDALONE}</style>{rest}\n"
 
 
-def _head(trade: Trade) -> str:
-    origin = "simulated data of the virtual rig" if trade.simulated else "data of a real rig"
-    made = made_line(trade.created.strftime("%Y-%m-%d %H:%M %Z"), trade.scissorcal_version)
-    said = "".join(f"<li>{prose(sentence)}</li>" for sentence in trade.sentences)
-    listed = f"<ul>{said}</ul>" if said else "<p>Nothing can be recommended yet.</p>"
-    facts = {
-        "Data": f"{trade.material}; {origin}",
-        "Computer": trade.machine,
-        "Measured": f"{trade.measured} samples, {trade.measured_now} of them by this run, in "
-        f"{short(trade.seconds)} s"
-        + (f" of {short(trade.budget_s)} s allowed" if trade.budget_s is not None else "")
-        + f", {trade.workers} at a time",
-        "Limit of one knob": f"{percent(trade.limit)} of the scene's largest torque: the "
-        f"tolerance of {percent(trade.tolerance)} over the number of knobs whose main error is one "
-        "of torque; a convention, no guarantee",
-    }
-    rows = "".join(f"<dt>{name}</dt><dd>{escape(text)}</dd>" for name, text in facts.items())
-    notes = "".join(f'<p class="note">{prose(note)}</p>' for note in trade.notes)
-    return (
-        '<section id="decision" class="plain"><p class="kicker">What accuracy costs, measured</p>'
-        f"<h1>{escape(trade.recipe_name)}</h1>{made}<dl>{rows}</dl><h2>Recommended</h2>{listed}"
-        f"<p>{HOW_TO_READ}</p>{notes}</section>"
-    )
-
-
-def _row(point: Point) -> Row:
-    marks = ", ".join(_words_of(point))
+def _row(point: Point, knob: Curve) -> Row:
+    marks = ", ".join(mark for mark, is_so in MARKS.items() if is_so(point))
     name = f"{point.setting.label} ({marks})" if marks else point.setting.label
     if point.failed:
         return Row(name, (), f"Failed: {point.failed}")
     values = [value for key, spread in point.costs.items() for value in _cost(key, spread)]
     values += [_error(key, error) for key, error in point.errors.items()]
+    values.sort(key=lambda value: value.name not in (knob.cost, knob.error))
     notes = list(point.notes)
     if point.rejected:
         notes.append(f"Failed checks: {', '.join(point.rejected)}.")
     return Row(name, tuple(values), " ".join(notes), marked=point.recommended)
 
 
-def _words_of(point: Point) -> list[str]:
-    known = {
-        "present": point.setting.present,
-        "recommended": point.recommended,
-        "Pareto front": point.front,
-        "reference": point.reference,
-    }
-    return [word for word, is_so in known.items() if is_so]
-
-
 def _cost(name: str, spread: Spread) -> list[Value]:
     several = spread.repeats > 1 and spread.low < spread.high
     ends = {"low": spread.low, "high": spread.high} if several else {}
-    found = [number(name, spread.median, spread.unit, **ends)]
+    values = [number(name, spread.median, spread.unit, **ends)]
     if spread.ratio is not None:
-        found.append(number(f"{name}, ×", spread.ratio))
-    return found
+        values.append(number(f"{name}, ×", spread.ratio))
+    return values
 
 
 def _error(name: str, error: Error) -> Value:
@@ -198,58 +203,37 @@ def _error(name: str, error: Error) -> Value:
     return number(name, error.value, error.unit)
 
 
-def _notes(found: Curve) -> tuple[str, ...]:
-    rejected = [p.setting.label for p in found.points if p.rejected]
-    if not rejected:
-        return ()
-    return (f"Settings that failed a check: {', '.join(rejected)}; the table names it.",)
-
-
-def _place(found: Curve, point: Point) -> tuple[float, float] | None:
+def _place(knob: Curve, point: Point) -> tuple[float, float] | None:
     """Cost and error of a point on the axes, errors of torque in percent; None without both."""
-    if found.cost not in point.costs or found.error not in point.errors:
+    if knob.cost not in point.costs or knob.error not in point.errors:
         return None
-    error = point.errors[found.error]
+    error = point.errors[knob.error]
     value = error.value if error.share is None else 100.0 * error.share
-    cost = point.costs[found.cost].median
+    cost = point.costs[knob.cost].median
     return (cost, value) if cost > 0.0 and value > 0.0 else None
 
 
 def _lines(placed: Sequence[tuple[Point, float, float]]) -> list[Series]:
-    methods = dict.fromkeys(point.setting.method for point, _, _ in placed)
-    found = []
-    for method in methods:
-        own = sorted((x, y) for point, x, y in placed if point.setting.method == method)
-        if len(own) > 1:
-            found.append(
-                curve(method or "settings", [x for x, _ in own], [y for _, y in own], "muted")
-            )
-    return found
+    lines = []
+    for method in dict.fromkeys(point.setting.method for point, _, _ in placed):
+        line = sorted((x, y) for point, x, y in placed if point.setting.method == method)
+        if len(line) > 1:
+            x, y = zip(*line, strict=True)
+            lines.append(curve(method or "settings", x, y, "muted"))
+    return lines
 
 
 def _marks(placed: Sequence[tuple[Point, float, float]]) -> list[Series]:
     """Points by what they are: others, on the front, present, recommended."""
-    kinds: tuple[tuple[str, str, str], ...] = (
-        ("dominated", "muted", "full"),
-        ("Pareto front", "blue", "full"),
-        ("present", "vermillion", "open"),
-        ("recommended", "green", "open"),
-    )
-    found = []
-    for name, look, style in kinds:
-        own = [
-            (p, x, y)
-            for p, x, y in placed
-            if {
-                "dominated": not p.front,
-                "Pareto front": p.front,
-                "present": p.setting.present,
-                "recommended": p.recommended,
-            }[name]
-        ]
-        if own:
-            drawn = points(name, [x for _, x, _ in own], [y for _, _, y in own], look, style=style)  # type: ignore[arg-type]
-            if name in ("dominated", "Pareto front"):
-                drawn = replace(drawn, labels=tuple(p.setting.label for p, _, _ in own))
-            found.append(drawn)
-    return found
+    series = []
+    for name, (look, style) in LOOKS.items():
+        marked = [place for place in placed if MARKS.get(name, _dominated)(place[0])]
+        if marked:
+            settings, x, y = zip(*marked, strict=True)
+            labels = tuple(point.setting.label for point in settings) if style == "full" else ()
+            series.append(points(name, x, y, look, style=style, labels=labels))
+    return series
+
+
+def _dominated(point: Point) -> bool:
+    return not point.front

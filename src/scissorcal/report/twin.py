@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 from scissorcal.report.document import ReportDocument
 
 if TYPE_CHECKING:
+    from scissorcal.bench.trade.result import Trade
     from scissorcal.report.comparison import Comparison
 
 
-def twin_text(document: ReportDocument | Comparison) -> str:
+def twin_text(document: ReportDocument | Comparison | Trade) -> str:
     """The document as JSON: what has its default is left out, what is not finite is null."""
     from pydantic import TypeAdapter
 
@@ -49,10 +50,10 @@ def _schema_text(kind: type, title: str) -> str:
         if definition.get("type") == "object":
             definition["additionalProperties"] = False
             definition["required"] = sorted(
-                name for name, own in definition["properties"].items() if "default" not in own
+                name for name, entry in definition["properties"].items() if "default" not in entry
             )
-        for own in definition.get("properties", {}).values():
-            own.pop("title", None)
+        for entry in definition.get("properties", {}).values():
+            entry.pop("title", None)
     whole = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": title,

@@ -11,7 +11,7 @@ import numpy as np
 from scissorcal.aliases import Array
 
 if TYPE_CHECKING:
-    from scissorcal.recipe.plate_tracking import PlateTracking
+    from scissorcal.recipe.plate_surface import PlateTracking
     from scissorcal.recipe.schema import Recipe
 
 

@@ -1,20 +1,24 @@
-"""Frames of a running camera or a video, and photographs selected from them."""
+"""Frames of a running camera or a video: photographs selected, and the pose of a target in each."""
 
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+import cv2
 import numpy as np
 
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.files import replacing
 from scissorcal.foreign import refuse_unless_regular
 from scissorcal.foreign.formats import VIDEO
+from scissorcal.recipe.priors import PlatePriors
+from scissorcal.vision.geometry.board_pose import ODDS, BoardPose, Corners, locate_board
+from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
-from scissorcal.vision.targets.boards import Board
+from scissorcal.vision.targets.boards import Board, MarkedBoard
 from scissorcal.vision.targets.detect import Detection, find_any_board
 
 APART_FRAMES = 5
@@ -50,6 +54,74 @@ class Frame:
     rate_Hz: float = math.nan
 
 
+BLANK_LEVELS = 8.0
+"""A picture is blank where 98 % of it lies within fewer grey levels than these."""
+
+State = Literal["seen", "ambiguous", "blank", "no target", "no pose"]
+
+STATES: dict[State, str] = {
+    "seen": "its pose is known",
+    "ambiguous": "two poses explain the picture about equally well",
+    "blank": "the picture is uniform: lens covered, or no light",
+    "no target": "the target is outside the picture, hidden or blurred",
+    "no pose": "the visible part of the target does not determine a pose",
+}
+"""The states of a picture and their meaning. The last three are drop-outs: no pose."""
+
+
+@dataclass(frozen=True)
+class LocatedFrame:
+    """One picture and its state, and the target's pose if there is one."""
+
+    frame: Frame
+    state: State
+    board: MarkedBoard | None
+    corners: int
+    pose: BoardPose | None
+
+
+def located_frames(
+    frames: Iterable[Frame],
+    boards: Sequence[MarkedBoard],
+    camera: Camera,
+    priors: PlatePriors = PlatePriors(),
+) -> Iterator[LocatedFrame]:
+    """Locate a target in every picture independently; the first board that is seen is the target.
+
+    Raises InputError where pictures are of another size than the camera was fitted at.
+    """
+    for frame in frames:
+        height, width = frame.image.shape[:2]
+        if (width, height) != (camera.width, camera.height):
+            raise InputError(
+                f"The pictures are {width} x {height} pixels, the camera was fitted at "
+                f"{camera.width} x {camera.height}: use the same camera, size, focus and zoom."
+            )
+        detection = look(frame.image, boards, f"picture {frame.number}")
+        if detection is None:
+            state: State = "blank" if _is_blank(frame) else "no target"
+            yield LocatedFrame(_without_image(frame), state, None, 0, None)
+            continue
+        boards = tuple(board for board in boards if board == detection.board)
+        try:
+            pose = locate_board(Corners.of(detection), camera, priors)
+        except ValueError:
+            count = len(detection.ids)
+            yield LocatedFrame(_without_image(frame), "no pose", boards[0], count, None)
+            continue
+        state = "seen" if pose.odds >= ODDS else "ambiguous"
+        yield LocatedFrame(_without_image(frame), state, boards[0], len(detection.ids), pose)
+
+
+def _without_image(frame: Frame) -> Frame:
+    return replace(frame, image=None)
+
+
+def _is_blank(frame: Frame) -> bool:
+    low, high = np.percentile(np.asarray(frame.image)[::4, ::4], [1.0, 99.0])
+    return bool(high - low < BLANK_LEVELS)
+
+
 def pick_frames(source: str, board: Board, folder: Path, most: int) -> Iterator[Path]:
     """Yield frames as PNG files in ``folder``, each with the board held still in a new place.
 
@@ -58,9 +130,9 @@ def pick_frames(source: str, board: Board, folder: Path, most: int) -> Iterator[
     without any frame.
     """
 
-    def new_place(frame: Frame, seen: Detection, kept: list[tuple[int, Detection]]) -> bool:
+    def new_place(frame: Frame, detection: Detection, kept: list[tuple[int, Detection]]) -> bool:
         far = NEW_SHARE * frame.image.shape[1]
-        return all(_moved(seen, old) >= far for _, old in kept)
+        return all(_moved(detection, old) >= far for _, old in kept)
 
     yield from _picked(source, (board,), folder, most, new_place)
 
@@ -79,8 +151,6 @@ def frames_of(source: str) -> Iterator[Frame]:
 
     Raises DeviceError where the camera gives none, InputError where the file is no video.
     """
-    import cv2
-
     number = camera_number(source)
     if number is None and not Path(source).exists():
         raise InputError(f"{source} does not exist: give a video file, or a camera's number.")
@@ -106,8 +176,8 @@ def frames_of(source: str) -> Iterator[Frame]:
             if number is None:
                 yield Frame(index, index / rate, image, count, stamp, rate_Hz=stated)
             else:
-                own = stamp if stamp > 0.0 else math.nan
-                yield Frame(index, now - began, image, count, own, now)
+                camera_time = stamp if stamp > 0.0 else math.nan
+                yield Frame(index, now - began, image, count, camera_time, now)
             index += 1
             good, image = video.read()
     finally:
@@ -139,11 +209,11 @@ def timed(frames: Iterable[Frame], source: str) -> Iterator[Frame]:
             first = frame.stamp_s
         passed = frame.stamp_s - first
         if frame.number % RATE_EVERY == RATE_EVERY - 1 and passed > 0.0:
-            found = frame.number / passed
-            if not 1.0 - RATE_SHARE < found / frame.rate_Hz < 1.0 + RATE_SHARE:
+            measured_Hz = frame.number / passed
+            if not 1.0 - RATE_SHARE < measured_Hz / frame.rate_Hz < 1.0 + RATE_SHARE:
                 raise InputError(
                     f"{source} states a frame rate of {frame.rate_Hz:g} per second, and its time "
-                    f"stamps have {found:.3g}: {_ENCODE}."
+                    f"stamps have {measured_Hz:.3g}: {_ENCODE}."
                 )
         yield frame
 
@@ -164,12 +234,12 @@ def _picked(
     try:
         for frame in frames_of(source):
             name = f"frame-{frame.number:05d}.png"
-            seen = look(frame.image, boards, name)
-            still = _moved(seen, previous) < STILL_SHARE * frame.image.shape[1]
-            previous = seen
-            if seen is None or not still or not wanted(frame, seen, kept):
+            detection = look(frame.image, boards, name)
+            still = _moved(detection, previous) < STILL_SHARE * frame.image.shape[1]
+            previous = detection
+            if detection is None or not still or not wanted(frame, detection, kept):
                 continue
-            kept.append((frame.number, seen))
+            kept.append((frame.number, detection))
             yield _stored(frame.image, folder / name)
             if len(kept) >= most:
                 return
@@ -187,20 +257,18 @@ def look(image: Any, boards: Sequence[Board], name: str) -> Detection | None:
         return None
 
 
-def _moved(one: Detection | None, other: Detection | None) -> float:
+def _moved(first: Detection | None, second: Detection | None) -> float:
     """Median distance in pixels between the corners that both show."""
-    if one is None or other is None:
+    if first is None or second is None:
         return float("inf")
-    _, here, there = np.intersect1d(one.ids, other.ids, return_indices=True)
+    _, here, there = np.intersect1d(first.ids, second.ids, return_indices=True)
     if len(here) < 4:
         return float("inf")
-    apart = one.pixels[here] - other.pixels[there]
+    apart = first.pixels[here] - second.pixels[there]
     return float(np.median(np.linalg.norm(apart, axis=1)))
 
 
 def _stored(frame: Any, path: Path) -> Path:
-    import cv2
-
     with replacing(path) as part:
         part.write_bytes(cv2.imencode(".png", frame)[1].tobytes())
     return path

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,7 +35,7 @@ def detection_overlay(photo: Photo, detection: Detection) -> Picture:
 
 
 def residual_overlay(
-    photo: Photo, pixels: Array, residuals: Array, words: str = "", axes: Array | None = None
+    photo: Photo, pixels: Array, residuals: Array, axes: Array | None = None
 ) -> Picture:
     """Draw residuals of corners as arrows, with a scale bar.
 
@@ -58,14 +59,12 @@ def residual_overlay(
     bar = _round_length(0.1 * width / magnified)
     canvas.bar(round(bar * magnified), f"{bar:g} px")
     rms = float(np.sqrt(np.mean(length**2)))
-    canvas.title(f"{photo.source}: {rms:.2f} px rms {words}".rstrip())
+    canvas.title(f"{photo.source}: {rms:.2f} px rms")
     return canvas.picture
 
 
 def write_picture(picture: Picture, path: Path) -> Path:
     """Write a picture as PNG, atomically."""
-    import cv2
-
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as part:
         part.write_bytes(cv2.imencode(".png", picture)[1].tobytes())
@@ -80,8 +79,6 @@ class Canvas:
     """
 
     def __init__(self, image: Picture, scale: float, origin: tuple[int, int] = (0, 0)) -> None:
-        import cv2
-
         part: Any = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
         size = (round(part.shape[1] * scale), round(part.shape[0] * scale))
         method = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_CUBIC
@@ -91,16 +88,12 @@ class Canvas:
 
     def line(self, pixels: Array, colour: Colour, *, closed: bool = False) -> None:
         """Draw a line through pixels (n, 2) of the photograph."""
-        import cv2
-
         cv2.polylines(
             self.picture, [self._fine(pixels)], closed, colour, 1, cv2.LINE_AA, shift=_FINE
         )
 
     def arrow(self, start: Array, end: Array, colour: Colour, *, thickness: int = 1) -> None:
         """Draw an arrow between two pixels of the photograph."""
-        import cv2
-
         ends = self._fine(np.array([start, end])).tolist()
         cv2.arrowedLine(
             self.picture, ends[0], ends[1], colour, thickness, cv2.LINE_AA, _FINE, tipLength=0.2
@@ -113,15 +106,11 @@ class Canvas:
 
     def ring(self, pixel: Array, colour: Colour, radius: int) -> None:
         """Draw a circle of a radius on the canvas about a pixel of the photograph."""
-        import cv2
-
         centre = self._fine(np.asarray(pixel)[None])[0].tolist()
         cv2.circle(self.picture, centre, radius * 2**_FINE, colour, 1, cv2.LINE_AA, shift=_FINE)
 
     def words(self, text: str, place: NDArray[np.int64]) -> None:
         """Write black on white; ``place`` (2,) on the canvas is the left end of the baseline."""
-        import cv2
-
         font, size = cv2.FONT_HERSHEY_SIMPLEX, self._letter_size
         (width, height), below = cv2.getTextSize(text, font, size, 1)
         left, low = (int(value) for value in place)
@@ -135,8 +124,6 @@ class Canvas:
 
     def bar(self, length: int, text: str) -> None:
         """Draw a scale bar of a length on the canvas in the lower left corner."""
-        import cv2
-
         low = self.picture.shape[0] - 20
         cv2.rectangle(self.picture, (10, low - 16), (40 + length, low + 14), _WHITE, cv2.FILLED)
         cv2.line(self.picture, (20, low), (20 + length, low), _BLACK, 2)

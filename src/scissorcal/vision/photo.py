@@ -1,7 +1,17 @@
-"""Read a photograph: upright, eight bits, limited in size."""
+"""Read a photograph: upright, eight bits, limited in size.
 
+Its bytes are decoded in the child process that `scissorcal.foreign` starts.
+"""
+
+import struct
+import warnings
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,12 +22,22 @@ from scissorcal.foreign import parse_isolated, read_foreign
 from scissorcal.foreign.formats import PHOTOGRAPH
 from scissorcal.identity import bytes_digest
 
+if TYPE_CHECKING:
+    from PIL import Image
+
+
+MOST_SIDE_PX = 65_535
+"""Of width or height: what JPEG can state, and more than any camera has."""
+
+_EXIF_ORIENTATION = 0x0112
+_DEEP = ("I", "I;16", "I;16B", "I;16L", "I;16N")
+_FORMATS = ("JPEG", "PNG", "TIFF", "BMP", "WEBP", "GIF")
+
+
 Picture = NDArray[np.uint8]
 
 MAX_PIXELS = 25_000_000
 """Default size limit; larger photographs are reduced by 2, 4 or 8."""
-
-_DECODER = "scissorcal.vision.photo_decoding"
 
 
 @dataclass(frozen=True)
@@ -54,8 +74,6 @@ class Photo:
 
         Raises ValueError unless ``factor`` divides both sides, as the rest would be cut off.
         """
-        from scissorcal.vision.photo_decoding import averaged
-
         rows, columns = self.image.shape[:2]
         if factor < 1 or rows % factor or columns % factor:
             raise ValueError(f"{columns} x {rows} pixels are no multiples of {factor}")
@@ -84,7 +102,7 @@ def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True)
     """
     data = read_foreign(path, PHOTOGRAPH)
     options = {"path": str(path), "max_pixels": max_pixels, "colour": colour}
-    facts = parse_isolated(f"{_DECODER}:decode", data, path, PHOTOGRAPH, **options)
+    facts = parse_isolated(f"{__name__}:decode", data, path, PHOTOGRAPH, **options)
     return Photo(
         facts["image"],
         facts["width"],
@@ -100,8 +118,8 @@ def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True)
 def picture_size(path: Path) -> tuple[int, int]:
     """Width and height in pixels by the header alone; raises InputError as `read_photo` does."""
     data = read_foreign(path, PHOTOGRAPH)
-    found = parse_isolated(f"{_DECODER}:decode_size", data, path, PHOTOGRAPH, path=str(path))
-    return found[0], found[1]
+    size = parse_isolated(f"{__name__}:decode_size", data, path, PHOTOGRAPH, path=str(path))
+    return size[0], size[1]
 
 
 PictureShape = tuple[int, int, int]
@@ -113,15 +131,189 @@ def same_shape(photo: Photo, shape: PictureShape | None) -> PictureShape:
 
     A photograph of another size or orientation would be one of another camera to the fit.
     """
-    own = (photo.width, photo.height, photo.orientation)
-    if shape is None or own == shape:
-        return own
-    if own[:2] != shape[:2]:
+    taken = (photo.width, photo.height, photo.orientation)
+    if shape is None or taken == shape:
+        return taken
+    if taken[:2] != shape[:2]:
         raise InputError(
-            f"{photo.source} has {own[0]} x {own[1]} pixels, the photographs before it "
+            f"{photo.source} has {taken[0]} x {taken[1]} pixels, the photographs before it "
             f"{shape[0]} x {shape[1]}: a fit takes one size, without zoom."
         )
     raise InputError(
-        f"{photo.source} has the EXIF orientation {own[2]}, the photographs before it "
+        f"{photo.source} has the EXIF orientation {taken[2]}, the photographs before it "
         f"{shape[2]}: hold the camera the same way for all."
     )
+
+
+def decode(data: bytes, path: str, max_pixels: int, colour: bool) -> dict[str, Any]:
+    """The facts of a `scissorcal.vision.photo.Photo`; see `scissorcal.vision.photo.read_photo`."""
+    with _opened(data, path) as opened:
+        return _photo(path, opened, max_pixels, colour)
+
+
+def decode_size(data: bytes, path: str) -> list[int]:
+    """Width and height in pixels, as the header states them."""
+    with _opened(data, path) as opened:
+        return list(opened.size)
+
+
+@contextmanager
+def _opened(data: bytes, path: str) -> "Iterator[Image.Image]":
+    """The picture, not decoded yet; what its decoder raises becomes an InputError."""
+    from PIL import Image, UnidentifiedImageError
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("error", Image.DecompressionBombWarning)
+        try:
+            with Image.open(BytesIO(data), formats=_FORMATS) as opened:
+                if max(opened.size) > MOST_SIDE_PX:
+                    raise InputError(_too_long(path, opened.size))  # noqa: TRY301
+                if opened.format == "PNG":
+                    _check_png(data)
+                yield opened
+        except (InputError, MemoryError):
+            raise
+        except (Image.DecompressionBombWarning, Image.DecompressionBombError):
+            limit = (Image.MAX_IMAGE_PIXELS or 0) // 1_000_000
+            raise InputError(
+                f"{path} has more than {limit} million pixels: save it at a smaller size."
+            ) from None
+        except UnidentifiedImageError:
+            raise InputError(_not_a_picture(path)) from None
+        except Exception as error:  # noqa: BLE001 - whatever a decoder raises is a fact of the file
+            raise InputError(
+                f"{path} is damaged or truncated ({error}). {PHOTOGRAPH.remedy}"
+            ) from None
+
+
+def _check_png(data: bytes) -> None:
+    """ValueError where a checksum of a picture's own chunks is wrong; Pillow shows such pixels."""
+    at = 8
+    while at + 12 <= len(data):
+        (length,) = struct.unpack_from(">I", data, at)
+        name, end = data[at + 4 : at + 8], at + 8 + length
+        is_needed = name[:1].isupper()  # what only adds to a picture begins with a small letter
+        if is_needed and zlib.crc32(data[at + 4 : end]) != int.from_bytes(
+            data[end : end + 4], "big"
+        ):
+            raise ValueError(f"the checksum of the part at byte {at} does not match")
+        if name == b"IEND":
+            return
+        at = end + 4
+
+
+def _too_long(path: str, size: tuple[int, int]) -> str:
+    return (
+        f"{path} states {size[0]} x {size[1]} pixels, and no side has more than {MOST_SIDE_PX}: it "
+        f"is damaged. {PHOTOGRAPH.remedy}"
+    )
+
+
+def _photo(path: str, opened: "Image.Image", max_pixels: int, colour: bool) -> dict[str, Any]:
+    width, height = opened.size
+    orientation = _orientation(opened)
+    reduction = _reduction(width, height, max_pixels)
+    if opened.mode == "F":
+        raise InputError(
+            f"{path} has floating-point pixels of unknown white level: save it as an 8- or 16-bit "
+            "picture."
+        )
+    left = reduction
+    if opened.format in ("JPEG", "MPO"):
+        mode = "L" if not colour and opened.mode in ("RGB", "L") else None
+        opened.draft(mode, (-(-width // reduction), -(-height // reduction)))
+        left = reduction // round(width / opened.size[0])
+    image = _eight_bits(opened, colour, left)
+    spare = (width - image.shape[1] * reduction, height - image.shape[0] * reduction)
+    image = _upright(image, orientation)
+    origin = _origin(spare, orientation)
+    if orientation >= 5:
+        width, height = height, width
+    return {
+        "image": image,
+        "width": width,
+        "height": height,
+        "reduction": reduction,
+        "across": origin[0],
+        "down": origin[1],
+        "orientation": orientation,
+    }
+
+
+def _eight_bits(opened: "Image.Image", colour: bool, reduction: int) -> Picture:
+    """Decode to grey or blue-green-red, averaging blocks of ``reduction`` by as many pixels."""
+    from PIL import Image
+
+    if opened.mode in _DEEP:
+        return averaged(_from_deep(np.asarray(opened)), reduction)
+    if opened.mode in ("1", "P", "PA", "LA", "La", "RGBa") or "transparency" in opened.info:
+        opened = opened.convert("L" if opened.mode == "1" else "RGBA")
+    if reduction > 1:
+        opened = opened.reduce(reduction)
+    if opened.mode == "RGBA":
+        paper = Image.new("RGBA", opened.size, "white")
+        opened = Image.alpha_composite(paper, opened).convert("RGB")
+    if opened.mode == "L" or not colour:
+        return np.array(opened.convert("L"), dtype=np.uint8)
+    return np.ascontiguousarray(np.asarray(opened.convert("RGB"), dtype=np.uint8)[:, :, ::-1])
+
+
+def _from_deep(deep: NDArray[Any]) -> Picture:
+    """Take the upper eight bits of those in use: 10-, 12- and 14-bit sensors fill 16 in part."""
+    values = np.maximum(deep, 0)
+    bits = max(8, int(values.max()).bit_length())
+    return np.asarray(values >> (bits - 8), dtype=np.uint8)
+
+
+def averaged(image: Picture, factor: int) -> Picture:
+    """Average blocks of ``factor`` by ``factor`` pixels; an incomplete last block is dropped."""
+    import cv2
+
+    if factor == 1:
+        return image
+    rows, columns = image.shape[0] // factor, image.shape[1] // factor
+    whole = image[: rows * factor, : columns * factor]
+    return np.asarray(
+        cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA), dtype=np.uint8
+    )
+
+
+def _upright(image: Picture, orientation: int) -> Picture:
+    """Rotate and mirror by EXIF's orientation (1 to 8)."""
+    if orientation in (2, 4, 5, 7):
+        image = image[:, ::-1]
+    turns = {3: 2, 4: 2, 5: 1, 6: 3, 7: 3, 8: 1}.get(orientation, 0)
+    return np.ascontiguousarray(np.rot90(image, turns))
+
+
+def _origin(spare: tuple[int, int], orientation: int) -> tuple[int, int]:
+    """Place of the reduced picture's corner in the whole one, both upright.
+
+    A reduced picture lacks (or exceeds) the whole one by ``spare`` pixels at its right and lower
+    end, which the turn may bring to the left or to the top.
+    """
+    across = {2: spare[0], 3: spare[0], 6: spare[1], 7: spare[1]}.get(orientation, 0)
+    down = {3: spare[1], 4: spare[1], 7: spare[0], 8: spare[0]}.get(orientation, 0)
+    return across, down
+
+
+def _orientation(opened: "Image.Image") -> int:
+    try:
+        stated = opened.getexif().get(_EXIF_ORIENTATION, 1)
+    except (ValueError, KeyError, TypeError, OSError, SyntaxError, struct.error):
+        return 1
+    return stated if isinstance(stated, int) and 1 <= stated <= 8 else 1
+
+
+def _reduction(width: int, height: int, max_pixels: int) -> int:
+    for factor in (1, 2, 4):
+        if width * height <= max_pixels * factor**2:
+            return factor
+    return 8
+
+
+def _not_a_picture(path: str) -> str:
+    if Path(path).suffix.lower() in (".heic", ".heif"):
+        return f"{path} is an HEIF photograph: set the camera to JPEG, or save it as JPEG or PNG."
+    return f"{path} is not a readable photograph: give a JPEG, PNG, TIFF, BMP or WebP file."

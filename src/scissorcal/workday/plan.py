@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scissorcal.recipe.capture_cost import CaptureCost, capture_cost
 from scissorcal.recipe.edge import edge_sentence
+from scissorcal.recipe.pace import CaptureCost, capture_cost
 from scissorcal.recipe.plate_layers import plate_pieces, plate_sentence
 from scissorcal.recipe.requirements import CaptureKind, Requirement, requirements
 from scissorcal.workday.engine import Engine

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from scissorcal.aliases import Array
+from scissorcal.calibration.cut.known import CutBasis
 from scissorcal.calibration.design import (
     CaptureList,
     Information,
@@ -224,9 +225,7 @@ def _told_by_strokes(
     known = cut.knowledge
     design = planned_cut(
         _motion(segment, plan, identity),
-        recipe,
-        cut.geometry,
-        friction.known,
+        CutBasis(recipe, cut.geometry, friction.known),
         cut.law,
         cut.structure,
         known.layout,

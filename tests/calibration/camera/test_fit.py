@@ -12,15 +12,20 @@ from scipy.spatial.transform import Rotation
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.camera.bundle import SHARED, SeenBoard, fit_bundle, seen
-from scissorcal.calibration.camera.candidates import CANDIDATES, compare_cameras
-from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera, seen_region
-from scissorcal.calibration.camera.pictures import left_over, residual_chart, uncertainty_chart
-from scissorcal.calibration.camera.there import CameraThere
+from scissorcal.calibration.camera.checks import CameraThere
+from scissorcal.calibration.camera.fit import (
+    CANDIDATES,
+    CameraPhoto,
+    compare_cameras,
+    fit_camera,
+    seen_region,
+)
 from scissorcal.calibration.camera.uncertainty import (
     camera_covariance,
     halves,
     pixel_map,
 )
+from scissorcal.calibration.fit_pictures import left_over, residual_chart, uncertainty_chart
 from scissorcal.calibration.plate.checks import CAMERA
 from scissorcal.errors import MissingError, VerdictError
 from scissorcal.vision.geometry.camera import Camera, usual_camera

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess
-from scissorcal.calibration.cut.path import Material, PathMotion, material_of, path_motion
+from scissorcal.calibration.cut.path_motion import PathMotion, path_motion
+from scissorcal.calibration.cut.path_work import Material, material_of
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.model import (
     Cutting,

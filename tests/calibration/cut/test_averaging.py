@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.averaging import (
+from scissorcal.calibration.cut.laws import CutLaw
+from scissorcal.calibration.cut.widening import (
     AveragedLaw,
     Inferred,
     average,
@@ -13,7 +14,6 @@ from scissorcal.calibration.cut.averaging import (
     load_note,
     log_evidence,
 )
-from scissorcal.calibration.cut.laws import CutLaw
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.inference import find_optimum, infer
 from scissorcal.inference.problem import Problem

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from scissorcal.calibration.cut.geometry import belief_geometry
 from scissorcal.calibration.cut.guess import Guess
-from scissorcal.calibration.cut.known import KnownFriction
-from scissorcal.calibration.cut.path import mean_torque, path_motion
-from scissorcal.calibration.cut.scout import belief_geometry
+from scissorcal.calibration.cut.known import KnownFriction, MaterialData
+from scissorcal.calibration.cut.path_motion import path_motion
+from scissorcal.calibration.cut.path_work import mean_torque
 from scissorcal.calibration.cut.segments import cut_into_segments
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
@@ -61,12 +62,9 @@ def compared(rig, seed: int) -> Compared:
     mean = truth["fracture_energy"] * (1.0 + kappa) / 2.0
     geometry = belief_geometry(recipe, edge_of(recipe))
     segments = cut_into_segments(
-        motions,
-        materials,
+        MaterialData(motions, materials, known.noise, known.stroke_sd),
         geometry,
         Guess(response, mean, 2.0 / (1.0 + kappa), load),
-        known.noise,
-        known.stroke_sd,
         True,
     )
     found: dict[str, list[float]] = {}

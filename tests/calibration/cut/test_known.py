@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.known import KnownFriction
-from scissorcal.calibration.cut.path import path_motion
+from scissorcal.calibration.cut.path_motion import path_motion
 from scissorcal.model import friction_torque
 from scissorcal.recipe.priors import CutPriors
 from tests.calibration.cut.path.made import record

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.fit import cut_experiment, fit_cut
-from scissorcal.calibration.cut.lack_of_fit import Budget
+from scissorcal.calibration.cut.widening import Budget
 from scissorcal.calibration.friction.fit import fit_friction
 from tests.second_rig import (
     capture_cut,

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_cut
-from scissorcal.calibration.cut.between import NOT_KNOWN
+from scissorcal.calibration.cut.known import MaterialData
 from scissorcal.calibration.cut.usage import FREE, STARTING, usage_of_segments, usage_sentence
+from scissorcal.calibration.cut.widening import NOT_KNOWN
 from scissorcal.calibration.signals.usage import INVALID
 from scissorcal.recording.recording import Stroke
 from tests.calibration.cut.made_cuts import GEOMETRY, GUESS, HIGH, LOW, NOISE, cut, way
@@ -74,7 +75,9 @@ def test_every_sample_of_a_stroke_is_used_or_has_a_reason():
     usable = invalid[: len(made.made.recording.samples)]
     usable[900:950] = False
     made = cut(*[way(HIGH, LOW, HIGH)] * 3, usable=usable)
-    segments = cut_into_segments(made.motions, made.materials, GEOMETRY, GUESS, NOISE, 1e-4, True)
+    segments = cut_into_segments(
+        MaterialData(made.motions, made.materials, NOISE, 1e-4), GEOMETRY, GUESS, True
+    )
     recordings = (made.made.recording,)
     usage = usage_of_segments(recordings, segments)
     for row in usage.rows:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult, cut_experiment, cutting_from, fit_cut
+from scissorcal.calibration.fit_model import CutRun
 from scissorcal.calibration.store import load_fit, save
 from scissorcal.model import Edge, EdgeBelief
 from tests.calibration.cut.recipes import friction_of, paper, pressing
@@ -94,7 +95,7 @@ def test_an_uncertain_edge_is_among_the_draws(friction):
     cuts = cut_recording(SMOOTH, rng, sheets=1)
     edge = EdgeBelief(LINE, ("offset_m", "taper_rad"), np.diag([5e-5, 1e-3]) ** 2)
     wanted = paper(fracture="smooth")
-    fit = fit_cut((cuts,), wanted, friction, effort="draft", rng=rng, edge=edge)
+    fit = fit_cut((cuts,), wanted, friction, effort="draft", rng=rng, run=CutRun(edge=edge))
     recovers(fit, SMOOTH, "response_force", "response_exponent", "fracture_energy")
     for name, sd in zip(edge.names, np.sqrt(np.diag(edge.covariance)), strict=True):
         assert 0.0 < fit.parameter(f"edge_{name}").sd < 1.1 * sd

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.calibration.cut.path import material_of, path_motion
-from scissorcal.calibration.cut.path.runs import find_runs, split
+from scissorcal.calibration.cut.known import MaterialData
+from scissorcal.calibration.cut.path_motion import find_runs, path_motion, split
+from scissorcal.calibration.cut.path_work import material_of
 from scissorcal.calibration.cut.rests import Rest, placed_by_loading
 from scissorcal.calibration.cut.segments import cut_into_segments
 from tests.calibration.cut.made_cuts import (
@@ -26,7 +27,9 @@ from tests.calibration.cut.path.made import INERTIA
 
 
 def segments_of(made: Cut, cuts: bool = True):
-    return cut_into_segments(made.motions, made.materials, GEOMETRY, GUESS, NOISE, 1e-4, cuts)
+    return cut_into_segments(
+        MaterialData(made.motions, made.materials, NOISE, 1e-4), GEOMETRY, GUESS, cuts
+    )
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_cut
-from scissorcal.calibration.cut.path import material_of, path_motion
-from scissorcal.calibration.cut.stale import SheetStrokes, count_empty, stale_verdict
+from scissorcal.calibration.cut.checks import SheetStrokes, count_empty, stale_verdict
+from scissorcal.calibration.cut.path_motion import path_motion
+from scissorcal.calibration.cut.path_work import material_of
 from scissorcal.recording.recording import Stroke
 from tests.calibration.cut.made_cuts import FRICTION, HIGH, LOW, cut, way
 from tests.calibration.cut.path.made import INERTIA

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.toughness import with_toughness
+from scissorcal.calibration.cut.unknowns import with_toughness
 from scissorcal.calibration.store import load_fit, save
 from scissorcal.recipe.schema import Recipe
 from tests.package.fits import cut_fit, recipe

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scissorcal.calibration.cut.known import CutBasis
 from scissorcal.calibration.design import (
     Information,
     Knowledge,
@@ -26,7 +27,7 @@ from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.trajectory import Plan, friction_plan
-from scissorcal.inference.information import likelihood_information
+from scissorcal.inference.curvature import likelihood_information
 from scissorcal.model.transforms import IDENTITY, LOG
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.workday.stock import nominal_identity
@@ -202,9 +203,7 @@ def test_strokes_through_material_add_up_to_the_fits_own_information(
     known = cut.knowledge
     design = planned_cut(
         planned(strokes((0.6,), 2)),
-        RECIPE,
-        cut.geometry,
-        friction.known,
+        CutBasis(RECIPE, cut.geometry, friction.known),
         cut.law,
         cut.structure,
         known.layout,
@@ -230,9 +229,7 @@ def test_a_motion_that_never_touches_has_no_design(friction: FrictionState, cut:
     known = cut.knowledge
     made = planned_cut(
         away,
-        RECIPE,
-        cut.geometry,
-        friction.known,
+        CutBasis(RECIPE, cut.geometry, friction.known),
         cut.law,
         cut.structure,
         known.layout,

@@ -6,23 +6,28 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.edge import fit as edge_fit
-from scissorcal.calibration.edge.candidates import MOST_EVALUATIONS, compare_edges
-from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
-from scissorcal.calibration.edge.fit import fit_blade, merged_nicks
+from scissorcal.calibration.edge.cells import EdgeCells, cells_each, edge_cells
+from scissorcal.calibration.edge.fit import (
+    Blade,
+    compare_edges,
+    fit_blade,
+    merged_nicks,
+)
 from scissorcal.calibration.edge.model import (
+    MOST_EVALUATIONS,
     SEARCH_EVALUATIONS,
     CellData,
     EdgeEvidence,
     basis_of,
 )
-from scissorcal.calibration.edge.result import BladeResult
+from scissorcal.calibration.edge.result import BladeResult, FoundNick
 from scissorcal.errors import InputError
 from scissorcal.inference import SamplingStatus
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import load_recipe
 from scissorcal.vision.blade.borders import BorderPoints
 from scissorcal.vision.blade.measure import BladeMeasurement
-from scissorcal.vision.blade.parts import BladeParts
+from scissorcal.vision.blade.silhouette import BladeParts
 
 LENGTH = 0.075
 
@@ -84,7 +89,7 @@ def measurement(rng, nicks=(), *, metric=True, source="a.jpg"):
 @pytest.mark.parametrize("family", ["line", "arc", "cubic", "spline"])
 def test_the_family_is_found_and_the_edge_within_its_intervals(family):
     rng = np.random.default_rng(3)
-    compared = compare_edges((cells(family, rng),), LENGTH, "draft", rng)
+    compared = compare_edges(CellData((cells(family, rng),), LENGTH), "draft", rng)
     best = compared.best
     order = ["line", "arc", "cubic", "spline"]
     assert order.index(best.family) >= order.index(family)
@@ -99,7 +104,7 @@ def test_the_family_is_found_and_the_edge_within_its_intervals(family):
 
 def test_simpler_families_that_the_evidence_rejects_are_not_chosen():
     rng = np.random.default_rng(4)
-    compared = compare_edges((cells("arc", rng),), LENGTH, "draft", rng, ("line", "arc"))
+    compared = compare_edges(CellData((cells("arc", rng),), LENGTH), "draft", rng, ("line", "arc"))
     assert compared.best.family == "arc"
     assert compared.rows[1].evidence > compared.rows[0].evidence + 20.0
 
@@ -124,7 +129,7 @@ def test_photographs_of_two_blades_end_within_a_stated_number_of_evaluations():
     rng = np.random.default_rng(16)
     one, other = (cells("arc", rng, noise=4e-5, count=80, photo=f"{k}.jpg") for k in range(2))
     other = replace(other, offset=other.offset + 0.004 + 0.05 * other.station)
-    compared = compare_edges((one, other), LENGTH, "standard", rng)
+    compared = compare_edges(CellData((one, other), LENGTH), "standard", rng)
     assert compared.status.trusted
     assert compared.evaluations < 4 * (2 * SEARCH_EVALUATIONS + 12) + MOST_EVALUATIONS["standard"]
     # in fact a twelfth of that
@@ -169,7 +174,9 @@ def test_intervals_hold_what_they_say_over_many_blades():
     held = []
     for seed in range(120):
         rng = np.random.default_rng([9, seed])
-        compared = compare_edges((cells("arc", rng),), LENGTH, "draft", rng, ("arc", "cubic"))
+        compared = compare_edges(
+            CellData((cells("arc", rng),), LENGTH), "draft", rng, ("arc", "cubic")
+        )
         edges = compared.belief.with_values(compared.draws)
         s = 0.6 * LENGTH
         low, high = np.quantile(edges.offset_at(s), [0.05, 0.95])
@@ -188,7 +195,7 @@ def test_several_photographs_share_what_is_shared_and_average_what_is_not():
             cells("line", rng, moved=8e-6, count=30, shared=shared, photo=f"{k}.jpg")
             for k in range(count)
         )
-        compared = compare_edges(every, LENGTH, "draft", rng, ("line",))
+        compared = compare_edges(CellData(every, LENGTH), "draft", rng, ("line",))
         draws = compared.belief.with_values(compared.draws)
         return float(draws.offset_at(0.5 * LENGTH).std())
 
@@ -278,7 +285,7 @@ def test_without_a_scale_the_edge_is_in_blade_lengths_until_a_length_is_given(tm
     assert any("--length-mm" in note for note in free.notes)
     with pytest.raises(InputError, match="no scale"):
         _ = BladeResult((free,), (), "x", ()).belief
-    known = fit_blade([flat], None, effort="draft", rng=rng, length_m=LENGTH)
+    known = fit_blade([flat], None, effort="draft", rng=rng, blade=Blade(length_m=LENGTH))
     assert known.metric
     assert np.abs(known.offset.mean - shape("line", known.station)).max() < 3e-5
     with pytest.raises(InputError, match="with and without a scale"):

@@ -8,10 +8,10 @@ from benchmarks.sledge import RIGS
 
 from scissorcal.calibration.friction.advance import (
     actuation_of,
+    driven,
     fit_friction_advance,
     sliding_joints,
 )
-from scissorcal.calibration.friction.commanded import driven
 from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.simulator import friction_simulator

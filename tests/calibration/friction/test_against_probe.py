@@ -9,7 +9,7 @@ import pytest
 
 from scissorcal.calibration import FitResult, fit_friction
 from scissorcal.calibration.caveats import LONG_WINDOWS, caveats_of
-from scissorcal.calibration.friction.against_probe import inertia_verdict
+from scissorcal.calibration.friction.probed import inertia_verdict
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.header import Joint
 from scissorcal.recording.probe import PROBE_KEY, Estimate, ProbeResult

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction
-from scissorcal.calibration.friction.cogging import FALSE_ALARM, find_cogging
+from scissorcal.calibration.friction.layout import LawChoice
 from scissorcal.calibration.friction.model import design
+from scissorcal.calibration.friction.noise import FALSE_ALARM, find_cogging
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.model import FrictionLaw
 from scissorcal.recipe.priors import JointPriors
@@ -30,7 +31,7 @@ def searched(recording: Recording):
     every = weigh((recording,), 75.0)
     windows = every.where(every.bins.moving)
     strokes = windows.bins.stroke
-    plain = design(windows, strokes, "coulomb", False, recording.joint, JointPriors())
+    plain = design(windows, strokes, LawChoice("coulomb", False), recording.joint, JointPriors())
     return find_cogging(plain.moments)
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.calibration.friction.commanded import (
+from scissorcal.calibration.friction.advance import (
     Actuation,
     as_sliding_joint,
     driven,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction, load_fit, save
+from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.errors import InputError
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording
@@ -83,7 +84,7 @@ def test_draft_fits_the_law_that_was_chosen_last(recording):
         FitFriction(),
         effort="draft",
         rng=np.random.default_rng(3),
-        last_chosen="coulomb + viscous, asymmetric",
+        run=FrictionRun(last_chosen="coulomb + viscous, asymmetric"),
     )
     assert [row["name"] for row in found.rungs] == ["coulomb + viscous, asymmetric"]
     assert any("Draft effort fitted one law of 10" in note for note in found.notes)
@@ -92,7 +93,9 @@ def test_draft_fits_the_law_that_was_chosen_last(recording):
 def test_a_fit_that_runs_out_of_time_is_no_calibration(recording):
     """The optimum of sums by stroke takes milliseconds and is reached all the same."""
     rng = np.random.default_rng(3)
-    found = fit_friction((recording,), SIMPLE, effort="standard", rng=rng, stop=lambda: True)
+    found = fit_friction(
+        (recording,), SIMPLE, effort="standard", rng=rng, run=FrictionRun(stop=lambda: True)
+    )
     assert "k-hat" in {verdict.check for verdict in found.rejected}
 
 
@@ -162,14 +165,14 @@ def test_no_recording_at_all_is_refused():
 def emps() -> Recording:
     if not EMPS.is_file():
         pytest.skip(f"real data absent: {EMPS.name} is not beside the project")
-    from scissorcal.recording import import_table
+    from scissorcal.recording import ImportOptions, import_table
 
     return import_table(
         EMPS,
         columns={"opening": "qm", "motor_torque": "vir", "time": "t"},
         units={"opening": "m", "motor_torque": "N", "time": "s"},
         scale={"motor_torque": "gtau"},
-        joint=Joint("linear"),
+        options=ImportOptions(joint=Joint("linear")),
     )
 
 

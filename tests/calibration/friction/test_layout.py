@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from scissorcal.calibration.friction.layout import Drive, friction_layout, friction_precision
+from scissorcal.calibration.friction.layout import LawChoice, friction_layout, friction_precision
 from scissorcal.calibration.friction.model import design
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.model.friction_terms import law_names
@@ -27,12 +27,9 @@ def test_no_prior_depends_on_the_data_that_are_fitted():
         law = design(
             windows,
             windows.bins.stroke,
-            law_names()[-1],
-            True,
+            LawChoice(law_names()[-1], True, ("rate^2",), 120.0),
             one.joint,
             JointPriors(),
-            ("rate^2",),
-            120.0,
         )
         layouts.append(law.layout)
     assert layouts[0] == layouts[1]
@@ -42,7 +39,7 @@ def test_a_stated_prior_is_the_parameters_prior():
     stated = LogNormalPrior(median=0.5, factor_90=3.0)
     default = JointPriors().rotary
     priors = default.model_copy(update={"coulomb_Nm": stated})
-    layout = friction_layout("coulomb", False, Joint(), priors)
+    layout = friction_layout(LawChoice("coulomb", False), Joint(), priors)
     places = [layout.names.index(name) for name in ("coulomb_pos", "coulomb_neg")]
     for place in places:
         parameter = layout.parameters[place]
@@ -54,8 +51,8 @@ def test_a_stated_prior_is_the_parameters_prior():
 @pytest.mark.parametrize("law", law_names())
 def test_every_law_has_parameters_with_units_and_proper_priors(law, kind):
     joint = Joint(kind)
-    drive = Drive(cogging=True, held_tick_s=1e-3)
-    layout = friction_layout(law, False, joint, JointPriors().of(kind), ("rate^2",), drive)
+    choice = LawChoice(law, False, ("rate^2",), cogging=120.0)
+    layout = friction_layout(choice, joint, JointPriors().of(kind), 1e-3)
     assert layout.names[0] == "inertia"
     assert layout.names[-1] == "noise"
     assert len(set(layout.names)) == len(layout.names)
@@ -73,7 +70,7 @@ def test_every_law_has_parameters_with_units_and_proper_priors(law, kind):
 def test_nine_of_ten_draws_of_the_prior_are_hand_tools():
     """Nine of ten draws have an inertia, levels and a Stribeck speed as hand tools have, and static
     friction between 1.06 and 2.5 times Coulomb friction."""
-    layout = friction_layout("stribeck", True, Joint(), JointPriors().rotary)
+    layout = friction_layout(LawChoice("stribeck", True), Joint(), JointPriors().rotary)
     rng = np.random.default_rng(3)
     covariance = np.linalg.inv(friction_precision(layout))
     values = layout.natural(rng.multivariate_normal(layout.mean, covariance, 4000))
@@ -92,7 +89,7 @@ def test_nine_of_ten_draws_of_the_prior_are_hand_tools():
 @pytest.mark.parametrize("symmetric", [True, False])
 def test_static_friction_goes_with_coulomb_friction(symmetric):
     """Friction ten times as large as the priors' centres has the same density of their ratio."""
-    layout = friction_layout("stribeck", symmetric, Joint(), JointPriors().rotary)
+    layout = friction_layout(LawChoice("stribeck", symmetric), Joint(), JointPriors().rotary)
     precision = friction_precision(layout)
     larger = np.array([np.log(10.0) * n.startswith(("coulomb", "stribeck")) for n in layout.names])
     larger[layout.names.index("stribeck_rate")] = 0.0

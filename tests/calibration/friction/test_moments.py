@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from scissorcal.calibration.friction.layout import LawChoice
 from scissorcal.calibration.friction.model import design
 from scissorcal.calibration.friction.search import search
 from scissorcal.calibration.signals.weak_form import weigh
@@ -39,7 +40,9 @@ def windows():
 def experiment(windows, law: str, symmetric: bool = False, cogging: float = 120.0):
     joint = friction_recording(Truth(), np.random.default_rng(1)).joint
     strokes = windows.bins.stroke
-    return design(windows, strokes, law, symmetric, joint, JointPriors(), ("rate^2",), cogging)
+    return design(
+        windows, strokes, LawChoice(law, symmetric, ("rate^2",), cogging), joint, JointPriors()
+    )
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -106,7 +109,9 @@ def test_the_scan_finds_a_length_far_from_every_start(length):
     windows = every.where(every.bins.moving)
     ways = np.sign(windows.bins.rate)
     strokes = np.cumsum(np.diff(ways, prepend=ways[:1]) != 0)
-    one = design(windows, strokes, "coulomb+presliding", True, recording.joint, JointPriors())
+    one = design(
+        windows, strokes, LawChoice("coulomb+presliding", True), recording.joint, JointPriors()
+    )
     candidate = one.candidate(one.observed)
     problem = candidate.problem(one.series)
     found = search(problem)

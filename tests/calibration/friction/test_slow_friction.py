@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scissorcal.calibration.friction.slow_friction import (
+from scissorcal.calibration.friction.layout import at_typical, typical_values
+from scissorcal.calibration.friction.probed import (
     LEFT_OUT,
     SlowFriction,
     opened,
     with_probed,
 )
-from scissorcal.calibration.friction.typical import at_typical, typical_values
 from scissorcal.recipe.priors import JointPriors, LogNormalPrior
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.header import Joint

@@ -12,7 +12,7 @@ from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.transmission import LoadSolver, two_ended
 from scissorcal.errors import InputError
 from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording import import_table
+from scissorcal.recording import ImportOptions, import_table
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 
 TOOL = Path(__file__).resolve().parents[4] / "shared" / "data" / "mis_tool_friction"
@@ -35,7 +35,7 @@ def tool(number: str) -> Recording:
             "motor_torque": TORQUE,
             "handle_force": -TORQUE,
         },
-        handle_radius_m=1.0,
+        options=ImportOptions(handle_radius_m=1.0),
     )
 
 

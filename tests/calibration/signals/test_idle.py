@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scissorcal.calibration.signals.idle import idle_noise, idle_periods, idle_zero
+from scissorcal.calibration.signals.zeros import idle_noise, idle_periods, idle_zero
 from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 
 ZERO, NOISE = 4e-4, 1e-3

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.signals.interruptions import interruptions
+from scissorcal.calibration.signals.soundness import interruptions
 from scissorcal.recording.recording import Recording
 from tests.calibration.truth import Stroke, Truth, make_recording, sweep
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.signals.idle import idle_periods
 from scissorcal.calibration.signals.zeros import (
     FELT,
     DriveZero,
+    idle_periods,
     without_zeros,
     zero_verdicts,
 )

@@ -2,22 +2,27 @@
 
 import pickle
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult
-from scissorcal.calibration.verify.check import assess, make_study, tasks_of
-from scissorcal.calibration.verify.generating import Generating, generating_prior, refit_prior
+from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
 from scissorcal.calibration.verify.result import RankedQuantity, VerifyResult
-from scissorcal.calibration.verify.study import Study, Task, run
+from scissorcal.calibration.verify.study import (
+    Generating,
+    Study,
+    Task,
+    generating_prior,
+    refit_prior,
+    run,
+)
 from scissorcal.calibration.verify.verdicts import held_by_90
 from scissorcal.errors import InputError, MissingError
 from scissorcal.inference import ArNoise, infer
 
-from .toy import BINS, LAYOUT, Linear, LinearSimulator, as_fit
+from .toy import BINS, LAYOUT, Linear, LinearSimulator, StandIn, as_fit
 
 TRUTH = np.array([0.3, -0.5, np.log(0.8), np.log(0.3)])
 
@@ -40,7 +45,9 @@ def study_of(experiment: Linear, rho: float = 0.8, seed: int = 0, fit: Any = Non
     """A study whose simulated noise is that of :func:`made`."""
     noise = ArNoise(1, (rho,), 0.3 * np.sqrt(1 - rho**2))
     simulator = LinearSimulator(experiment, noise, float(TRUTH[3]))
-    return make_study(experiment, fit or fit_of(experiment), simulator, seed=seed)
+    return make_study(
+        experiment, fit or fit_of(experiment), simulator, settings=StudySettings(seed=seed)
+    )
 
 
 def checked(experiment: Linear, checks: Any, fits: int = 0) -> tuple[Study, VerifyResult]:
@@ -113,7 +120,7 @@ class Refusing(LinearSimulator):
         draws = np.delete(fit.draws, 1, axis=1)
         other = {**fit.__dict__, "parameters": kept, "draws": draws, "rung": "flat"}
         other["column"] = lambda name: draws[:, [p.name for p in kept].index(name)]
-        return cast(FitResult, SimpleNamespace(**other))
+        return cast(FitResult, StandIn(**other))
 
 
 def test_refused_data_count_and_other_laws_rank_common_quantities():

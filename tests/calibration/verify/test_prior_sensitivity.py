@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from scissorcal.calibration.verify.prior_sensitivity import (
+from scissorcal.calibration.verify.statistics import (
     SENSITIVE,
     cumulative_distance,
     diagnose,

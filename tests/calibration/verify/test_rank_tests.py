@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, norm
 
-from scissorcal.calibration.verify.rank_tests import (
+from scissorcal.calibration.verify.statistics import (
     POINTS,
     acceptance,
     chi_square_p_value,

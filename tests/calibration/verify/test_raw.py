@@ -9,15 +9,10 @@ from scissorcal.calibration import FitResult, cut_experiment, fit_cut, fit_frict
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.calibration.verify.check import assess, make_study, tasks_of
+from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
 from scissorcal.calibration.verify.result import Calibration
-from scissorcal.calibration.verify.simulation import (
-    CutTruth,
-    DriveTruth,
-    Unevenness,
-    motion_of,
-    simulate_cut,
-)
+from scissorcal.calibration.verify.simulated_motion import DriveTruth, motion_of
+from scissorcal.calibration.verify.simulated_recordings import CutTruth, Unevenness, simulate_cut
 from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
 from scissorcal.calibration.verify.study import Study, run
 from scissorcal.model import Cutting, Response
@@ -106,7 +101,7 @@ def test_the_fit_of_friction_is_calibrated_on_raw_samples(day: Day) -> None:
     settings = day.recipe.fit.friction
     design = friction_experiment((day.empty,), settings, day.friction)
     simulator = friction_simulator((day.empty,), settings, day.friction, design.layout)
-    study = make_study(design, day.friction, simulator, seed=1)
+    study = make_study(design, day.friction, simulator, settings=StudySettings(seed=1))
     assert calibrated(study, day.friction).other_law < 0.2
 
 
@@ -116,7 +111,9 @@ def test_the_fit_of_a_cut_is_calibrated_on_raw_samples(day: Day) -> None:
     fit = fit_cut((day.cuts,), day.recipe, day.friction, effort="standard", rng=rng)
     design = cut_experiment((day.cuts,), day.recipe, day.friction, fit)
     simulator = cut_simulator((day.cuts,), day.recipe, day.friction, fit, design.layout)
-    quantities = calibrated(make_study(design, fit, simulator, seed=1), fit).quantities
+    quantities = calibrated(
+        make_study(design, fit, simulator, settings=StudySettings(seed=1)), fit
+    ).quantities
     names = [quantity.name for quantity in quantities[:4]]
     assert names == ["response_force", "response_exponent", "fracture_energy", "kappa"]
     assert [len(quantity.ranks) for quantity in quantities[:4]] == [FITS] * 4

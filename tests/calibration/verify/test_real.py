@@ -5,7 +5,7 @@ import pytest
 
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.calibration.verify.check import assess, make_study, tasks_of
+from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
 from scissorcal.calibration.verify.simulator import friction_simulator
 from scissorcal.calibration.verify.study import run
 from scissorcal.recipe.schema import FitFriction
@@ -20,7 +20,7 @@ def test_emps_is_calibrated_and_its_halves_agree():
     fit = fit_friction((recording,), settings, effort="standard", rng=np.random.default_rng(0))
     design = friction_experiment((recording,), settings, fit)
     simulator = friction_simulator((recording,), settings, fit, design.layout)
-    study = make_study(design, fit, simulator, seed=0)
+    study = make_study(design, fit, simulator, settings=StudySettings(seed=0))
     checks = ("sbc", "halves", "prior")
     result = assess(study, fit, checks, [run(study, task) for task in tasks_of(study, checks, 30)])
     assert {verdict.status for verdict in result.verdicts} == {"pass"}

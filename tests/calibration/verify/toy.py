@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.fit_candidate import Candidate, Likelihood
-from scissorcal.calibration.parameters import Layout, Parameter
+from scissorcal.calibration.parameters import Layout, Parameter, StatedPrior
 from scissorcal.calibration.result import Effort, FitResult, StrokeError
-from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.inference import ArNoise, Posterior, Problem, infer
 from scissorcal.model.transforms import IDENTITY, LOG
 
@@ -105,6 +104,12 @@ class LinearSimulator:
         )
 
 
+class StandIn(SimpleNamespace):
+    """A result with the fields that it is given, and draws by name as a fit has them."""
+
+    columns = FitResult.columns
+
+
 def as_fit(experiment: Linear, posterior: Posterior) -> FitResult:
     """What the check reads of a fit: draws, parameters, strokes."""
     natural = LAYOUT.columns(posterior.draws)
@@ -138,4 +143,4 @@ def as_fit(experiment: Linear, posterior: Posterior) -> FitResult:
         "parameter": lambda name: next(p for p in fitted if p.name == name),
         "column": lambda name: natural[:, LAYOUT.names.index(name)],
     }
-    return cast(FitResult, SimpleNamespace(**facts))
+    return cast(FitResult, StandIn(**facts))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from benchmarks.photographs import Glare, GlaringLayer, centreline_turn
 from numpy.typing import NDArray
 
 from scissorcal.vision.geometry.camera import Camera
@@ -40,12 +41,14 @@ def blade_photo(
     where: tuple[float, float] = MAT_PIVOT_M,
     mat: bool = True,
     seed: int = 0,
+    glares: tuple[Glare, ...] = (),
     **look: object,
 ) -> Photo:
     """One blade on the mat (or on its bare sheet)."""
     sheet = target_layers(BLADE_MAT, pose)
     layers = sheet if mat else sheet[:1]
-    layers = [*layers, blade_layer(shape, pose, where, turn, **look)]
+    metal = blade_layer(shape, pose, where, turn, **look)
+    layers = [*layers, GlaringLayer(**vars(metal), glares=glares)]
     return photo_of(render(layers, LENS, looks, np.random.default_rng(seed)))
 
 
@@ -62,7 +65,7 @@ def scissors_photo(opening: float, *, seed: int = 0, mat: bool = True) -> Photo:
 
 def true_edge(shape: BladeShape, station: NDArray[np.float64]) -> NDArray[np.float64]:
     """The edge in the frame whose x axis halves the blade."""
-    turn = shape.centreline_turn()
+    turn = centreline_turn(shape)
     s = np.linspace(0.0, shape.length_m, 20_001)
     e = shape.edge_at(s)
     c, n = np.cos(turn), np.sin(turn)

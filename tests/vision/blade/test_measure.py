@@ -5,17 +5,23 @@ from dataclasses import dataclass, fields, replace
 import cv2
 import numpy as np
 import pytest
+from benchmarks.photographs import Glare
 
 from scissorcal.errors import InputError
+from scissorcal.vision.blade.borders import PicturedBlade
 from scissorcal.vision.blade.measure import measure_blade
-from scissorcal.vision.blade.parts import lone_blade
-from scissorcal.vision.blade.photo import photograph_blade, photograph_scissors
-from scissorcal.vision.blade.picture import NickMark, blade_picture
+from scissorcal.vision.blade.photo import (
+    NickMark,
+    blade_picture,
+    photograph_blade,
+    photograph_scissors,
+)
+from scissorcal.vision.blade.silhouette import lone_blade
 from scissorcal.vision.blade.view import CameraView
 from scissorcal.vision.photo import Photo
-from scissorcal.vision.sim import Glare, Nick, SimPose, blade_layer, render, target_layers
+from scissorcal.vision.sim import Nick, SimPose, blade_layer, render, target_layers
 from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD, MAT_PIVOT_M
-from scissorcal.vision.targets.marker_corners import linear_light
+from scissorcal.vision.targets.detect import linear_light
 from tests.vision.blade.scenes import (
     CAMERA,
     LENS,
@@ -89,7 +95,7 @@ def test_a_mode_equals_the_difference_of_a_repeated_measurement(measured):
         values = view.values.copy()
         values[order] += error
         moved = MovedView(**held, moved=tuple(values))
-        again = measure_blade(light, moved, parts, "blade.jpg")
+        again = measure_blade(PicturedBlade(light, moved, parts, "blade.jpg"))
         low, high = again.station[[0, -1]]
         s = one.station[(one.station > low) & (one.station < high)]
         change = np.interp(s, again.station, again.offset) - np.interp(s, one.station, one.offset)
@@ -119,7 +125,7 @@ def test_a_blade_that_is_not_seen_where_it_is_halved_is_refused(measured):
     parts = replace(lone_blade(photo.outline, "blade.jpg"), halved=(0.795, 0.7999))
     light = linear_light(photo.photo.grey)
     with pytest.raises(InputError, match=r"blade\.jpg: too little of the blade's edge .* halves"):
-        measure_blade(light, photo.view, parts, "blade.jpg")
+        measure_blade(PicturedBlade(light, photo.view, parts, "blade.jpg"))
 
 
 def test_a_given_pivot_replaces_the_hole():
@@ -158,15 +164,7 @@ def test_the_overlay_shows_the_measurement(measured):
     seen = measured[True]
     one = seen.measured[0]
     slope, level = np.polyfit(one.station, one.offset, 1)
-    drawn = blade_picture(
-        seen.photo,
-        seen.view,
-        seen.outline,
-        seen.measured,
-        [lambda s: level + slope * s],
-        [[NickMark(0.04, "nick 0.3 mm")]],
-        "blade.jpg",
-    )
+    drawn = blade_picture(seen, [lambda s: level + slope * s], [[NickMark(0.04, "nick 0.3 mm")]])
     assert max(drawn.shape[:2]) <= 1600
     green = (drawn[..., 1].astype(int) - drawn[..., 0] > 60) & (drawn[..., 1] > 150)
     assert green.sum() > 100

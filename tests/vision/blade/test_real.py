@@ -10,13 +10,12 @@ from scipy.spatial import cKDTree
 
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.photo import photograph_scissors
-from scissorcal.vision.blade.plain_view import PlainView
 from scissorcal.vision.blade.profile import crossings, sampled, steepest
 from scissorcal.vision.blade.silhouette import silhouette
+from scissorcal.vision.blade.view import PlainView
 from scissorcal.vision.photo import read_photo
-from scissorcal.vision.sim.coverage import coverage
-from scissorcal.vision.sim.looks import Looks, develop
-from scissorcal.vision.targets.marker_corners import linear_light
+from scissorcal.vision.sim.optics import Looks, coverage, develop
+from scissorcal.vision.targets.detect import linear_light
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
 PHOTOS = DATA / "scissors_photos"

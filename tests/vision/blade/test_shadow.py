@@ -5,14 +5,15 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from benchmarks.photographs import CastShadow, Lamp, centreline_turn
 from benchmarks.scissors import ALIKE, judged, photographed, true_edge
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.photo import by_blade, photograph_scissors
-from scissorcal.vision.blade.plain_view import PlainView
 from scissorcal.vision.blade.profile import outermost_sharp, steepest
-from scissorcal.vision.sim import CastShadow, Lamp, Lens, Looks, PaintLayer, SimPose, render
+from scissorcal.vision.blade.view import PlainView
+from scissorcal.vision.sim import Lens, Looks, PaintLayer, SimPose, render
 from tests.vision.blade.scenes import photo_of
 
 SHARP = Looks(exposure=0.9, softness_px=0.5)
@@ -231,7 +232,7 @@ def test_the_true_edge_of_the_benchmark_is_in_the_frame_that_halves_the_blade():
     shape = pair.blades["left"]
     lone = replace(shape)
     s = np.linspace(0.2, 0.9, 7) * shape.length_m
-    turn = lone.centreline_turn()
+    turn = centreline_turn(lone)
     fine = np.linspace(0.0, shape.length_m, 40_001)
     along = np.cos(turn) * fine + np.sin(turn) * shape.edge_at(fine)
     off = np.cos(turn) * shape.edge_at(fine) - np.sin(turn) * fine

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scissorcal.errors import InputError
 from scissorcal.vision.photo import read_photo
 from scissorcal.vision.sim import Looks
-from scissorcal.vision.targets.board_words import board_from_words
-from scissorcal.vision.targets.boards import BLADE_MAT, Board, CharucoBoard
+from scissorcal.vision.targets.boards import BLADE_MAT, Board, CharucoBoard, board_from_words
 from scissorcal.vision.targets.detect import find_board
 from tests.vision.scenes import lens, photo_of, picture, pose_before
 

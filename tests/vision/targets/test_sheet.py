@@ -11,16 +11,18 @@ from PIL import Image
 
 from scissorcal.vision.targets.boards import BLADE_MAT, DICTIONARY, MAT_FIELD_M, TARGETS, targets_of
 from scissorcal.vision.targets.detect import find_board, find_markers
-from scissorcal.vision.targets.pdf import sheet_pdf
 from scissorcal.vision.targets.sheet import (
     PAPER_MM,
+    PIXELS_PER_MM,
     RULERS_MM,
     Paper,
     SheetName,
     Words,
+    sheet_pdf,
+    sheet_png,
     target_sheet,
+    write_target,
 )
-from scissorcal.vision.targets.sheet_files import PIXELS_PER_MM, sheet_png, write_target
 from tests.vision.scenes import photo_of
 
 SHEETS = [(name, paper) for name in ("camera", "blade", "plate") for paper in ("A4", "Letter")]

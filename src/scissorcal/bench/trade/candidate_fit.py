@@ -9,6 +9,7 @@ import numpy as np
 
 from scissorcal.bench.trade.case import Case
 from scissorcal.calibration.cut.fit import fit_cut
+from scissorcal.calibration.fit_model import CutRun
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
@@ -86,8 +87,7 @@ def refit(case: Case, recipe: Recipe, repeat: int, *, friction_too: bool) -> Ref
             friction,
             effort=case.effort,
             rng=rng,
-            edge=case.edge,
-            edge_verdicts=case.edge_verdicts,
+            run=CutRun(edge=case.edge, edge_verdicts=case.edge_verdicts),
         )
     return Refitted(friction, cut, time.process_time() - began)
 

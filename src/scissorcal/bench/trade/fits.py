@@ -17,6 +17,7 @@ from scissorcal.bench.trade.torque import (
     torque_errors,
 )
 from scissorcal.calibration import FitResult, fit_cut, fit_friction
+from scissorcal.calibration.fit_model import CutRun
 
 PROCESSOR, EVALUATIONS, MINUTES = "processor time", "evaluations", "capture"
 MEAN, SD = "posterior mean, worst parameter", "posterior sd, worst parameter"
@@ -69,8 +70,7 @@ def fit_case(
             friction,
             effort=case.effort,
             rng=np.random.default_rng([case.seed, repeat, 1]),
-            edge=case.edge,
-            edge_verdicts=case.edge_verdicts,
+            run=CutRun(edge=case.edge, edge_verdicts=case.edge_verdicts),
         )
         fits.append(cut)
     spent_s = time.process_time() - before

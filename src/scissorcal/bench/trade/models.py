@@ -8,7 +8,6 @@ from scissorcal.bench.trade.case import Case
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.kernel import ModelTables
-from scissorcal.package.build import pick_draws
 from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.compile import (
     TOLERANCE,
@@ -17,7 +16,7 @@ from scissorcal.package.compile import (
     kernel_tables,
     scene_ranges,
 )
-from scissorcal.package.exact import ExactModel, central_model
+from scissorcal.package.exact import ExactModel, central_model, pick_draws
 from scissorcal.package.simplest.law import Law
 from scissorcal.package.simplest.model import simplest_model
 from scissorcal.package.smallest_tables import smallest_tables

@@ -14,7 +14,6 @@ from scissorcal.bench.trade.models import held_law, model_of_law, tables_of
 from scissorcal.bench.trade.point import Error, NextCapture, Sample, Setting
 from scissorcal.bench.trade.together import Together, expected_chain_s, rendered_torque
 from scissorcal.bench.trade.torque import band_errors, fitted_torque, torque_errors
-from scissorcal.calibration import FitResult
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.zeros import without_zeros
 from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
@@ -94,12 +93,12 @@ def recaptured(case: Case, repeat: int) -> Case:
     kind = case.friction[0].joint.kind
     unmeasured_sd = settings.priors.of(kind).zero(kind)
     still, zero = without_zeros(case.friction, unmeasured_sd)
-    friction = friction_simulator(still, settings, fit, BY_NAME).recordings_of(_centre(fit), rng)
+    friction = friction_simulator(still, settings, fit, BY_NAME).recordings_of(fit.best, rng)
     if case.cut_fit is None:
         return replace(case, friction=friction)
     still, _ = without_zeros(case.cut, unmeasured_sd, zero) if zero else (case.cut, None)
     simulator = cut_simulator(still, case.recipe, fit, case.cut_fit, BY_NAME, case.edge)
-    cut = simulator.recordings_of(_centre(case.cut_fit), rng)
+    cut = simulator.recordings_of(case.cut_fit.best, rng)
     return replace(case, friction=friction, cut=cut)
 
 
@@ -143,9 +142,3 @@ def upper_limit(values: Sequence[float] | NDArray[np.float64]) -> float:
     count = len(values)
     factor = float(stdtrit(count - 1, CONFIDENCE)) * np.sqrt(1.0 + 1.0 / count)
     return float(np.mean(values) + factor * np.std(values, ddof=1))
-
-
-def _centre(fit: FitResult) -> dict[str, float]:
-    """The most probable point of a fit by name, with the means of its nuisance parameters."""
-    values = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
-    return values | {p.name: p.mean for p in fit.nuisance}

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.bench.trade.case import Case, Photographed
-from scissorcal.calibration.edge.fit import fit_blade
+from scissorcal.calibration.edge.fit import Blade, fit_blade
 from scissorcal.calibration.edge.result import BladeFit
 from scissorcal.calibration.plate.fit import PosePhoto, fit_plate, plate_target
 from scissorcal.calibration.plate.result import PlateFit
@@ -79,8 +79,7 @@ def fit_edge(
         case.recipe,
         effort=case.effort,
         rng=rng,
-        name=name,
-        length_m=1e-3 * lengths[0] if lengths else None,
+        blade=Blade(name=name, length_m=1e-3 * lengths[0] if lengths else None),
     )
     return fit, time.process_time() - began
 

@@ -1,6 +1,5 @@
 """What a run of `bench trade` ends in, as its JSON twin holds it."""
 
-import json
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -48,14 +47,6 @@ class Trade:
     notes: tuple[str, ...] = ()
 
 
-def trade_text(trade: Trade) -> str:
-    """The JSON twin; what has its default is left out."""
-    from pydantic import TypeAdapter
-
-    plain = TypeAdapter(Trade).dump_python(trade, mode="json", exclude_defaults=True)
-    return json.dumps(plain, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
-
-
 def read_trade(path: Path) -> Trade:
     """Read a JSON twin back.
 
@@ -67,14 +58,14 @@ def read_trade(path: Path) -> Trade:
         raise MissingError(f"There is no {path} yet: run 'scissorcal bench trade' first.")
     try:
         plain = read_json(path, STATE)
-        found = plain["format"]
+        stated = plain["format"]
     except (InputError, KeyError, TypeError):
         raise InputError(
             f"{path} holds no results of 'bench trade': remove it and run 'scissorcal bench trade'."
         ) from None
-    if found != FORMAT:
+    if stated != FORMAT:
         raise InputError(
-            f"{path} is of format {found}, and this version reads {FORMAT}: run 'scissorcal bench "
+            f"{path} is of format {stated}, and this version reads {FORMAT}: run 'scissorcal bench "
             "trade', which writes it anew."
         )
     try:

@@ -12,7 +12,6 @@ from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.point import Error
 from scissorcal.calibration.result import FitResult
 from scissorcal.model import FrictionLaw, edge_height, friction_torque
-from scissorcal.package.build import pick_draws
 from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.compile import SLOWEST_EPS, scene_ranges
 from scissorcal.package.exact import (
@@ -20,6 +19,7 @@ from scissorcal.package.exact import (
     FitDraws,
     central_model,
     exact_model,
+    pick_draws,
     torque_quantiles,
 )
 from scissorcal.package.grid import Points, spread_points

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.inference.least_squares import least_squares
+from scissorcal.inference.ascent import least_squares
 from scissorcal.vision.geometry.camera import PARAMETERS
 
 DEGREES_OF_FREEDOM = 5.0

@@ -1,13 +1,22 @@
-"""Fit a camera to photographs of a flat board."""
+"""Fit the camera to its photographs: candidate models compared, or constants imported."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from scissorcal.aliases import Array, Progress
-from scissorcal.calibration.camera.bundle import Bundle, SeenBoard, fit_bundle
-from scissorcal.calibration.camera.candidates import CANDIDATES, compare_cameras
+from scissorcal.calibration.camera.bundle import (
+    DEGREES_OF_FREEDOM,
+    SHARED,
+    Bundle,
+    SeenBoard,
+    Structure,
+    fit_bundle,
+    fit_pose,
+)
 from scissorcal.calibration.camera.checks import (
     FEWEST_VIEWS,
     OUTLYING,
@@ -23,9 +32,13 @@ from scissorcal.calibration.camera.uncertainty import (
     halves,
     pixel_map,
 )
+from scissorcal.calibration.candidates import Account, CandidateRow, compare
 from scissorcal.errors import MissingError
-from scissorcal.recipe.photograph_priors import CameraPriors
-from scissorcal.vision.geometry.camera import Camera, usual_camera
+from scissorcal.identity import file_digest
+from scissorcal.recipe.priors import CameraPriors
+from scissorcal.verdicts import Check
+from scissorcal.vision.camera_files import CameraFile
+from scissorcal.vision.geometry.camera import PARAMETERS, Camera, usual_camera
 from scissorcal.vision.targets.detect import Detection
 
 _DRAWS = 500
@@ -160,4 +173,125 @@ def _too_few(count: int) -> str:
     return (
         f"{reason}: take 15 with 'scissorcal capture camera --image board-*.jpg', with the board "
         f"near and far, in every corner and tilted every way; {FEWEST_VIEWS} are the least."
+    )
+
+
+FOLDS = 5
+_SQUARE = (("fx", "fy"), ("cx",), ("cy",))
+
+
+def _structure(*camera: tuple[str, ...]) -> Structure:
+    groups = (*camera, ("bulge_x",), ("bulge_y",))
+    spread = np.zeros((len(SHARED), len(groups)))
+    for column, group in enumerate(groups):
+        for name in group:
+            spread[SHARED.index(name), column] = 1.0
+    return Structure(tuple(group[0] if len(group) == 1 else "f" for group in groups), spread)
+
+
+CANDIDATES: tuple[tuple[str, Structure], ...] = (
+    ("no distortion", _structure(*_SQUARE)),
+    ("k1", _structure(*_SQUARE, ("k1",))),
+    ("k1, k2", _structure(*_SQUARE, ("k1",), ("k2",))),
+    ("k1, k2, p1, p2", _structure(*_SQUARE, ("k1",), ("k2",), ("p1",), ("p2",))),
+    (
+        "k1, k2, p1, p2, oblong pixels",
+        _structure(*((name,) for name in PARAMETERS if name != "k3")),
+    ),
+    ("k1, k2, p1, p2, k3, oblong pixels", _structure(*((name,) for name in PARAMETERS))),
+)
+"""Pixels are square (fx = fy) in all but the last two. The board may bulge in every candidate."""
+
+
+@dataclass(frozen=True)
+class CameraCandidate:
+    """One camera model fitted to all photographs; ``unseen_px`` is its rms on unseen ones."""
+
+    row: CandidateRow
+    bundle: Bundle
+    unseen_px: float
+
+    def as_row(self) -> dict[str, Any]:
+        """The row that reports and files hold."""
+        row = asdict(self.row)
+        return {"free": row.pop("parameters"), "unseen_px": self.unseen_px, **row}
+
+
+def compare_cameras(
+    views: Sequence[SeenBoard], start: Array, tell: Callable[[float, str], None]
+) -> tuple[CameraCandidate, ...]:
+    """Fit every model to all photographs, and to all but each fifth part of them in turn.
+
+    Models are compared by :func:`~.calibration.candidates.compare`, photographs being the units.
+    The log density of a photograph counts as many corners as err independently: its share is one
+    over the squared stretch that :func:`camera_covariance` finds.
+    """
+    shared, bundles = start, []
+    for _, structure in CANDIDATES:
+        bundles.append(fit_bundle(views, structure, shared))
+        shared = bundles[-1].shared
+    densities, errors = [], []
+    for index, (name, structure) in enumerate(CANDIDATES):
+        tell(0.8 * index / len(CANDIDATES), f"camera: {name}")
+        residuals = unseen_residuals(views, structure, bundles[index])
+        densities.append([_log_density(residual, bundles[-1].sd_px) for residual in residuals])
+        errors.append(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2) * 2.0)))
+    share = camera_covariance(bundles[-1]).stretch ** -2
+    rows = compare(
+        [name for name, _ in CANDIDATES],
+        [len(structure.names) for _, structure in CANDIDATES],
+        [Account(share * np.array(densities))],
+    )
+    return tuple(map(CameraCandidate, rows, bundles, errors))
+
+
+def unseen_residuals(
+    views: Sequence[SeenBoard], structure: Structure, whole: Bundle
+) -> list[Array]:
+    """Residuals of each photograph under a camera fitted without it; its pose is its own."""
+    folds = min(FOLDS, len(views))
+    found: list[Array] = [np.empty((0, 2))] * len(views)
+    for fold in range(folds):
+        seen = [index for index in range(len(views)) if index % folds != fold]
+        trained = fit_bundle(
+            [views[index] for index in seen], structure, whole.shared, whole.poses[seen]
+        )
+        for index in range(fold, len(views), folds):
+            found[index] = fit_pose(views[index], trained.shared, whole.poses[index])
+    return found
+
+
+def _log_density(residual: Array, sd: float) -> float:
+    """Log density of corner errors under the fit's Student-t, up to a constant."""
+    nu = DEGREES_OF_FREEDOM
+    return -float(0.5 * (nu + 2.0) * np.sum(np.log1p(np.sum(residual**2, axis=1) / (nu * sd**2))))
+
+
+UNCERTAINTY = Check(
+    "fit.camera uncertainty", "lengths measured in photographs: whether their error is known"
+)
+
+
+def imported_camera(read: CameraFile, file: Path) -> CameraFit:
+    """The camera of a file that `read_camera_file` read, without draws, views or covariance."""
+    why = f"{file.name} ({read.style}) states no uncertainty of the camera."
+    return CameraFit(
+        camera=read.camera,
+        origin="imported",
+        board="",
+        rung=f"as in {file.name}",
+        rungs=(),
+        draws=np.empty((0, 9)),
+        views=(),
+        bulge_mm=(0.0, 0.0),
+        noise_px=read.rms_px if read.rms_px is not None else float("nan"),
+        stretch=float("nan"),
+        region=np.empty((0, 2)),
+        region_share=0.0,
+        pixel_map=None,
+        cross=None,
+        verdicts=(UNCERTAINTY.not_evaluated(why),),
+        inputs_hash=file_digest(file),
+        sources=(file.name,),
+        notes=(f"Imported from {file.name} ({read.style}).", *read.notes),
     )

@@ -2,22 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from scissorcal.aliases import Array, Progress
-from scissorcal.calibration.assemble import assemble
-from scissorcal.calibration.between import widened
+from scissorcal.aliases import Array
+from scissorcal.calibration.assemble import CriticRequest, Particulars, assemble
+from scissorcal.calibration.between import BetweenRecordings, widened
 from scissorcal.calibration.comparison import choose
-from scissorcal.calibration.cut.averaging import (
-    AveragedLaw,
-    Inferred,
-    average,
-    by_load,
-    load_note,
-)
-from scissorcal.calibration.cut.between import between_notes, compare_cuts
 from scissorcal.calibration.cut.checks import (
     cut_diagnostics,
     cut_verdicts,
@@ -26,32 +17,42 @@ from scissorcal.calibration.cut.checks import (
 )
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import CoarseEncoderError, NoUnloadingError
-from scissorcal.calibration.cut.known import KnownFriction
-from scissorcal.calibration.cut.lack_of_fit import budget_of
+from scissorcal.calibration.cut.known import CutBasis, KnownFriction
 from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws, usual_law
 from scissorcal.calibration.cut.model import CutExperiment
-from scissorcal.calibration.cut.path import PathMotion, path_motion
+from scissorcal.calibration.cut.path_motion import PathMotion, path_motion
 from scissorcal.calibration.cut.scout import (
     MisfitError,
     Scouted,
-    belief_geometry,
     make_experiment,
     scout,
 )
-from scissorcal.calibration.cut.structure import edge_of
-from scissorcal.calibration.cut.toughness import with_toughness
-from scissorcal.calibration.cut.unknowns import with_unknowns
+from scissorcal.calibration.cut.unknowns import with_toughness, with_unknowns
 from scissorcal.calibration.cut.usage import counted, usage_of_segments, usage_sentence
-from scissorcal.calibration.effort import candidates_for, draft_note
+from scissorcal.calibration.cut.widening import (
+    AveragedLaw,
+    Inferred,
+    average,
+    between_notes,
+    budget_of,
+    by_load,
+    compare_cuts,
+    load_note,
+)
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
+from scissorcal.calibration.fit_model import CutRun, Outcome, candidates_for, draft_note
+from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.calibration.signals.interruptions import Interruptions, interruptions
 from scissorcal.calibration.signals.sensors import Sensors, inspect_sensors
-from scissorcal.calibration.signals.soundness import farthest_torque, refuse_unsound
+from scissorcal.calibration.signals.soundness import (
+    Interruptions,
+    farthest_torque,
+    interruptions,
+    refuse_unsound,
+)
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros
-from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.errors import InputError
-from scissorcal.inference import Stop, infer
+from scissorcal.inference import InferOptions, infer
 from scissorcal.model import EdgeBelief
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
@@ -65,13 +66,11 @@ KNOTS, SPAN, DEEPEST = 5, 8.0, 0.99
 
 @dataclass(frozen=True)
 class _Data:
-    """What a fit is made of: recordings with their sensors and motions, geometry, friction."""
+    """What a fit is made of: recordings with their sensors and motions, and what is given."""
 
     recordings: tuple[Recording, ...]
-    recipe: Recipe
     friction: FitResult
-    geometry: Geometry
-    known: KnownFriction
+    basis: CutBasis
     sensors: Sensors
     motions: tuple[PathMotion, ...]
     broken: Interruptions
@@ -85,13 +84,12 @@ class _Data:
         edge: EdgeBelief | None,
         prior: StatedPrior | None = None,
     ) -> "_Data":
-        geometry = belief_geometry(recipe, edge or edge_of(recipe))
         known = replace(KnownFriction.of(friction, recipe.fit.cut.priors), prior=prior)
         sensors = inspect_sensors(recordings, "fit.cut")
         cleaned, known = _cleaned(recordings, recipe, friction, known)
         motions = path_motion(cleaned, known.inertia, sensors.usable)
-        broken = interruptions(recordings)
-        return cls(recordings, recipe, friction, geometry, known, sensors, motions, broken)
+        basis = CutBasis.of(recipe, known, edge)
+        return cls(recordings, friction, basis, sensors, motions, interruptions(recordings))
 
     @property
     def names(self) -> str:
@@ -121,13 +119,7 @@ def fit_cut(
     *,
     effort: Effort,
     rng: np.random.Generator,
-    progress: Progress | None = None,
-    edge: EdgeBelief | None = None,
-    edge_verdicts: tuple[Verdict, ...] = (),
-    checkpoint: Path | None = None,
-    last_chosen: str | None = None,
-    stop: Stop | None = None,
-    prior: StatedPrior | None = None,
+    run: CutRun = CutRun(),
 ) -> FitResult:
     """Identify response, fracture energy and ripple from cuts (or presses), over their path.
 
@@ -136,34 +128,58 @@ def fit_cut(
     spectral line of the teeth in a running crack's own phase (docs/model.md). Friction, inertia,
     cogging and noise are those of ``friction``; its uncertainty widens the material's intervals.
 
-    ``edge_verdicts`` are those on the fit that gave ``edge``: where one of them failed, or one on
-    friction, this fit fails too. ``checkpoint`` is a file from which an interrupted thorough fit
-    continues. ``last_chosen`` is the law that draft effort fits where the recipe allows several,
-    ``stop`` says whether the time limit is reached. ``prior`` replaces the recipe's in a study of
-    simulated data, which goes without the verdicts of this fit alone and without a budget of lack
-    of fit. Raises InputError where the blades hardly touched the material, a value is no
-    measurement, or a stroke is a copy of another.
+    Where a verdict on friction failed, this fit fails too. A study of simulated data goes without
+    a budget of lack of fit. Raises InputError where the blades hardly touched the material, a value
+    is no measurement, or a stroke is a copy of another.
     """
-    tell = progress or (lambda done, sentence: None)
     refuse_unsound(recordings)
-    data = _Data.of(recordings, recipe, friction, edge, prior)
+    prior = run.prior
+    data = _Data.of(recordings, recipe, friction, run.edge, prior)
     _refuse_no_contact(data)
     allowed = allowed_laws(recipe)
-    laws = candidates_for(effort, allowed, usual_law, last_chosen, prior.laws if prior else ())
-    tell(0.05, "cut: finding where cracks rest and run")
+    near = prior.laws if prior else ()
+    laws = candidates_for(effort, allowed, usual_law, run.last_chosen, near)
+    run.tell(0.05, "cut: finding where cracks rest and run")
     scouted = _scouted(data, laws)
-    compared = _fit_laws(scouted, data, laws, tell, stop)
-    laws_used = by_load(choose([one for one, _ in compared]), compared)
+    compared = _fit_laws(scouted, data, laws, run)
+    laws_used = by_load(choose([fitted for fitted, _ in compared]), compared)
 
-    def infer_one(law: AveragedLaw) -> Inferred:
-        tell(0.5, f"cut: inferring {law.fitted.candidate.name}")
-        first = law is laws_used[0]
+    def infer_law(law: AveragedLaw) -> Inferred:
+        run.tell(0.5, f"cut: inferring {law.fitted.candidate.name}")
         share = None if prior else 0.01 * recipe.fit.cut.lack_of_fit_percent
-        return _infer(law, share, effort, rng, tell, checkpoint if first else None, stop)
+        own = run if law is laws_used[0] else replace(run, checkpoint=None)
+        return _infer(law, share, effort, rng, own)
 
-    inferred = average(laws_used, infer_one, rng)
-    notes = (*load_note(laws_used), *draft_note(effort, allowed, laws))
-    fit = _assembled(data, scouted, compared, inferred, effort, edge_verdicts, notes, rng)
+    inferred = average(laws_used, infer_law, rng)
+    chosen, design = inferred.law.fitted, inferred.law.design
+    usual = recipe.fit.cut.between_recordings
+    between = compare_cuts(design, chosen.optimum.point, recordings, usual, rng)
+    posterior = widened(inferred.posterior, between, rng)
+    candidates = [fitted for fitted, _ in compared]
+    usage = usage_of_segments(recordings, scouted.segments)
+    notes = (
+        *data.sensors.notes,
+        *line_notes(scouted, design, inferred.budget),
+        *load_note(laws_used),
+        *draft_note(effort, allowed, laws),
+        usage_sentence(recordings, usage),
+        *between_notes(between, NUISANCE),
+    )
+    diagnostics = {
+        **cut_diagnostics(scouted, design),
+        **(between.diagnostics() if between else {}),
+    }
+    verdicts = () if prior else _verdicts(data, scouted, inferred.law, between, run)
+    fit = assemble(
+        Outcome(
+            design, effort, candidates, chosen, posterior, design.key, simulated=prior is not None
+        ),
+        recordings,
+        usage,
+        Particulars(verdicts, notes, diagnostics),
+        CriticRequest(recipe.fit.cut.critic and effort != "draft"),
+        rng,
+    )
     return with_unknowns(with_toughness(fit, recipe, rng), recipe, friction, recordings)
 
 
@@ -182,11 +198,7 @@ def cut_experiment(
     data = _Data.of(recordings, recipe, friction, edge)
     law = CutLaw.of(fit.structure)
     scouted = _scouted(data, [law])
-    ended = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
-    ended |= {p.name: p.mean for p in fit.nuisance}
-    return make_experiment(
-        scouted.segments, data.geometry, recipe, law, data.known, ended, scouted.accepted_line
-    )
+    return make_experiment(scouted.segments, data.basis, law, fit.best, scouted.accepted_line)
 
 
 def cut_optimum(
@@ -204,7 +216,7 @@ def cut_optimum(
     _refuse_no_contact(data)
     laws = candidates_for("draft", allowed_laws(recipe), usual_law, last_chosen)
     scouted = _scouted(data, laws)
-    ((fitted, design),) = _fit_laws(scouted, data, laws, lambda done, sentence: None, None)
+    ((fitted, design),) = _fit_laws(scouted, data, laws, CutRun())
     return design, fitted.optimum.point
 
 
@@ -229,7 +241,7 @@ def _scouted(data: _Data, laws: Sequence[CutLaw]) -> Scouted:
     fractures = ("none", "smooth", "rippled")
     richest = max((law.fracture for law in laws), key=fractures.index)
     try:
-        return scout(data.motions, data.known, data.recipe, data.geometry, richest)
+        return scout(data.motions, data.basis, richest)
     except NoUnloadingError as error:
         raise InputError(
             f"{data.names}: {data.cause}no stroke shows the blades unloading the material, so its "
@@ -247,37 +259,25 @@ def _scouted(data: _Data, laws: Sequence[CutLaw]) -> Scouted:
 
 
 def _fit_laws(
-    scouted: Scouted,
-    data: _Data,
-    laws: Sequence[CutLaw],
-    tell: Progress,
-    stop: Stop | None,
+    scouted: Scouted, data: _Data, laws: Sequence[CutLaw], run: CutRun
 ) -> list[tuple[FittedCandidate, CutExperiment]]:
     """Fit every law to the same segments; each begins where the scouting ended."""
-    found: list[tuple[FittedCandidate, CutExperiment]] = []
+    fitted: list[tuple[FittedCandidate, CutExperiment]] = []
     values = dict(scouted.values)
     for index, law in enumerate(laws):
-        tell(0.1 + 0.4 * index / len(laws), f"cut: trying {law.name}")
+        run.tell(0.1 + 0.4 * index / len(laws), f"cut: trying {law.name}")
         begin = dict(values)
         if law.response != "power":
             begin.pop("response_exponent", None)
         if law.response == "spline":
-            law = replace(law, knots_m=_knots(scouted, data.geometry))
+            law = replace(law, knots_m=_knots(scouted, data.basis.geometry))
             begin["response_exponent"] = values["response_exponent"]
         if law.fracture == "smooth":
             begin["fracture_energy"] *= 0.5 * (1.0 + begin.get("kappa", 1.0))
-        design = make_experiment(
-            scouted.segments,
-            data.geometry,
-            data.recipe,
-            law,
-            data.known,
-            begin,
-            scouted.accepted_line,
-        )
+        design = make_experiment(scouted.segments, data.basis, law, begin, scouted.accepted_line)
         candidate = design.candidate(design.observed)
-        found.append((fit_candidate(candidate, design.series, design.strokes, stop), design))
-    return found
+        fitted.append((fit_candidate(candidate, design.series, design.strokes, run.stop), design))
+    return fitted
 
 
 def _infer(
@@ -285,9 +285,7 @@ def _infer(
     share: float | None,
     effort: Effort,
     rng: np.random.Generator,
-    tell: Progress,
-    checkpoint: Path | None,
-    stop: Stop | None,
+    run: CutRun,
 ) -> Inferred:
     """The posterior of a law, widened by ``share`` of lack of fit; a study has none to state."""
     fitted, design = law.fitted, law.design
@@ -297,9 +295,11 @@ def _infer(
         rng,
         count=DRAWS,
         optimum=fitted.optimum,
-        checkpoint=checkpoint,
-        stop=stop,
-        progress=lambda done, sentence: tell(0.5 + 0.5 * done, f"cut: {sentence}"),
+        options=InferOptions(
+            checkpoint=run.checkpoint,
+            stop=run.stop,
+            progress=lambda done, sentence: run.tell(0.5 + 0.5 * done, f"cut: {sentence}"),
+        ),
     )
     if share is None:
         return Inferred(law, posterior, None)
@@ -307,60 +307,20 @@ def _infer(
     return Inferred(law, replace(posterior, draws=budget.widen(posterior.draws, rng)), budget)
 
 
-def _assembled(
+def _verdicts(
     data: _Data,
     scouted: Scouted,
-    compared: list[tuple[FittedCandidate, CutExperiment]],
-    inferred: Inferred,
-    effort: Effort,
-    edge_verdicts: tuple[Verdict, ...],
-    notes: tuple[str, ...],
-    rng: np.random.Generator,
-) -> FitResult:
-    """The result, with the differences between recordings in its posterior."""
-    chosen, design = inferred.law.fitted, inferred.law.design
-    recordings, point = data.recordings, chosen.optimum.point
-    usual = data.recipe.fit.cut.between_recordings
-    between = compare_cuts(design, point, recordings, usual, rng)
-    usage = usage_of_segments(recordings, scouted.segments)
-    verdicts: tuple[Verdict, ...] = ()
-    if data.known.prior is None:
-        verdicts = (
-            *cut_verdicts(data.friction, edge_verdicts, scouted, data.sensors, recordings),
-            scatter_verdict(design, point, data.recipe.fit.cut.priors.noise_scale),
-            *((data.broken.verdict("fit.cut"),) if data.broken.interrupted else ()),
-            *((between.verdict(),) if between else ()),
-        )
-    return assemble(
-        what="cut",
-        effort=effort,
-        posterior=widened(inferred.posterior, between, rng),
-        compared=[one for one, _ in compared],
-        chosen=chosen,
-        structure=design.key,
-        bins=design.bins,
-        strokes=design.strokes,
-        measured=design.observed,
-        contact=design.contact(point),
-        recordings=recordings,
-        joint=recordings[0].joint,
-        nuisance=NUISANCE,
-        rng=rng,
-        critic=data.recipe.fit.cut.critic and effort != "draft",
-        usage=usage,
-        brief=data.known.prior is not None,
-        extra_verdicts=verdicts,
-        extra_notes=(
-            *data.sensors.notes,
-            *line_notes(scouted, design, inferred.budget),
-            *notes,
-            usage_sentence(recordings, usage),
-            *between_notes(between, NUISANCE),
-        ),
-        extra_diagnostics={
-            **cut_diagnostics(scouted, design),
-            **(between.diagnostics() if between else {}),
-        },
+    law: AveragedLaw,
+    between: BetweenRecordings | None,
+    run: CutRun,
+) -> tuple[Verdict, ...]:
+    """Verdicts that only a fit of cuts has."""
+    recordings, noise_scale = data.recordings, data.basis.recipe.fit.cut.priors.noise_scale
+    return (
+        *cut_verdicts(data.friction, run.edge_verdicts, scouted, data.sensors, recordings),
+        scatter_verdict(law.design, law.fitted.optimum.point, noise_scale),
+        *((data.broken.verdict("fit.cut"),) if data.broken.interrupted else ()),
+        *((between.verdict(),) if between else ()),
     )
 
 
@@ -390,10 +350,12 @@ def _refuse_no_contact(data: _Data) -> None:
             f"{data.names}: no stroke through material is marked. Capture cuts with "
             f"'scissorcal capture cut', or mark strokes and sheets when importing. {data.counted}"
         )
-    least = FELT_SDS * float(np.hypot(data.known.noise.white_Nm, data.known.noise.slow_Nm))
+    least = FELT_SDS * float(
+        np.hypot(data.basis.friction.noise.white_Nm, data.basis.friction.noise.slow_Nm)
+    )
     felt = 0.0
     for motion in data.motions:
-        material = data.known.material(motion)
+        material = data.basis.friction.material(motion)
         stride = max(1, round(0.02 / motion.tick_s))
         path = np.diff(motion.opening[::stride])
         moved = np.abs(path) > 1e-3

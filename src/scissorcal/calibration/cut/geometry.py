@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from scissorcal.aliases import Array
 from scissorcal.model import Edge, EdgeBelief, edge_height
+from scissorcal.recipe.schema import Recipe
 
 NEWTON_STEPS = 12
 STEP_M = 1e-6
@@ -204,3 +205,14 @@ class Geometry:
         _, lever = self.depth_and_lever(edge, opening, place)
         view: Any = edge_height(edge, place, opening / self.moving_blades)
         return place, lever, view.slope
+
+
+def belief_geometry(recipe: Recipe, belief: EdgeBelief) -> Geometry:
+    """The geometry of a recipe and an edge with its uncertainty."""
+    return Geometry(
+        belief,
+        recipe.upper_face_m,
+        recipe.rig.moving_blades,
+        recipe.fit.cut.reference_indentation_mm * 1e-3,
+        recipe.scene.closure,
+    )

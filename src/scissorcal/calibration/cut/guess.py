@@ -7,9 +7,11 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.path import Material, PathMotion, mean_torque
-from scissorcal.calibration.cut.path.runs import Run
+from scissorcal.calibration.cut.known import MaterialData
+from scissorcal.calibration.cut.path_motion import PathMotion, Run, find_runs
+from scissorcal.calibration.cut.path_work import Material, mean_torque
 from scissorcal.model import Response
+from scissorcal.recipe.priors import LogNormalPrior
 
 LEAST_DEPTH_M = 1e-9
 
@@ -102,14 +104,7 @@ class CoarseEncoderError(ValueError):
 
 
 def first_guess(
-    motions: tuple[PathMotion, ...],
-    materials: tuple[Material, ...],
-    runs: Sequence[Run],
-    geometry: Geometry,
-    *,
-    cuts: bool,
-    median_exponent: float,
-    log_sd_exponent: float,
+    data: MaterialData, geometry: Geometry, *, cuts: bool, exponent: LogNormalPrior
 ) -> Guess:
     """Response from unloading alone, mean fracture energy from what closing costs.
 
@@ -117,15 +112,15 @@ def first_guess(
     force and exponent follow by least squares with those places free. Where nothing is cut the
     place is the sheet's edge. Raises NoUnloadingError where none was seen.
     """
-    pulls = [_unloading(motions, materials, run, geometry, cuts) for run in runs]
-    seen = [pull for pull in pulls if pull is not None]
-    if not seen:
+    runs = find_runs(data.motions)
+    unloadings = [_unloading(data, run, geometry, cuts) for run in runs]
+    pulls = [pull for pull in unloadings if pull is not None]
+    if not pulls:
         raise NoUnloadingError("no unloading was seen")
-    force, exponent = _power_law(seen, geometry, cuts, median_exponent, log_sd_exponent)
-    response = Response("power", force, exponent, geometry.reference_m)
+    response = Response("power", *_power_law(pulls, geometry, cuts, exponent), geometry.reference_m)
     if not cuts:
         return Guess(response, np.inf)
-    return Guess(response, _running_energy(motions, materials, runs, geometry))
+    return Guess(response, _running_energy(data, runs, geometry))
 
 
 @dataclass(frozen=True)
@@ -151,18 +146,12 @@ def _profile(
     return middle, 0.5 * (motion.advance[ends[1:]] + motion.advance[ends[:-1]]), torque
 
 
-def _unloading(
-    motions: tuple[PathMotion, ...],
-    materials: tuple[Material, ...],
-    run: Run,
-    geometry: Geometry,
-    cuts: bool,
-) -> _Pull | None:
-    motion = motions[run.motion]
+def _unloading(data: MaterialData, run: Run, geometry: Geometry, cuts: bool) -> _Pull | None:
+    motion = data.motions[run.motion]
     if motion.opening[run.high] <= motion.opening[run.low]:
         return None
     opening, advance, torque = _profile(
-        motion, materials[run.motion], run.low, run.high, PROFILE_RAD
+        motion, data.materials[run.motion], run.low, run.high, PROFILE_RAD
     )
     opening, advance, torque = (a[:LONGEST_PROFILE] for a in (opening, advance, torque))
     if len(torque) < 12:
@@ -182,11 +171,7 @@ def _unloading(
 
 
 def _power_law(
-    pulls: list[_Pull],
-    geometry: Geometry,
-    cuts: bool,
-    median_exponent: float,
-    log_sd_exponent: float,
+    pulls: list[_Pull], geometry: Geometry, cuts: bool, prior: LogNormalPrior
 ) -> tuple[float, float]:
     from scipy.optimize import least_squares
 
@@ -211,14 +196,14 @@ def _power_law(
         return left, slopes_of
 
     def misfit(u: Array) -> Array:
-        prior = [u[2:] / 3.0, (u[1:2] - np.log(median_exponent)) / log_sd_exponent]
-        return np.concatenate([*prior, *rows(u)[0]])
+        away = [u[2:] / 3.0, (u[1:2] - np.log(prior.median)) / prior.log_sd]
+        return np.concatenate([*away, *rows(u)[0]])
 
     def jacobian(u: Array) -> Array:
         blocks, count = rows(u)[1], len(pulls)
         found = np.zeros((count + 1 + sum(map(len, blocks)), len(u)))
         found[:count, 2:] = np.eye(count) / 3.0
-        found[count, 1] = 1.0 / log_sd_exponent
+        found[count, 1] = 1.0 / prior.log_sd
         first = count + 1
         for place, block in enumerate(blocks, start=2):
             found[first : first + len(block), [0, 1, place]] = block
@@ -235,20 +220,15 @@ def _power_law(
     return float(np.exp(best.x[0])), float(np.exp(best.x[1]))
 
 
-def _running_energy(
-    motions: tuple[PathMotion, ...],
-    materials: tuple[Material, ...],
-    runs: Sequence[Run],
-    geometry: Geometry,
-) -> float:
+def _running_energy(data: MaterialData, runs: Sequence[Run], geometry: Geometry) -> float:
     """Median of m t torque / lever over closing, where that is no small share of its largest."""
     found = []
     for run in runs:
-        motion = motions[run.motion]
+        motion = data.motions[run.motion]
         if motion.opening[run.high] >= motion.opening[run.low]:
             continue
         opening, _, torque = _profile(
-            motion, materials[run.motion], run.low, run.high, RUNNING_PROFILE_RAD
+            motion, data.materials[run.motion], run.low, run.high, RUNNING_PROFILE_RAD
         )
         if len(opening):
             view = geometry.running(opening)

@@ -1,24 +1,27 @@
-"""What a cut's fit takes from the fit of friction: levels, inertia, cogging, noise."""
+"""What a cut's fit takes as given: recipe, geometry, and levels and noise of friction."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.cut.path import (
+from scissorcal.calibration.cut.geometry import Geometry, belief_geometry
+from scissorcal.calibration.cut.path_motion import PathMotion
+from scissorcal.calibration.cut.path_work import (
     FrictionDraws,
     Material,
-    PathMotion,
     material_of,
     torque_noise_of,
 )
-from scissorcal.calibration.friction.typical import friction_and_offset, typical_values
+from scissorcal.calibration.cut.structure import edge_of
+from scissorcal.calibration.friction.layout import friction_and_offset, typical_values
+from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.zeros import DriveZero
-from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.model import FrictionLaw
+from scissorcal.model import EdgeBelief, FrictionLaw
 from scissorcal.recipe.priors import CutPriors
+from scissorcal.recipe.schema import Recipe
 
 USUAL_RATE = 0.3
 SOME_DRAWS = 48
@@ -119,3 +122,34 @@ def _spread(friction: FitResult, centre: float, rate: float) -> float:
     draws = {p.name: friction.column(p.name) for p in friction.parameters}
     low, high = np.quantile(friction_and_offset(draws, centre, rate), WITHIN_SD)
     return float(0.5 * (high - low))
+
+
+@dataclass(frozen=True)
+class CutBasis:
+    """What a fit of cuts takes as given: recipe, geometry with the edge, and friction."""
+
+    recipe: Recipe
+    geometry: Geometry
+    friction: KnownFriction
+
+    @classmethod
+    def of(
+        cls, recipe: Recipe, friction: KnownFriction, edge: EdgeBelief | None = None
+    ) -> "CutBasis":
+        """That of a recipe; ``edge`` takes the place of the edge that it states."""
+        return cls(recipe, belief_geometry(recipe, edge or edge_of(recipe)), friction)
+
+    def data(self, motions: tuple[PathMotion, ...]) -> "MaterialData":
+        """What the material did along motions, friction taken off."""
+        materials = tuple(self.friction.material(motion) for motion in motions)
+        return MaterialData(motions, materials, self.friction.noise, self.friction.stroke_sd)
+
+
+@dataclass(frozen=True)
+class MaterialData:
+    """What the material did along motions, with the noise by sample and from stroke to stroke."""
+
+    motions: tuple[PathMotion, ...]
+    materials: tuple[Material, ...]
+    noise: TorqueNoise
+    offset_sd: float

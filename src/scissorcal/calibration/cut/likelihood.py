@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.path import advance_line, kinetic_variance, mean_advance
+from scissorcal.calibration.cut.path_work import advance_line, kinetic_variance, mean_advance
 from scissorcal.calibration.cut.segments import Segments
 from scissorcal.calibration.cut.teeth import Line
 from scissorcal.kernel import (

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.laws import NUISANCE, CutLaw
 from scissorcal.calibration.cut.likelihood import CutLikelihood, Evaluation
-from scissorcal.calibration.cut.path import mean_advance
+from scissorcal.calibration.cut.path_work import mean_advance
 from scissorcal.calibration.cut.structure import response_from
 from scissorcal.calibration.fit_candidate import (
     SEARCH_REACH,

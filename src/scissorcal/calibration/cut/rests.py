@@ -7,8 +7,8 @@ import numpy as np
 from scissorcal.aliases import Array, Mask
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess
-from scissorcal.calibration.cut.path import PathMotion, mean_torque
-from scissorcal.calibration.cut.path.runs import Run, split
+from scissorcal.calibration.cut.path_motion import PathMotion, Run, split
+from scissorcal.calibration.cut.path_work import mean_torque
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 
 ELASTIC_SEGMENTS = 8

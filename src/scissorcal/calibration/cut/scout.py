@@ -15,18 +15,18 @@ from scissorcal.calibration.cut.guess import (
     NoUnloadingError,
     first_guess,
 )
-from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.known import CutBasis
 from scissorcal.calibration.cut.laws import CutLaw, cut_layout
 from scissorcal.calibration.cut.likelihood import CutLikelihood
 from scissorcal.calibration.cut.model import CutExperiment, starting_point
-from scissorcal.calibration.cut.path import Material, PathMotion
-from scissorcal.calibration.cut.path.runs import FEWEST_SEGMENTS, find_runs
+from scissorcal.calibration.cut.path_motion import FEWEST_SEGMENTS, PathMotion
+from scissorcal.calibration.cut.path_work import Material
 from scissorcal.calibration.cut.segments import Segments, cut_into_segments
 from scissorcal.calibration.cut.structure import edge_layout, geometry_of, response_from
 from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
+from scissorcal.calibration.parameters import Layout
 from scissorcal.inference import Counter, Optimum, find_optimum
-from scissorcal.model import EdgeBelief, Response
-from scissorcal.recipe.schema import Recipe
+from scissorcal.model import Response
 
 ROUNDS = 2
 KAPPAS = np.linspace(0.05, 0.985, 188)
@@ -71,23 +71,18 @@ class Scouted:
         return self.line if self.accepted else None
 
 
-def scout(
-    motions: tuple[PathMotion, ...],
-    known: KnownFriction,
-    recipe: Recipe,
-    geometry: Geometry,
-    fracture: str,
-) -> Scouted:
+def scout(motions: tuple[PathMotion, ...], basis: CutBasis, fracture: str) -> Scouted:
     """Fit a power law twice, segment the recordings by its result, and look for the teeth.
 
     Raises NoUnloadingError where none was seen, CoarseEncoderError where the encoder shows too
     little of it, MisfitError where the law is nowhere near the data.
     """
-    materials = tuple(known.material(motion) for motion in motions)
+    recipe, geometry, data = basis.recipe, basis.geometry, basis.data(motions)
+    cuts, exponent = recipe.scene.cut, recipe.fit.cut.response_exponent
     rounds = [(False, False), (True, recipe.fit.cut.load_share != "none")]
-    known_point = _known_point(known, recipe, geometry, fracture)
+    known_point = _known_point(basis, fracture)
     if known_point is None:
-        guess = _guessed(motions, materials, recipe, geometry)
+        guess = first_guess(data, geometry, cuts=cuts, exponent=exponent)
         values = _values_of(guess, fracture)
     else:
         (values, guess), rounds = known_point, rounds[1:]
@@ -95,52 +90,33 @@ def scout(
     for unseen, loaded in rounds:
         law = CutLaw("power", fracture, loaded=loaded)
         for _ in range(ROUNDS if loaded else 1):
-            at = (motions, materials, geometry.at(values), guess, known.noise, known.stroke_sd)
-            segments = cut_into_segments(*at, recipe.scene.cut, unseen=unseen)
+            at = geometry.at(values)
+            segments = cut_into_segments(data, at, guess, cuts, unseen=unseen)
             if not segments.pieces and not unseen:
-                segments = cut_into_segments(*at, recipe.scene.cut)
+                segments = cut_into_segments(data, at, guess, cuts)
             if not segments.pieces:
                 refuse_coarse(segments)
                 raise NoUnloadingError("no stroke shows unloading")
-            design = make_experiment(segments, geometry, recipe, law, known, values)
+            design = make_experiment(segments, basis, law, values)
             optimum = _found(design)
             evaluations += optimum.evaluations
             values = _natural(design, optimum.point)
             guess = guess_at(design.key, values)
-    found = Scouted(segments, materials, values, None, False, float("nan"), "", evaluations)
+    scouted = Scouted(segments, data.materials, values, None, False, float("nan"), "", evaluations)
     if fracture != "rippled" or not segments.stretches:
-        return found
-    return _with_line(found, design, optimum, recipe, known, geometry)
+        return scouted
+    return _with_line(scouted, design, optimum, basis)
 
 
-def _guessed(
-    motions: tuple[PathMotion, ...],
-    materials: tuple[Material, ...],
-    recipe: Recipe,
-    geometry: Geometry,
-) -> Guess:
-    exponent = recipe.fit.cut.response_exponent
-    return first_guess(
-        motions,
-        materials,
-        find_runs(motions),
-        geometry,
-        cuts=recipe.scene.cut,
-        median_exponent=exponent.median,
-        log_sd_exponent=exponent.log_sd,
-    )
-
-
-def _known_point(
-    known: KnownFriction, recipe: Recipe, geometry: Geometry, fracture: str
-) -> tuple[dict[str, float], Guess] | None:
+def _known_point(basis: CutBasis, fracture: str) -> tuple[dict[str, float], Guess] | None:
     """Where a study of simulated data begins: at the mean of its truths, if that is a power law."""
+    recipe, known = basis.recipe, basis.friction
     if known.prior is None or known.prior.response != "power":
         return None
     law = CutLaw("power", fracture)
     layout = known.prior.layout(cut_layout(recipe, law, (known.closing_sd, known.opening_sd)))
     values = {name: float(value) for name, value in layout.natural(layout.mean).items()}
-    return values, guess_at({**law.key, **geometry_of(recipe, geometry.belief.edge)}, values)
+    return values, guess_at({**law.key, **geometry_of(recipe, basis.geometry.belief.edge)}, values)
 
 
 def refuse_coarse(segments: Segments) -> None:
@@ -159,26 +135,32 @@ def refuse_coarse(segments: Segments) -> None:
     )
 
 
-def make_experiment(
-    segments: Segments,
-    geometry: Geometry,
-    recipe: Recipe,
-    law: CutLaw,
-    known: KnownFriction,
-    values: Mapping[str, float],
-    line: Line | None = None,
-) -> CutExperiment:
-    """One law over segments, with priors from the recipe; a search begins at ``values``."""
-    layout = cut_layout(recipe, law, (known.closing_sd, known.opening_sd))
-    edge = edge_layout(geometry.belief)
+def cut_prior(basis: CutBasis, law: CutLaw) -> tuple[Layout, Array]:
+    """The parameters of a law and of the edge, and the precision (p, p) of their prior."""
+    known, belief = basis.friction, basis.geometry.belief
+    layout = cut_layout(basis.recipe, law, (known.closing_sd, known.opening_sd))
+    edge = edge_layout(belief)
     whole = type(layout)((*layout.parameters, *edge.parameters))
     precision = np.diag(1.0 / whole.sd**2)
     count = len(edge.parameters)
     if count:
-        precision[-count:, -count:] = np.linalg.inv(geometry.belief.covariance)
+        precision[-count:, -count:] = np.linalg.inv(belief.covariance)
     if known.prior is not None:
         stated = known.prior.of_response(law.response)
         precision, whole = stated.precision(whole, precision), stated.layout(whole)
+    return whole, precision
+
+
+def make_experiment(
+    segments: Segments,
+    basis: CutBasis,
+    law: CutLaw,
+    values: Mapping[str, float],
+    line: Line | None = None,
+) -> CutExperiment:
+    """One law over segments, with priors from the recipe; a search begins at ``values``."""
+    recipe, geometry = basis.recipe, basis.geometry
+    whole, precision = cut_prior(basis, law)
     return CutExperiment(
         likelihood=CutLikelihood(
             segments, geometry, law.fracture, line if law.fracture == "rippled" else None
@@ -222,35 +204,31 @@ def tooth_periods(
 
 
 def _with_line(
-    found: Scouted,
-    design: CutExperiment,
-    optimum: Optimum,
-    recipe: Recipe,
-    known: KnownFriction,
-    geometry: Geometry,
+    scouted: Scouted, design: CutExperiment, optimum: Optimum, basis: CutBasis
 ) -> Scouted:
     """Look for the teeth, test whether they agree with the rest, and fit again with them."""
-    first = _line(found, geometry, design)
-    found = replace(found, without=found.values["kappa"])
+    geometry = basis.geometry
+    first = _line(scouted, geometry, design)
+    scouted = replace(scouted, without=scouted.values["kappa"])
     if first is None:
         return replace(
-            found, reason="no stroke shows the teeth of a running crack as a spectral line."
+            scouted, reason="no stroke shows the teeth of a running crack as a spectral line."
         )
     if not first.at_two_speeds:
         return replace(
-            found,
+            scouted,
             line=first,
             reason="the teeth's line appears at one stroke speed only; two are needed.",
         )
     alone = design.candidate(design.observed).problem(design.series)
-    values, line, evaluations = dict(found.values), first, found.evaluations
+    values, line, evaluations = dict(scouted.values), first, scouted.evaluations
     for _ in range(ROUNDS):
-        values |= _kappa_at(values, geometry, found, line.log_period, line.stretches)
-        design = make_experiment(found.segments, geometry, recipe, design.law, known, values, line)
+        values |= _kappa_at(values, geometry, scouted, line.log_period, line.stretches)
+        design = make_experiment(scouted.segments, basis, design.law, values, line)
         with_line = _found(design)
         evaluations += with_line.evaluations
         values = _natural(design, with_line.point)
-        again = _line(replace(found, values=values), geometry, design, near=True)
+        again = _line(replace(scouted, values=values), geometry, design, near=True)
         if again is None:
             break
         line = again
@@ -261,8 +239,8 @@ def _with_line(
             f"the line's period is {away:.1f} standard deviations (limit {MOST_SDS:g}) from the "
             "rest of the data, as for encoder counts that alias with the samples."
         )
-        return replace(found, line=line, reason=reason, evaluations=evaluations)
-    return replace(found, values=values, line=line, accepted=True, evaluations=evaluations)
+        return replace(scouted, line=line, reason=reason, evaluations=evaluations)
+    return replace(scouted, values=values, line=line, accepted=True, evaluations=evaluations)
 
 
 def _found(design: CutExperiment) -> Optimum:
@@ -278,31 +256,33 @@ def _found(design: CutExperiment) -> Optimum:
 
 
 def _line(
-    found: Scouted, geometry: Geometry, design: CutExperiment, near: bool = False
+    scouted: Scouted, geometry: Geometry, design: CutExperiment, near: bool = False
 ) -> Line | None:
-    response = response_from(design.key, {k: np.asarray(v) for k, v in found.values.items()})
+    response = response_from(design.key, {k: np.asarray(v) for k, v in scouted.values.items()})
     rows = [
-        tooth_periods(geometry, response, found.values, geometry.running(_middles(found, index)))
-        for index in range(len(found.segments.stretches))
+        tooth_periods(
+            geometry, response, scouted.values, geometry.running(_middles(scouted, index))
+        )
+        for index in range(len(scouted.segments.stretches))
     ]
-    gain = 1.0 + float(found.values.get("load_share", 0.0))
-    offset = float(found.values.get("offset_closing", 0.0))
+    gain = 1.0 + float(scouted.values.get("load_share", 0.0))
+    offset = float(scouted.values.get("offset_closing", 0.0))
     growth = 1.0 / float(np.asarray(response.exponent))
     periods, torques = [row[0] for row in rows], [gain * row[1] + offset for row in rows]
-    signals = phase_signals(found.segments, found.materials, geometry, periods, torques, growth)
+    signals = phase_signals(scouted.segments, scouted.materials, geometry, periods, torques, growth)
     return find_line(signals, periods, torques, near)
 
 
-def _middles(found: Scouted, index: int) -> Array:
-    stretch = found.segments.stretches[index]
-    opening = found.segments.motions[stretch.motion].opening
+def _middles(scouted: Scouted, index: int) -> Array:
+    stretch = scouted.segments.stretches[index]
+    opening = scouted.segments.motions[stretch.motion].opening
     return 0.5 * (opening[stretch.ends[1:]] + opening[stretch.ends[:-1]])
 
 
 def _kappa_at(
     values: Mapping[str, float],
     geometry: Geometry,
-    found: Scouted,
+    scouted: Scouted,
     log_period: float,
     stretches: tuple[int, ...],
 ) -> dict[str, float]:
@@ -311,7 +291,7 @@ def _kappa_at(
     response = Response(
         "power", values["response_force"], values["response_exponent"], geometry.reference_m
     )
-    view = geometry.running(np.concatenate([_middles(found, index) for index in stretches])[::7])
+    view = geometry.running(np.concatenate([_middles(scouted, index) for index in stretches])[::7])
     misses = []
     for kappa in KAPPAS:
         tried = {**values, "kappa": kappa, "fracture_energy": 2.0 * mean / (1.0 + kappa)}
@@ -343,14 +323,3 @@ def guess_at(structure: Mapping[str, Any], values: Mapping[str, float]) -> Guess
 
 def _natural(design: CutExperiment, point: Array) -> dict[str, float]:
     return {name: float(value) for name, value in design.layout.natural(point).items()}
-
-
-def belief_geometry(recipe: Recipe, belief: EdgeBelief) -> Geometry:
-    """The geometry of a recipe and an edge with its uncertainty."""
-    return Geometry(
-        belief,
-        recipe.upper_face_m,
-        recipe.rig.moving_blades,
-        recipe.fit.cut.reference_indentation_mm * 1e-3,
-        recipe.scene.closure,
-    )

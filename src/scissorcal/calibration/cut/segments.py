@@ -13,14 +13,20 @@ import numpy as np
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import Guess
-from scissorcal.calibration.cut.path import (
-    Material,
+from scissorcal.calibration.cut.known import MaterialData
+from scissorcal.calibration.cut.path_motion import (
+    FEWEST_SEGMENTS,
     PathMotion,
+    Run,
+    find_runs,
+    split,
+)
+from scissorcal.calibration.cut.path_work import (
+    Material,
     mean_torque,
     sums_between,
     torque_covariance,
 )
-from scissorcal.calibration.cut.path.runs import FEWEST_SEGMENTS, Run, find_runs, split
 from scissorcal.calibration.cut.rests import (
     ELASTIC_SEGMENTS,
     LEAST_RANGE_RAD,
@@ -30,7 +36,6 @@ from scissorcal.calibration.cut.rests import (
     placed_by_loading,
     shortest_segment,
 )
-from scissorcal.calibration.signals.torque_noise import TorqueNoise
 
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
 """Least length and least teeth of running segments: in shorter ones the teeth are
@@ -108,22 +113,15 @@ class Segments:
 
 
 def cut_into_segments(
-    motions: tuple[PathMotion, ...],
-    materials: tuple[Material, ...],
-    geometry: Geometry,
-    guess: Guess,
-    noise: TorqueNoise,
-    offset_sd: float,
-    cuts: bool,
-    unseen: bool = True,
+    data: MaterialData, geometry: Geometry, guess: Guess, cuts: bool, unseen: bool = True
 ) -> Segments:
-    """Cut motions with what the material did (see :func:`material_of`) into segments.
+    """Cut motions with what the material did into segments.
 
     ``guess`` says where cracks wait and how deep the edge may sink before they run; ``cuts`` is
     false where nothing is cut. A segment with an invalid sample is left out, and without ``unseen``
     so are loadings of cracks that no unloading placed.
     """
-    builder = _Builder(motions, materials, geometry, guess, noise, offset_sd, cuts, unseen)
+    motions, builder = data.motions, _Builder(data, geometry, guess, cuts, unseen)
     sheet: tuple[int, int] | None = None
     for run in find_runs(motions):
         here = (motions[run.motion].recording, run.sheet)
@@ -149,12 +147,9 @@ def cut_into_segments(
 class _Builder:
     """Collects rests, pieces and stretches, run by run."""
 
-    motions: tuple[PathMotion, ...]
-    materials: tuple[Material, ...]
+    data: MaterialData
     geometry: Geometry
     guess: Guess
-    noise: TorqueNoise
-    offset_sd: float
     cuts: bool
     unseen: bool
     rests: list[Rest] = field(default_factory=list)
@@ -173,10 +168,10 @@ class _Builder:
 
     def closing(self, run: Run) -> None:
         """Loading of the crack that waits, then what is cut further."""
-        motion = self.motions[run.motion]
+        motion = self.data.motions[run.motion]
         span = slice(run.low, run.high + 1)
         if not self.rests[-1].seen and self.rests[-1].placed:
-            work = self.materials[run.motion].work
+            work = self.data.materials[run.motion].work
             self.rests[-1] = placed_by_loading(
                 motion, work, run, self.rests[-1], self.geometry, self.guess
             )
@@ -207,15 +202,15 @@ class _Builder:
 
     def opening(self, run: Run) -> None:
         """Unloading from where the blades turned; a crack may have come to rest there."""
-        motion = self.motions[run.motion]
+        motion = self.data.motions[run.motion]
         if self.cuts:
             found = place_at_turn(
                 motion,
-                self.materials[run.motion].work,
+                self.data.materials[run.motion].work,
                 run,
                 self.geometry,
                 self.guess,
-                self.noise,
+                self.data.noise,
             )
             if found is None:
                 return
@@ -241,7 +236,7 @@ class _Builder:
         self._piece("unloading", run.motion, run.low + begin, run.low + end, length)
 
     def _piece(self, kind: str, index: int, low: int, high: int, length: float) -> None:
-        motion = self.motions[index]
+        motion = self.data.motions[index]
         way = abs(float(motion.opening[high] - motion.opening[low]))
         shortest = shortest_segment(motion, low, high)
         if way > self.most_segments * shortest:
@@ -250,9 +245,9 @@ class _Builder:
         ends = split(motion.opening, low, high, max(length / ELASTIC_SEGMENTS, shortest))
         if len(ends) - 1 < FEWEST_SEGMENTS or not np.all(motion.usable[ends[0] : ends[-1] + 1]):
             return
-        material = self.materials[index]
+        material = self.data.materials[index]
         torque, late = mean_torque(motion, material.work, ends)
-        covariance = torque_covariance(motion, ends, self.noise, self.offset_sd)
+        covariance = torque_covariance(motion, ends, self.data.noise, self.data.offset_sd)
         rest = len(self.rests) - 1
         covariance += material.torque_doubt(motion, ends)
         covariance += np.diag(self._by_opening(motion, ends, self.rests[rest].place) ** 2)
@@ -271,18 +266,20 @@ class _Builder:
 
     def _stretch(self, run: Run, low: int) -> None:
         """Running segments; one with an invalid sample splits a stretch in two."""
-        motion, geometry = self.motions[run.motion], self.geometry
+        motion, geometry = self.data.motions[run.motion], self.geometry
         _, period = self.guess.tooth(geometry, motion.opening[low : run.high + 1])
         step = max(RUNNING_RAD, SEGMENT_CYCLES * period)
         every = split(motion.opening, low, run.high, step)
         invalid = np.concatenate([[0], np.cumsum(~motion.usable)])
         for ends in _parts(every, invalid):
-            material = self.materials[run.motion]
+            material = self.data.materials[run.motion]
             path, work = free_path(motion, material, geometry, ends)
             turned = np.diff(motion.opening[ends])
             _, late = mean_torque(motion, material.work, ends)
             ticks = np.diff(ends).astype(np.float64)
-            noise = np.array([self.noise.variance_of_mean(int(n), motion.tick_s) for n in ticks])
+            noise = np.array(
+                [self.data.noise.variance_of_mean(int(n), motion.tick_s) for n in ticks]
+            )
             noise += np.diag(material.torque_doubt(motion, ends)) * (turned / path) ** 2
             unseen = swings_unseen(motion, ends, period)
             self.stretches.append(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.path import Material
+from scissorcal.calibration.cut.path_work import Material
 from scissorcal.calibration.cut.segments import Segments, Stretch, sledge_share
 
 Complex = NDArray[np.complex128]
@@ -276,8 +276,8 @@ def _gain(pairs: Sequence[Complex]) -> float:
 
 def coherent_power(signals: Sequence[PhaseSignal], frequency: float) -> float:
     """Power that keeps its phase, summed over strokes."""
-    found = _pairs_of(signals, frequency)
-    return max(float(sum(float(np.real(p.sum())) / len(p) for p in found)), 1e-300)
+    pairs = _pairs_of(signals, frequency)
+    return max(float(sum(float(np.real(p.sum())) / len(p) for p in pairs)), 1e-300)
 
 
 def _pairs_of(signals: Sequence[PhaseSignal], frequency: float) -> list[Complex]:
@@ -286,28 +286,28 @@ def _pairs_of(signals: Sequence[PhaseSignal], frequency: float) -> list[Complex]
 
 def _shown(signals: Sequence[PhaseSignal], frequency: float) -> float:
     """Gain at a frequency, 0 where the phase gains a part of a cycle between windows."""
-    found = _pairs_of(signals, frequency)
-    ahead = sum(float(np.real(p.sum())) / float(np.abs(p).mean()) for p in found)
-    return _gain(found) if ahead > 0 else 0.0
+    pairs = _pairs_of(signals, frequency)
+    ahead = sum(float(np.real(p.sum())) / float(np.abs(p).mean()) for p in pairs)
+    return _gain(pairs) if ahead > 0 else 0.0
 
 
 def _coherence(signals: Sequence[PhaseSignal], frequency: float) -> float:
     """Pairs that keep their phase over one window and over one and a half, in units of a pair."""
-    found = [
+    pairs = [
         pair
         for signal in signals
         for apart in (ONE_WINDOW, ONE_AND_A_HALF)
         if (pair := _pairs(signal, frequency, apart)) is not None
     ]
-    return sum(float(np.real(pair.sum())) / float(np.abs(pair).mean()) for pair in found)
+    return sum(float(np.real(pair.sum())) / float(np.abs(pair).mean()) for pair in pairs)
 
 
 def _refined(signals: Sequence[PhaseSignal], frequency: float) -> float:
     for _ in range(4):
-        found = _pairs_of(signals, frequency)
-        if not found:
+        pairs = _pairs_of(signals, frequency)
+        if not pairs:
             return frequency
-        sums = sum(p.sum() / max(float(np.abs(p).sum()), 1e-300) * len(p) for p in found)
+        sums = sum(p.sum() / max(float(np.abs(p).sum()), 1e-300) * len(p) for p in pairs)
         frequency *= 1.0 + float(np.angle(sums)) / (2 * np.pi * WINDOW_CYCLES)
     return frequency
 

@@ -1,4 +1,4 @@
-"""Bounds on the scene's torque from quantities that were not measured: zeros, edge, load."""
+"""What a fit of cuts leaves unknown or does not state: toughness, and what a scene takes."""
 
 from dataclasses import dataclass, replace
 
@@ -7,11 +7,12 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.laws import LOADED
 from scissorcal.calibration.cut.structure import cutting_from
+from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.signals.idle import idle_zero
-from scissorcal.calibration.signals.zeros import DriveZero
+from scissorcal.calibration.signals.zeros import DriveZero, idle_zero
 from scissorcal.model import Cutting, edge_height, settled_contact
 from scissorcal.model.cutting import torque_at, within_thickness
+from scissorcal.model.transforms import LOG
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import STATED, TORQUE, Check, Verdict
@@ -115,12 +116,12 @@ def with_unknowns(
     lies within the data. A bound is no observed error: a large one rejects nothing; the check
     counts as not evaluated and names what to measure.
     """
-    found = find_unknowns(fit, recipe, friction, recordings)
+    unknowns = find_unknowns(fit, recipe, friction, recordings)
     limit = recipe.scene.tolerance_percent / 100.0
-    facts = {"not_measured": [dict(vars(one)) for one in found]}
+    facts = {"not_measured": [dict(vars(unknown)) for unknown in unknowns]}
     return replace(
         fit,
-        verdicts=(*fit.verdicts, *(_verdict(one, limit) for one in found)),
+        verdicts=(*fit.verdicts, *(_verdict(unknown, limit) for unknown in unknowns)),
         diagnostics={**fit.diagnostics, **facts},
     )
 
@@ -145,18 +146,20 @@ def find_unknowns(
 
 def _rig_limit(recordings: tuple[Recording, ...]) -> float:
     """The least torque limit (N m) that the rigs of the recordings state, infinite if none does."""
-    stated = [one.device.get("torque_limit") for one in recordings]
+    stated = [recording.device.get("torque_limit") for recording in recordings]
     return min((float(limit) for limit in stated if isinstance(limit, float)), default=np.inf)
 
 
-def _verdict(one: Unknown, limit: float) -> Verdict:
-    size = f"Error up to {one.share:.1%} of the scene's mean torque ({one.torque_Nm:.2g} N m)"
-    if one.torque_Nm == 0.0:
+def _verdict(unknown: Unknown, limit: float) -> Verdict:
+    size = (
+        f"Error up to {unknown.share:.1%} of the scene's mean torque ({unknown.torque_Nm:.2g} N m)"
+    )
+    if unknown.torque_Nm == 0.0:
         size = "No torque error"
-    why = f"{size}: {one.spread} {one.removed_by}".rstrip()
-    if one.share > limit:
-        return UNKNOWNS[one.name].not_evaluated(why, one.share, threshold=limit)
-    return UNKNOWNS[one.name].judge(one.share, why, threshold=limit)
+    why = f"{size}: {unknown.spread} {unknown.removed_by}".rstrip()
+    if unknown.share > limit:
+        return UNKNOWNS[unknown.name].not_evaluated(why, unknown.share, threshold=limit)
+    return UNKNOWNS[unknown.name].judge(unknown.share, why, threshold=limit)
 
 
 def _opening_zero(scene: SceneMean, recipe: Recipe) -> tuple[float, str, str]:
@@ -245,3 +248,29 @@ def _load(
     usual = recipe.fit.cut.priors.load_share.sd
     said = f"jaw tools lose up to {usual:.0%} of the load to friction, and none was fitted."
     return usual * mean, said, f'{cure} Or set fit.cut.load_share = "auto".'
+
+
+MEANING = "fracture energy over thickness: energy per area of cut"
+
+
+def with_toughness(fit: FitResult, recipe: Recipe, rng: np.random.Generator) -> FitResult:
+    """Give a cut's fit its toughness, if the recipe says how well the thickness is known.
+
+    Torque determines the product J_c h alone, so each draw of it is divided by its own draw of the
+    thickness: log-normal, independent, with the recipe's mean and standard deviation. Its share of
+    1 goes into the toughness as it is. The fit is returned as it came where nothing is cut or
+    ``material.thickness_sd_mm`` is not given.
+    """
+    material, prior = recipe.material, recipe.fit.cut.toughness_J_per_m2
+    if material.thickness_sd_mm is None or prior is None:
+        return fit
+    names = [parameter.name for parameter in fit.parameters]
+    if "fracture_energy" not in names:
+        return fit
+    variance = float(np.log1p((material.thickness_sd_mm / material.thickness_mm) ** 2))
+    centre = float(np.log(material.thickness_mm * 1e-3)) - 0.5 * variance
+    thickness = centre + np.sqrt(variance) * rng.standard_normal(len(fit.draws))
+    u = np.log(fit.column("fracture_energy")) - thickness
+    row = Layout((Parameter("toughness", "J/m^2", LOG, *prior.normal(), MEANING),))
+    draws = u[:, None]
+    return replace(fit, derived=row.fitted(draws), derived_draws=row.columns(draws))

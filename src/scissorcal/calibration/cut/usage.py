@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from scissorcal.aliases import Mask
-from scissorcal.calibration.cut.path.motion import PathMotion
+from scissorcal.calibration.cut.path_motion import PathMotion
 from scissorcal.calibration.cut.segments import Segments
 from scissorcal.calibration.signals.usage import GAP, INVALID, Usage, count_usage
 from scissorcal.recording.recording import Recording
@@ -67,7 +67,7 @@ def counted(
     recordings: tuple[Recording, ...], usable: tuple[Mask, ...], motions: Sequence[PathMotion]
 ) -> str:
     """What is left of the recordings after each filter of a fit of cuts, in seconds."""
-    ticks = [one.duration_s / max(len(one.samples) - 1, 1) for one in recordings]
+    ticks = [recording.duration_s / max(len(recording.samples) - 1, 1) for recording in recordings]
     recorded = sum(tick * len(good) for tick, good in zip(ticks, usable, strict=True))
     sound = sum(tick * np.count_nonzero(good) for tick, good in zip(ticks, usable, strict=True))
     kept = under = moving = 0.0

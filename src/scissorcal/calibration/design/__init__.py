@@ -18,11 +18,11 @@ from scissorcal.calibration.design.choice import (
 )
 from scissorcal.calibration.design.information import (
     Information,
+    Knowledge,
     cut_information,
     friction_information,
     line_information,
 )
-from scissorcal.calibration.design.knowledge import Knowledge
 from scissorcal.calibration.design.planned import PlannedMotion, planned_cut, planned_friction
 
 __all__ = [

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.design.information import Information
-from scissorcal.calibration.design.knowledge import Knowledge
+from scissorcal.calibration.design.information import Information, Knowledge
 
 REACHED_SHARE = 0.95
 """Share of the places that can be felt from which a scene's tolerance counts as reached. Where the

@@ -15,8 +15,7 @@ from scissorcal.calibration.design.choice import (
     Capture,
     Stock,
 )
-from scissorcal.calibration.design.information import Information
-from scissorcal.calibration.design.knowledge import Knowledge
+from scissorcal.calibration.design.information import Information, Knowledge
 
 Judge = Callable[[TorqueKnowledge], Band]
 
@@ -107,7 +106,7 @@ def outlook(
         ]
         if not options:
             break
-        best = max(options, key=lambda one: one.gain)
+        best = max(options, key=lambda option: option.gain)
         if best.gain <= WORTH and not needed:
             break
         chosen.append(best)

@@ -7,26 +7,25 @@ from typing import Any
 import numpy as np
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.known import CutBasis
 from scissorcal.calibration.cut.laws import CutLaw
 from scissorcal.calibration.cut.model import CutExperiment
-from scissorcal.calibration.cut.path import path_motion
+from scissorcal.calibration.cut.path_motion import path_motion
 from scissorcal.calibration.cut.scout import guess_at, make_experiment
 from scissorcal.calibration.cut.segments import cut_into_segments
+from scissorcal.calibration.friction.layout import LawChoice
 from scissorcal.calibration.friction.model import FrictionExperiment, design
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.weak_form import weigh
-from scissorcal.calibration.verify.simulation import (
-    Motion,
-    SmoothPiece,
+from scissorcal.calibration.verify.simulated_motion import Motion, SmoothPiece
+from scissorcal.calibration.verify.simulated_recordings import (
     cut_truth,
     friction_truth,
     simulate_cut,
     simulate_friction,
 )
-from scissorcal.recipe.schema import FitFriction, Recipe
+from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
 
 QUIET = TorqueNoise(0.0, 0.0, 0.01)
@@ -65,29 +64,16 @@ def planned_friction(
     values = {name: float(value) for name, value in layout.natural(point).items()}
     truth = friction_truth(values, structure, QUIET)
     recordings = simulate_friction((_motion(motion, "friction"),), truth, np.random.default_rng(0))
-    every = weigh(recordings, settings.cutoff_Hz)
-    windows = every.where(every.bins.moving & (every.bins.stroke >= 0))
-    found = design(
-        windows,
-        windows.bins.stroke.astype(np.int64),
-        str(structure["law"]),
-        bool(structure["symmetric"]),
-        Joint("rotary"),
-        settings.priors,
-        tuple(structure.get("adopt", ())),
-        float(structure.get("cogging_periods_per_turn", 0.0)),
-        zero_sd=zero_sd,
-    )
-    return replace(
-        found, layout=layout, key={**found.key, "angle_center": structure["angle_center"]}
-    )
+    whole = weigh(recordings, settings.cutoff_Hz)
+    windows = whole.where(whole.bins.moving & (whole.bins.stroke >= 0))
+    strokes, choice = windows.bins.stroke.astype(np.int64), LawChoice.of(structure, zero_sd)
+    law = design(windows, strokes, choice, Joint("rotary"), settings.priors)
+    return replace(law, layout=layout, key={**law.key, "angle_center": structure["angle_center"]})
 
 
 def planned_cut(
     motion: PlannedMotion,
-    recipe: Recipe,
-    geometry: Geometry,
-    known: KnownFriction,
+    basis: CutBasis,
     law: CutLaw,
     structure: Mapping[str, Any],
     layout: Layout,
@@ -100,21 +86,15 @@ def planned_cut(
     """
     values = {name: float(value) for name, value in layout.natural(point).items()}
     even = {**values, "variation": 0.0, "sheet_variation": 0.0}
+    known = basis.friction
     truth = cut_truth(even, structure, replace(known, noise=QUIET, stroke_sd=0.0), motion.tick_s)
     recordings = simulate_cut((_motion(motion, "cut"),), truth, np.random.default_rng(0))
     motions = path_motion(recordings, known.inertia)
-    segments = cut_into_segments(
-        motions,
-        tuple(known.material(one) for one in motions),
-        geometry,
-        guess_at(structure, values),
-        known.noise,
-        known.stroke_sd,
-        recipe.scene.cut,
-    )
+    guess, cuts = guess_at(structure, values), basis.recipe.scene.cut
+    segments = cut_into_segments(basis.data(motions), basis.geometry, guess, cuts)
     if not segments.pieces:
         return None
-    return make_experiment(segments, geometry, recipe, law, known, values)
+    return make_experiment(segments, basis, law, values)
 
 
 def _motion(planned: PlannedMotion, kind: str) -> Motion:

@@ -1,7 +1,7 @@
 """What a design starts from: finished fits with their recordings, or the recipe's priors."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,23 +9,23 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.fit import cut_experiment, cut_optimum
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.known import USUAL_RATE, KnownFriction
-from scissorcal.calibration.cut.lack_of_fit import error_shares
-from scissorcal.calibration.cut.laws import CutLaw, allowed_laws, cut_layout
+from scissorcal.calibration.cut.known import USUAL_RATE, CutBasis, KnownFriction
+from scissorcal.calibration.cut.laws import CutLaw, allowed_laws
 from scissorcal.calibration.cut.model import CutExperiment
-from scissorcal.calibration.cut.path import torque_noise_of
-from scissorcal.calibration.cut.scout import belief_geometry
-from scissorcal.calibration.cut.structure import edge_layout, edge_of, geometry_of
+from scissorcal.calibration.cut.path_work import torque_noise_of
+from scissorcal.calibration.cut.scout import cut_prior
+from scissorcal.calibration.cut.structure import geometry_of
+from scissorcal.calibration.cut.widening import error_shares
 from scissorcal.calibration.design.band import Sharing
 from scissorcal.calibration.design.information import (
     Information,
+    Knowledge,
     cut_information,
     friction_information,
     line_information,
 )
-from scissorcal.calibration.design.knowledge import Knowledge
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.calibration.friction.layout import Drive, friction_layout, friction_precision
+from scissorcal.calibration.friction.layout import LawChoice, friction_layout, friction_precision
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
@@ -73,7 +73,7 @@ def fitted_friction(
 ) -> FrictionState:
     """What a finished fit of friction knows by its own recordings."""
     design = friction_experiment(recordings, recipe.fit.friction, fit)
-    point = _point(design.layout, fit)
+    point = design.layout.unconstrained(fit.best)
     noise = torque_noise_of(fit.diagnostics)
     stroke_sd = _number(fit.diagnostics.get("stroke_offset_sd_Nm"))
     told = friction_information(design, point, noise, stroke_sd)
@@ -101,7 +101,8 @@ def fitted_cut(
 ) -> CutState:
     """What a finished fit of a cut knows by its own recordings."""
     design = cut_experiment(recordings, recipe, friction, fit, edge)
-    return _cut_state(design, _point(design.layout, fit), recipe, _between(design.layout, fit))
+    point = design.layout.unconstrained(fit.best)
+    return _cut_state(design, point, recipe, _between(design.layout, fit))
 
 
 def latest_cut(
@@ -127,21 +128,20 @@ def expected_friction(recipe: Recipe) -> FrictionState:
     """
     settings = recipe.fit.friction
     law = EXPECTED_LAW if settings.rung == "auto" else settings.rung
-    symmetric, adopt = settings.symmetry == "symmetric", settings.adopt
+    choice = LawChoice(law, settings.symmetry == "symmetric", settings.adopt)
     centre = float(np.round(np.mean(recipe.scene.opening_rad), 3))
     structure = {
         "law": law,
-        "symmetric": symmetric,
+        "symmetric": choice.symmetric,
         "angle_center": centre,
-        "adopt": list(adopt),
+        "adopt": list(choice.adopt),
     }
     joint, priors = Joint("rotary"), settings.priors.of("rotary")
-    free = friction_layout(law, symmetric, joint, priors, adopt, Drive(False, TICK_S))
+    free = friction_layout(choice, joint, priors, TICK_S)
     size = float(free.natural(free.mean)["noise"])
     noise = TorqueNoise(size, size, EXPECTED_SLOW_S)
     zero_sd = float(np.sqrt(noise.variance_of_mean(round(2.0 * ZERO_S / TICK_S), TICK_S)))
-    drive = Drive(False, TICK_S, zero_sd)
-    layout = friction_layout(law, symmetric, joint, priors, adopt, drive)
+    layout = friction_layout(replace(choice, zero_sd=zero_sd), joint, priors, TICK_S)
     values = {name: float(value) for name, value in layout.natural(layout.mean).items()}
     floor = recipe.fit.cut.priors.friction_sd_floor_Nm
     known = KnownFriction(
@@ -174,15 +174,9 @@ def expected_cut(
     fractures = ("none", "smooth", "rippled")
     laws = allowed_laws(recipe)
     law = max(laws, key=lambda one: (fractures.index(one.fracture), one.loaded))
-    geometry = belief_geometry(recipe, edge or edge_of(recipe))
-    known = friction.known
-    layout = cut_layout(recipe, law, (known.closing_sd, known.opening_sd))
-    edge_part = edge_layout(geometry.belief)
-    whole = type(layout)((*layout.parameters, *edge_part.parameters))
-    prior = np.diag(1.0 / whole.sd**2)
-    count = len(edge_part.parameters)
-    if count:
-        prior[-count:, -count:] = np.linalg.inv(geometry.belief.covariance)
+    basis = CutBasis.of(recipe, friction.known, edge)
+    layout, prior = cut_prior(basis, law)
+    geometry = basis.geometry
     structure = {**law.key, **geometry_of(recipe, geometry.belief.edge)}
     share = 0.01 * recipe.fit.cut.lack_of_fit_percent
     kinds = (
@@ -194,8 +188,8 @@ def expected_cut(
     )
     shares = dict.fromkeys(kinds, share)
     knowledge = Knowledge(
-        whole,
-        whole.mean,
+        layout,
+        layout.mean,
         prior,
         error_shares=shares,
         usual_scatter=recipe.fit.cut.between_recordings,
@@ -246,13 +240,6 @@ def _cut_state(
         usual_scatter=recipe.fit.cut.between_recordings,
     )
     return CutState(knowledge, design.key, design.law, design.likelihood.geometry)
-
-
-def _point(layout: Layout, fit: FitResult) -> Array:
-    """Where the fit ended, in unconstrained coordinates; nuisances at their means."""
-    values = {p.name: float(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
-    values |= {p.name: p.mean for p in fit.nuisance}
-    return layout.unconstrained({name: values[name] for name in layout.names})
 
 
 def _by_recording(

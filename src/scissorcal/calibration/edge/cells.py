@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
+from scissorcal.calibration.edge.result import FoundNick
 from scissorcal.errors import InputError
 from scissorcal.model.bspline import FEWEST, spline_design
 from scissorcal.vision.blade.measure import BladeMeasurement
@@ -25,16 +26,6 @@ _SHORTEST_SHARE = 0.002
 _FEWEST_POINTS = 3
 _SOFTEST = 1.45
 """A notch's border is as sharp as the edge's; a glare's is softer."""
-
-
-@dataclass(frozen=True)
-class FoundNick:
-    """Metal missing from the edge, as one photograph shows it: metres from the pivot."""
-
-    station_m: float
-    width_m: float
-    depth_m: float
-    source: str
 
 
 @dataclass(frozen=True)

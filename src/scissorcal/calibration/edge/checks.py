@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from scissorcal.calibration.camera.checks import MOST_SD_PX
-from scissorcal.calibration.edge.candidates import MOST_EVALUATIONS
+from scissorcal.calibration.edge.model import MOST_EVALUATIONS
 from scissorcal.calibration.edge.result import BladeFit, PhotographRow, RungRow, SeenPair
 from scissorcal.inference import Effort, SamplingStatus
 from scissorcal.verdicts import INTERVALS, STATED, Check, Verdict

@@ -1,19 +1,31 @@
-"""A blade's edge from photographs: a posterior of e(s), alpha(s) and the height over the scene."""
+"""Fit a blade's edge to its photographs: families compared by their evidence."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scissorcal.aliases import Array, Progress
-from scissorcal.calibration.edge.candidates import EdgeComparison, compare_edges
-from scissorcal.calibration.edge.cells import EdgeCells, FoundNick, cells_each, edge_cells
+from scissorcal.calibration.candidates import Account, compare
+from scissorcal.calibration.edge.cells import EdgeCells, cells_each, edge_cells
 from scissorcal.calibration.edge.checks import blade_verdicts
-from scissorcal.calibration.edge.result import Band, BladeFit, PhotographRow
+from scissorcal.calibration.edge.model import (
+    FAMILIES,
+    MOST_EVALUATIONS,
+    CellData,
+    EdgeEvidence,
+    Family,
+    Found,
+    basis_of,
+    search,
+)
+from scissorcal.calibration.edge.result import Band, BladeFit, FoundNick, PhotographRow, RungRow
 from scissorcal.errors import InputError
-from scissorcal.inference import Effort
-from scissorcal.model import EdgeBelief, draw_edges, edge_height
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.inference import Effort, InferOptions
+from scissorcal.inference.infer import infer
+from scissorcal.inference.status import SamplingStatus
+from scissorcal.model import Edge, EdgeBelief, draw_edges, edge_height
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.blade.measure import BladeMeasurement
 from scissorcal.vision.blade.modes import smooth_slope
@@ -22,35 +34,42 @@ PLACES = 41
 HEIGHT_DRAWS = 400
 
 
+@dataclass(frozen=True)
+class Blade:
+    """Which blade is fitted; its length, where known, gives shapes without a scale their size."""
+
+    name: str = "blade"
+    length_m: float | None = None
+
+
 def fit_blade(
     measured: Sequence[BladeMeasurement],
     recipe: Recipe | None,
     *,
     effort: Effort = "standard",
     rng: np.random.Generator,
-    name: str = "blade",
-    length_m: float | None = None,
+    blade: Blade = Blade(),
     progress: Progress | None = None,
 ) -> BladeFit:
     """Fit one blade's edge to its measurements, one for each photograph.
 
-    ``length_m`` is the blade's known length, which gives shapes without a scale their size. Raises
-    InputError without any measurement, or where photographs with and without a scale are mixed.
+    Raises InputError without any measurement, or where photographs with and without a scale are
+    mixed.
     """
     if not measured:
         raise InputError("No photograph of a blade could be measured, so there is nothing to fit.")
-    sized = tuple(_sized(one, length_m) for one in measured)
-    if len({one.metric for one in sized}) > 1:
+    sized = tuple(_sized(measurement, blade.length_m) for measurement in measured)
+    if len({measurement.metric for measurement in sized}) > 1:
         raise InputError(
             "Photographs with and without a scale cannot be fitted together: give --length-mm, or "
             "leave one kind out."
         )
     metric = sized[0].metric
     priors = recipe.fit.blade.priors if recipe else BladePriors()
-    lengths = np.array([one.length for one in sized])
+    lengths = np.array([measurement.length for measurement in sized])
     length = float(np.median(lengths))
-    cells = tuple(edge_cells(one, cells_each(len(sized))) for one in sized)
-    best = compare_edges(cells, length, effort, rng, priors=priors, progress=progress)
+    cells = tuple(edge_cells(measurement, cells_each(len(sized))) for measurement in sized)
+    best = compare_edges(CellData(cells, length), effort, rng, priors=priors, progress=progress)
     first = min(float(c.station[0]) for c in cells)
     last = max(float(c.station[-1]) for c in cells)
     station = np.linspace(first, last, PLACES)
@@ -58,11 +77,17 @@ def fit_blade(
     rows = _rows(sized, cells, best)
     opening, contact, height = _height(best.belief, recipe, rng) if metric else _no_height()
     pivot = [
-        float(np.sqrt(np.mean(np.sum(np.square(one.modes[:, _columns(one, "pivot")]), axis=1))))
-        for one in sized
+        float(
+            np.sqrt(
+                np.mean(
+                    np.sum(np.square(measurement.modes[:, _columns(measurement, "pivot")]), axis=1)
+                )
+            )
+        )
+        for measurement in sized
     ]
     fit = BladeFit(
-        name,
+        blade.name,
         best.belief,
         best.draws,
         best.rows,
@@ -108,32 +133,32 @@ def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
     )
 
 
-def _sized(one: BladeMeasurement, length_m: float | None) -> BladeMeasurement:
+def _sized(measurement: BladeMeasurement, length_m: float | None) -> BladeMeasurement:
     """The measurement in metres, or in blade lengths where nobody knows its size.
 
     The error of the length that gives the size stretches the edge along and across: a mode.
     """
-    if one.metric:
-        return one
-    factor = (length_m or 1.0) / (one.unit_length or one.length)
-    station, offset = one.station * factor, one.offset * factor
+    if measurement.metric:
+        return measurement
+    factor = (length_m or 1.0) / (measurement.unit_length or measurement.length)
+    station, offset = measurement.station * factor, measurement.offset * factor
     slope = smooth_slope(station, offset) if len(station) > 4 else 0.0
-    size = one.unit_length_sd * (offset - station * slope)
+    size = measurement.unit_length_sd * (offset - station * slope)
     return replace(
-        one,
+        measurement,
         station=station,
         offset=offset,
-        sd=one.sd * factor,
-        modes=np.column_stack([one.modes * factor, size]),
-        mode_names=(*one.mode_names, "size"),
-        length=one.length * factor,
-        hole_radius=one.hole_radius * factor,
+        sd=measurement.sd * factor,
+        modes=np.column_stack([measurement.modes * factor, size]),
+        mode_names=(*measurement.mode_names, "size"),
+        length=measurement.length * factor,
+        hole_radius=measurement.hole_radius * factor,
         metric=length_m is not None,
     )
 
 
-def _columns(one: BladeMeasurement, name: str) -> list[int]:
-    return [index for index, known in enumerate(one.mode_names) if known == name]
+def _columns(measurement: BladeMeasurement, name: str) -> list[int]:
+    return [index for index, known in enumerate(measurement.mode_names) if known == name]
 
 
 def _band(draws: Array) -> Band:
@@ -161,11 +186,11 @@ def _no_height() -> tuple[Array, Array, Band | None]:
 
 
 def _rows(
-    measured: Sequence[BladeMeasurement], cells: Sequence[EdgeCells], best: EdgeComparison
+    measured: Sequence[BladeMeasurement], cells: Sequence[EdgeCells], best: "EdgeComparison"
 ) -> tuple[PhotographRow, ...]:
     rows = []
     begin = 0
-    for one, own in zip(measured, cells, strict=True):
+    for measurement, own in zip(measured, cells, strict=True):
         count = len(own.station)
         residual = best.residual[begin : begin + count]
         begin += count
@@ -175,15 +200,15 @@ def _rows(
         spread = float(np.sqrt(np.mean(np.sum(own.modes[:, own_modes] ** 2, axis=1))))
         rows.append(
             PhotographRow(
-                one.source,
-                len(one.station),
-                one.edge.blur_px,
-                one.edge.good_share,
+                measurement.source,
+                len(measurement.station),
+                measurement.edge.blur_px,
+                measurement.edge.good_share,
                 own.spoilt,
-                one.length,
+                measurement.length,
                 float(residual.mean()),
                 float(np.hypot(spread, best.best.between_m)),
-                one.uncertainty,
+                measurement.uncertainty,
                 tuple(own.station.tolist()),
                 tuple(residual.tolist()),
             )
@@ -192,9 +217,9 @@ def _rows(
 
 
 def _notes(
-    measured: Sequence[BladeMeasurement], best: EdgeComparison, metric: bool
+    measured: Sequence[BladeMeasurement], best: "EdgeComparison", metric: bool
 ) -> tuple[str, ...]:
-    notes = list(dict.fromkeys(one.uncertainty for one in measured))
+    notes = list(dict.fromkeys(measurement.uncertainty for measurement in measured))
     if not metric:
         notes.append(
             "The edge is known up to its size: lengths are in blade lengths. Give the blade's "
@@ -208,3 +233,144 @@ def _notes(
     )
     notes.append(f"{best.sentence} {best.evaluations} evaluations of the edge's likelihood.")
     return tuple(notes)
+
+
+POLYNOMIAL = ("offset_m", "taper_rad", "curvature_per_m", "bend_per_m2")
+
+_COUNT = {"draft": 200, "standard": 300, "thorough": 600}
+
+
+@dataclass(frozen=True)
+class EdgeComparison:
+    """All families compared, their errors' sizes at the optimum, and the chosen one fitted.
+
+    ``belief`` is the edge with its covariance, ``draws`` (n, k) are of its parameters, ``residual``
+    (n,) is of all cells in the order of the photographs. ``status`` and ``sentence`` are the
+    sampler's, ``evaluations`` counts those of the likelihood over all families.
+    """
+
+    rows: tuple[RungRow, ...]
+    belief: EdgeBelief
+    draws: Array
+    residual: Array
+    status: SamplingStatus
+    sentence: str
+    evaluations: int
+
+    @property
+    def best(self) -> RungRow:
+        return next(row for row in self.rows if row.chosen)
+
+
+def compare_edges(
+    data: CellData,
+    effort: Effort,
+    rng: np.random.Generator,
+    families: tuple[Family, ...] = FAMILIES,
+    priors: BladePriors = BladePriors(),
+    progress: Progress | None = None,
+) -> EdgeComparison:
+    """Compare families of edges by their evidence, and fit the chosen one.
+
+    Cells are normal about the edge with five kinds of error: their own noise; roughness of the
+    edge, which neighbours share and every photograph sees; what neighbours of one photograph share
+    (its compression, its light); what moves a whole photograph (its pivot, centreline, mapping);
+    and what is alike in all of them (the print, the camera, its tone curve). All that is linear is
+    integrated in closed form. The sizes of the errors are inferred with it: in every family by
+    their optimum, in the chosen one at the ``effort`` asked for. Evaluations have a limit
+    (`MOST_EVALUATIONS`, `SEARCH_EVALUATIONS`), and ``sentence`` says what came of it.
+    """
+    tell = progress or (lambda done, sentence: None)
+    found, evidences = [], []
+    for number, family in enumerate(families):
+        tell(0.4 * number / len(families), f"comparing edges: {family}")
+        evidences.append(EdgeEvidence(data, basis_of(data, family, priors), priors))
+        found.append(search(evidences[-1]))
+    sizes = [evidence.basis.columns.shape[1] for evidence in evidences]
+    chosen = _chosen(families, sizes, [searched.evidence for searched in found])
+    rows = tuple(
+        _row(data, family, searched, index == chosen)
+        for index, (family, searched) in enumerate(zip(families, found, strict=True))
+    )
+    evidence = evidences[chosen]
+    posterior = infer(
+        evidence.problem(),
+        effort,
+        rng,
+        count=_COUNT[effort],
+        optimum=found[chosen].optimum,
+        options=InferOptions(
+            budget=MOST_EVALUATIONS[effort] or None,
+            progress=lambda done, sentence: tell(0.4 + 0.5 * done, sentence),
+        ),
+    )
+    draws = np.stack([_draw(evidence, u, rng) for u in posterior.draws])
+    residual = data.offset - evidence.basis.columns @ draws.mean(axis=0)
+    belief, natural = _belief(data, families[chosen], draws)
+    others = sum(searched.evaluations for index, searched in enumerate(found) if index != chosen)
+    tell(1.0, f"edge fitted: {families[chosen]}")
+    return EdgeComparison(
+        rows,
+        belief,
+        natural,
+        residual,
+        posterior.status,
+        posterior.sentence,
+        posterior.evaluations + others,
+    )
+
+
+def _row(data: CellData, family: Family, found: Found, chosen: bool) -> RungRow:
+    noise, rough, length, _, *more = (float(size) for size in np.exp(found.optimum.point))
+    between = more[0] if data.several else 0.0
+    return RungRow(family, found.evidence, chosen, noise, rough, length, between)
+
+
+def _chosen(families: Sequence[Family], sizes: Sequence[int], evidences: Sequence[float]) -> int:
+    """The simplest family that the evidence does not distinguish from the best.
+
+    The evidence is the log density of all cells, each predicted from those before it: one unit, as
+    photographs of one blade share its roughness.
+    """
+    rows = compare(families, sizes, [Account(np.array(evidences)[:, None])])
+    return next(index for index, row in enumerate(rows) if row.chosen)
+
+
+def _draw(evidence: EdgeEvidence, u: Array, rng: np.random.Generator) -> Array:
+    """The edge's parameters given the sizes of the errors: a draw from their exact posterior."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    covariance, prior = evidence.covariances(u)
+    factor = cho_factor(covariance, lower=True)
+    columns = evidence.basis.columns
+    scale = np.sqrt(np.diag(prior))
+    information = columns.T @ cho_solve(factor, columns) * np.outer(scale, scale)
+    information += np.linalg.pinv(prior / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+    pull = columns.T @ cho_solve(factor, evidence.data.offset) * scale
+    levels, vectors = np.linalg.eigh(0.5 * (information + information.T))
+    levels = np.maximum(levels, 1e-12 * levels.max())
+    mean = vectors @ ((vectors.T @ pull) / levels)
+    return np.asarray(
+        scale * (mean + vectors @ (rng.standard_normal(len(levels)) / np.sqrt(levels)))
+    )
+
+
+def _belief(data: CellData, family: Family, draws: Array) -> tuple[EdgeBelief, Array]:
+    """The normal distribution that the draws amount to, and the draws in the edge's parameters."""
+    natural = draws.copy()
+    if family == "spline":
+        names = tuple(f"spline_m_{index}" for index in range(draws.shape[1]))
+    else:
+        names = POLYNOMIAL[: draws.shape[1]]
+        natural[:, 1] = np.arctan(draws[:, 1])
+    blank = Edge(
+        family,
+        0.0,
+        0.0,
+        data.length,
+        spline_m=(0.0,) * draws.shape[1] if family == "spline" else (),
+        spline_start_m=data.start if family == "spline" else 0.0,
+    )
+    covariance = np.atleast_2d(np.cov(natural, rowvar=False))
+    edge = EdgeBelief(blank, names, covariance).with_values(natural.mean(axis=0))
+    return EdgeBelief(edge, names, covariance), natural

@@ -7,10 +7,10 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.edge.cells import EdgeCells
-from scissorcal.inference import Cluster, Optimum, Problem
+from scissorcal.inference import Cluster, Effort, Optimum, Problem
 from scissorcal.inference.status import SearchStatus
 from scissorcal.model.bspline import spline_design
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 
 Family = Literal["line", "arc", "cubic", "spline"]
 
@@ -23,6 +23,9 @@ MOVING = ("tilt", "pivot", "centreline", "size")
 
 SEARCH_EVALUATIONS = 150
 """Evaluations of the likelihood with its gradient that each start of a search may take."""
+
+MOST_EVALUATIONS: dict[Effort, int] = {"draft": 0, "standard": 20_000, "thorough": 200_000}
+"""Evaluations of the likelihood that sampling the sizes of the errors may take."""
 
 _HALF_LOG_TWO_PI = 0.5 * float(np.log(2.0 * np.pi))
 _BOUND = 5.0

@@ -6,11 +6,20 @@ from typing import Annotated, Any
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.edge.cells import FoundNick
 from scissorcal.calibration.result import Result, Stored, by_name
 from scissorcal.errors import InputError
 from scissorcal.model import EdgeBelief
 from scissorcal.verdicts import Verdict
+
+
+@dataclass(frozen=True)
+class FoundNick:
+    """Metal missing from the edge, as one photograph shows it: metres from the pivot."""
+
+    station_m: float
+    width_m: float
+    depth_m: float
+    source: str
 
 
 @dataclass(frozen=True)

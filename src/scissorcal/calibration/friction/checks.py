@@ -206,7 +206,7 @@ def _names(experiment: FrictionExperiment, values: Mapping[str, float]) -> list[
     if side_of("viscous_pos", values) is None:
         sides = ("",) if experiment.key["symmetric"] else ("_pos", "_neg")
         offered = [f"viscous{side}" for side in sides]
-    fixed = ("noise", *(one.name for one in layout.parameters if one.believed))
+    fixed = ("noise", *(parameter.name for parameter in layout.parameters if parameter.believed))
     return [*(name for name in layout.names if name not in fixed), *offered]
 
 
@@ -260,7 +260,7 @@ def _searched(
     unit = float(np.std(experiment.observed))
     floor = 1e-6 * unit
     begin = {name: values.get(name, 0.0) for name in names}
-    kinds = {one.name: one.transform for one in experiment.layout.parameters}
+    kinds = {parameter.name: parameter.transform for parameter in experiment.layout.parameters}
     logs = [name for name in names if kinds.get(name, LOG) == LOG and not (free and _signed(name))]
     begin |= {name: max(begin[name], floor) for name in logs}
     scale = {name: max(abs(begin[name]), floor) for name in names}

@@ -1,4 +1,4 @@
-"""The law that is used: chosen among candidates, fitted with the noise that its residuals have."""
+"""Choose the law of friction, and widen its posterior by the lack of fit that is stated."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,8 +11,9 @@ from scissorcal.calibration.comparison import choose
 from scissorcal.calibration.fit_candidate import FittedCandidate, fit_candidate
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.search import scan_nodes
-from scissorcal.inference import Stop, gradient, tails_of
-from scissorcal.model.friction_terms import parts_of
+from scissorcal.inference import Posterior, Stop, gradient, tails_of
+from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, parts_of, side_of
+from scissorcal.model.transforms import LOG, LOGIT
 
 USUAL_LAWS = {"rotary": "stribeck+angle", "linear": "coulomb+viscous"}
 """The law that evidence takes on most days, by the kind of joint: the pivot's on 12 of 12 days of
@@ -128,3 +129,33 @@ def gain_of_build_up(plain: FittedCandidate, rich: FrictionExperiment) -> float:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+def with_lack_of_fit(
+    posterior: Posterior, law: FrictionExperiment, share: float, rng: np.random.Generator
+) -> Posterior:
+    """The posterior with relative errors of ``share`` (sd) in its draws, independent of each other.
+
+    They are of inertia, levels, scales and shares; the offset's is that share of the drive (rms).
+    As for a cut (decision 084), what repeats in every stroke is in no residual. With a share of 0
+    nothing changes, and no random number is drawn.
+    """
+    if share == 0.0:
+        return posterior
+    drive = float(np.sqrt(np.mean(law.observed**2)))
+    values = law.layout.natural(posterior.optimum.point)
+    size = [_size(name, float(values[name]), share, drive) for name in law.layout.names]
+    noise = rng.standard_normal(posterior.draws.shape)
+    return replace(posterior, draws=posterior.draws + np.array(size) * noise)
+
+
+def _size(name: str, value: float, share: float, drive: float) -> float:
+    """Standard deviation of the error of one parameter, in its unconstrained coordinate."""
+    row = PARAMETERS.get(side_of(name, PARAMETERS) or "")
+    if row is None or row.name in NUISANCE:
+        return 0.0
+    if row.transform == LOG:
+        return share
+    if row.transform == LOGIT:
+        return share / max(value * (1.0 - value), share)
+    return share * drive if row.name == "offset" else 0.0

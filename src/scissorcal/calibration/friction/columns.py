@@ -66,12 +66,12 @@ class FrictionBasis:
         ``cogging`` is the number of periods a turn of a torque that repeats, 0 where there is none.
         """
         self.windows, self.cogging, self._center = windows, cogging, angle_center
-        rows = [one for one in terms if windows.load is not None or not one.needs_load]
-        place = sorted((one for one in rows if one.role is Role.PLACE), key=lambda one: one.power)
+        rows = [term for term in terms if windows.load is not None or not term.needs_load]
+        place = sorted((row for row in rows if row.role is Role.PLACE), key=lambda one: one.power)
         self._place = tuple(one.name for one in place)
-        self._plain = tuple(one for one in rows if one.role is Role.PLAIN)
-        self._dry = tuple(one for one in rows if one.role is Role.DRY and not one.scale)
-        self._sliding = tuple(one for one in rows if one.role is Role.SLIDING)
+        self._plain = tuple(row for row in rows if row.role is Role.PLAIN)
+        self._dry = tuple(row for row in rows if row.role is Role.DRY and not row.scale)
+        self._sliding = tuple(row for row in rows if row.role is Role.SLIDING)
         none = np.broadcast_to(0.0, windows.rate.shape)
         load = none if windows.load is None else windows.load
         self.motion = Motion(windows.opening, windows.rate, none, load)

@@ -2,15 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.aliases import Progress
-from scissorcal.calibration.assemble import assemble
+from scissorcal.calibration.assemble import CriticRequest, Particulars, assemble
 from scissorcal.calibration.between import (
     NOT_KNOWN,
     BetweenRecordings,
@@ -18,13 +15,8 @@ from scissorcal.calibration.between import (
     jackknife,
     widened,
 )
-from scissorcal.calibration.effort import candidates_for, draft_note
 from scissorcal.calibration.fit_candidate import FittedCandidate
-from scissorcal.calibration.friction.against_probe import (
-    hidden_from_sweeps,
-    inertia_verdict,
-    with_pushed_inertia,
-)
+from scissorcal.calibration.fit_model import FrictionRun, Outcome, candidates_for, draft_note
 from scissorcal.calibration.friction.checks import (
     BANDWIDTH,
     bandwidth_verdict,
@@ -32,35 +24,38 @@ from scissorcal.calibration.friction.checks import (
     physical_verdict,
     start_verdict,
 )
-from scissorcal.calibration.friction.choice import choose_law, usual_law
-from scissorcal.calibration.friction.cogging import NO_COGGING, Cogging, find_cogging
-from scissorcal.calibration.friction.lack_of_fit import with_lack_of_fit
+from scissorcal.calibration.friction.choice import choose_law, usual_law, with_lack_of_fit
+from scissorcal.calibration.friction.layout import LawChoice
 from scissorcal.calibration.friction.model import FrictionExperiment, design
 from scissorcal.calibration.friction.noise import (
+    NO_COGGING,
+    Cogging,
     cogging_notes,
+    find_cogging,
     noise_diagnostics,
     sample_noise,
     stroke_offsets,
 )
-from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
-from scissorcal.calibration.friction.slow_friction import (
+from scissorcal.calibration.friction.probed import (
     SlowFriction,
+    hidden_from_sweeps,
+    inertia_verdict,
     opened,
     with_probed,
+    with_pushed_inertia,
 )
+from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
+from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import Effort, FitResult, FittedParameter, in_words
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.calibration.signals.idle import idle_noise
-from scissorcal.calibration.signals.interruptions import interruptions
 from scissorcal.calibration.signals.sensors import inspect_sensors
-from scissorcal.calibration.signals.soundness import refuse_unsound
+from scissorcal.calibration.signals.soundness import interruptions, refuse_unsound
 from scissorcal.calibration.signals.steadiness import Steadiness, steadiness
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
 from scissorcal.calibration.signals.window_length import HALF_AT
-from scissorcal.calibration.signals.zeros import FELT, DriveZero, without_zeros, zero_verdicts
-from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.inference import Posterior, Stop, infer
+from scissorcal.calibration.signals.zeros import DriveZero, idle_noise, without_zeros, zero_verdicts
+from scissorcal.inference import InferOptions, Posterior, infer
 from scissorcal.model.friction_terms import NUISANCE, needs_load
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.probe import newest_probe
@@ -78,13 +73,7 @@ def fit_friction(
     *,
     effort: Effort,
     rng: np.random.Generator,
-    progress: Progress | None = None,
-    checkpoint: Path | None = None,
-    last_chosen: str | None = None,
-    stop: Stop | None = None,
-    prior: StatedPrior | None = None,
-    critic: bool = False,
-    tolerance: float = FELT,
+    run: FrictionRun = FrictionRun(),
 ) -> FitResult:
     """Identify friction, inertia and offset from recordings of empty motion.
 
@@ -93,14 +82,10 @@ def fit_friction(
     ``settings`` name one. Units follow the recordings' joint. Two or more recordings are also
     fitted each by itself, and draws widened by what they differ in.
 
-    ``checkpoint`` is a file from which an interrupted thorough fit goes on, ``last_chosen`` the law
-    of draft effort where the recipe leaves several, ``prior`` that of a study of simulated data,
-    which goes without the verdicts and diagnostics of this fit alone; ``stop`` says whether the
-    time is used up. ``critic`` asks for the critic at draft effort too; ``tolerance`` is the share
-    of torque by which what it finds is judged. Raises InputError where there is too little motion,
-    a value is no measurement, or a stroke is a copy of another.
+    Raises InputError where there is too little motion, a value is no measurement, or a stroke is a
+    copy of another.
     """
-    tell = progress or (lambda done, sentence: None)
+    prior = run.prior
     refuse_unsound(recordings)
     joint = recordings[0].joint if recordings else Joint()
     sensors = inspect_sensors(recordings)
@@ -112,21 +97,25 @@ def fit_friction(
         usable, cutoff_Hz = sensors.usable, settings.cutoff_Hz
         return _slid(steady, cleaned, cutoff_Hz, usable, window_Hz=window_Hz), zero
 
-    every, zero = weighed()
-    windows = every.where(every.bins.moving)
-    usage = usage_of_windows(recordings, every, sensors.usable)
-    refuse_friction(recordings, settings, every, windows, sensors, usage)
-    left_out = 1.0 - len(windows.first) / len(every.first)
-    del every  # half of what a long recording's windows take
+    whole, zero = weighed()
+    windows = whole.where(whole.bins.moving)
+    usage = usage_of_windows(recordings, whole, sensors.usable)
+    refuse_friction(recordings, settings, whole, windows, sensors, usage)
+    left_out = 1.0 - len(windows.first) / len(whole.first)
+    del whole  # half of what a long recording's windows take
     slow = SlowFriction.of(recordings, windows.bins, settings)
     settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
     near = prior.laws if prior else ()
-    laws = list(candidates_for(effort, every_law, usual_law, last_chosen, near))
-    compared, chosen, law, passed = choose_law(laws, settings.lack_of_fit, stop, tell)
-    infer_law = partial(infer, checkpoint=checkpoint, stop=stop, progress=_last_part(tell))
+    laws = list(candidates_for(effort, every_law, usual_law, run.last_chosen, near))
+    compared, chosen, law, passed = choose_law(laws, settings.lack_of_fit, run.stop, run.tell)
+    options = InferOptions(
+        checkpoint=run.checkpoint,
+        stop=run.stop,
+        progress=lambda done, sentence: run.tell(0.6 + 0.4 * done, f"friction: {sentence}"),
+    )
     problem = chosen.candidate.problem(law.series)
-    posterior = infer_law(problem, effort, rng, optimum=chosen.optimum)
+    posterior = infer(problem, effort, rng, optimum=chosen.optimum, options=options)
     if prior is None:  # a study simulates the law itself
         posterior = with_lack_of_fit(posterior, law, settings.lack_of_fit, rng)
         posterior = opened(posterior, law, slow, chosen.held_out_rms, rng)
@@ -150,40 +139,28 @@ def fit_friction(
             *(v.of("fit.friction") for v in zero_verdicts(zero, recordings, drive)),
             *((between.verdict(),) if between else ()),
         )
+    notes = (
+        *sensors.notes,
+        *_notes(left_out, windows, posterior, joint, cogging),
+        *_symmetry_note(law, chosen),
+        *passed,
+        *draft_note(effort, every_law, laws),
+        usage.sentence,
+        *(between.notes((*NUISANCE, *unshown)) if between else (NOT_KNOWN,)),
+    )
+    diagnostics = {} if prior else _diagnostics(law, chosen, between, recordings)
+    structure = {**chosen.candidate.key, "joint": joint.kind, **_tails_if_heavy(chosen)}
     fit = assemble(
-        what="friction",
-        effort=effort,
-        posterior=posterior,
-        compared=compared,
-        chosen=chosen,
-        structure={**chosen.candidate.key, "joint": joint.kind, **_tails_if_heavy(chosen)},
-        bins=law.bins,
-        strokes=law.strokes,
-        measured=law.observed,
-        contact=np.full_like(law.observed, np.nan),
-        recordings=recordings,
-        joint=joint,
-        nuisance=NUISANCE,
-        rng=rng,
-        critic=critic or (settings.critic and effort != "draft"),
-        tolerance=None if prior else tolerance,
-        known=("time",) if zero and np.isfinite(zero.drift) else (),
-        usage=usage,
-        brief=prior is not None,
-        extra_verdicts=verdicts,
-        extra_notes=(
-            *sensors.notes,
-            *_notes(left_out, windows, posterior, joint, cogging),
-            *_symmetry_note(law, chosen),
-            *passed,
-            *draft_note(effort, every_law, laws),
-            usage.sentence,
-            *(between.notes((*NUISANCE, *unshown)) if between else (NOT_KNOWN,)),
+        Outcome(law, effort, compared, chosen, posterior, structure, simulated=prior is not None),
+        recordings,
+        usage,
+        Particulars(verdicts, notes, diagnostics | (zero.as_dict() if zero else {})),
+        CriticRequest(
+            run.critic or (settings.critic and effort != "draft"),
+            tolerance=None if prior else run.tolerance,
+            known=("time",) if zero and np.isfinite(zero.drift) else (),
         ),
-        extra_diagnostics={
-            **({} if prior else _diagnostics(law, chosen, between, recordings)),
-            **(zero.as_dict() if zero else {}),
-        },
+        rng,
     )
     # A study of simulated data asks what sweeps tell: its recordings hold the rig's own probe.
     return fit if prior else with_pushed_inertia(fit, law, recordings, rng)
@@ -203,23 +180,11 @@ def friction_experiment(
     every = _slid(steadiness(recordings), cleaned, settings.cutoff_Hz, usable)
     windows = every.where(every.bins.moving)
     settings = with_probed(settings, SlowFriction.of(recordings, windows.bins, settings))
-    law, symmetric = str(fit.structure["law"]), bool(fit.structure["symmetric"])
-    adopt = tuple(fit.structure.get("adopt", ()))
-    cogging = float(fit.structure.get("cogging_periods_per_turn", 0.0))
-    strokes = _strokes(windows.bins)
-    found = design(
-        windows,
-        strokes,
-        law,
-        symmetric,
-        joint,
-        settings.priors,
-        adopt,
-        cogging,
-        zero_sd=zero.sd if zero and _has_offset(fit) else None,
-    )
+    zero_sd = zero.sd if zero and _has_offset(fit) else None
+    choice = LawChoice.of(fit.structure, zero_sd)
+    law = design(windows, _strokes(windows.bins), choice, joint, settings.priors)
     tails = float(fit.structure.get("tails", np.inf))
-    return replace(found, tails=tails, share=float(fit.diagnostics["independent_share"]))
+    return replace(law, tails=tails, share=float(fit.diagnostics["independent_share"]))
 
 
 def _slid(
@@ -247,11 +212,6 @@ def _has_offset(fit: FitResult) -> bool:
     return any(parameter.name == "offset" for parameter in fit.parameters)
 
 
-def _last_part(tell: Progress) -> Progress:
-    """The progress of inference, as the last part of the fit's."""
-    return lambda done, sentence: tell(0.6 + 0.4 * done, f"friction: {sentence}")
-
-
 def _diagnostics(
     law: FrictionExperiment,
     chosen: FittedCandidate,
@@ -261,7 +221,7 @@ def _diagnostics(
     """What a fit stores beside its parameters: noise, scatter of strokes and of recordings."""
     point = chosen.optimum.point
     noise = sample_noise(law, point, idle_noise(recordings))
-    probe = newest_probe(one.device for one in recordings)
+    probe = newest_probe(recording.device for recording in recordings)
     seen = probe.facts if probe else {}
     residuals = chosen.candidate.likelihood.residuals(point)
     return {
@@ -385,14 +345,14 @@ def _laws(
     both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}
     strokes = _strokes(windows.bins)
 
-    def one(law: str, symmetric: bool, periods: float = 0.0) -> FrictionExperiment:
-        priors, adopt = settings.priors, settings.adopt
-        sd = zero.sd if zero else None
-        return design(windows, strokes, law, symmetric, joint, priors, adopt, periods, prior, sd)
+    def over(law: str, symmetric: bool, periods: float = 0.0) -> FrictionExperiment:
+        zero_sd = zero.sd if zero else None
+        choice = LawChoice(law, symmetric, settings.adopt, periods, zero_sd)
+        return design(windows, strokes, choice, joint, settings.priors, prior)
 
-    plain = one(names[0], False)
+    plain = over(names[0], False)
     cogging = NO_COGGING if joint.kind == "linear" else find_cogging(plain.moments)
     periods = cogging.periods_per_turn if cogging.found else 0.0
-    laws = [one(law, symmetric, periods) for law in names for symmetric in both[settings.symmetry]]
+    laws = [over(law, symmetric, periods) for law in names for symmetric in both[settings.symmetry]]
     shared = laws[0].moments if periods else plain.moments
     return [replace(law, shared=shared) for law in laws], cogging

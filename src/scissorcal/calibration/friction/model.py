@@ -10,13 +10,12 @@ import numpy as np
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.fit_candidate import Candidate, Likelihood
 from scissorcal.calibration.friction.columns import SCALES, FrictionBasis
-from scissorcal.calibration.friction.layout import Drive, friction_layout, friction_precision
+from scissorcal.calibration.friction.layout import LawChoice, friction_layout, friction_precision
 from scissorcal.calibration.friction.moments import ReducedLaw, StrokeMoments
 from scissorcal.calibration.friction.search import search
-from scissorcal.calibration.parameters import Layout
+from scissorcal.calibration.parameters import Layout, StatedPrior
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.weak_form import Windows
-from scissorcal.calibration.stated_prior import StatedPrior
 from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, side_of, terms_of
 from scissorcal.model.terms import Role, Term
 from scissorcal.model.transforms import LOG
@@ -121,6 +120,10 @@ class FrictionExperiment:
         """
         return self.basis.drive(values)
 
+    def contact(self, point: Array) -> Array:
+        """Nothing is cut: NaN (n,)."""
+        return np.full_like(self.observed, np.nan)
+
     def candidate(self, measured: Array) -> Candidate:
         """Give the law over ``measured`` (n,), ready to be fitted."""
 
@@ -217,32 +220,24 @@ class FrictionExperiment:
 def design(
     windows: Windows,
     strokes: Integers,
-    law: str,
-    symmetric: bool,
+    choice: LawChoice,
     joint: Joint,
     priors: JointPriors,
-    adopt: tuple[str, ...] = (),
-    cogging: float = 0.0,
     prior: StatedPrior | None = None,
-    zero_sd: float | None = None,
 ) -> FrictionExperiment:
-    """One law over windows, with the recipe's priors, or those of ``prior`` where it states them.
-
-    ``cogging`` is the number of its periods a turn, 0 where there is none; ``zero_sd`` how well the
-    sensors' zeros are known.
-    """
+    """One law over windows, with the recipe's priors, or those that ``prior`` states."""
     opening = windows.bins.opening
     center = float(np.round(np.mean([opening.min(), opening.max()]), 3))
     key: dict[str, Any] = {
-        "law": law,
-        "symmetric": symmetric,
+        "law": choice.name,
+        "symmetric": choice.symmetric,
         "angle_center": center,
-        "adopt": list(adopt),
+        "adopt": list(choice.adopt),
     }
-    if cogging:
-        key["cogging_periods_per_turn"] = cogging
-    drive = Drive(bool(cogging), windows.tick_s if windows.held else None, zero_sd)
-    layout = friction_layout(law, symmetric, joint, priors.of(joint.kind), adopt, drive)
+    if choice.cogging:
+        key["cogging_periods_per_turn"] = choice.cogging
+    held_tick_s = windows.tick_s if windows.held else None
+    layout = friction_layout(choice, joint, priors.of(joint.kind), held_tick_s)
     precision = friction_precision(layout)
     if prior is not None:
         precision = prior.precision(layout, precision)

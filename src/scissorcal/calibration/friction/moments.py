@@ -16,7 +16,7 @@ import numpy as np
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.friction.columns import SCALES, Cell, FrictionBasis, coupled_nodes
 from scissorcal.calibration.parameters import Layout
-from scissorcal.inference.ar_noise import runs
+from scissorcal.inference.noise import runs
 from scissorcal.model.transforms import IDENTITY, Transform
 
 Block = tuple[str, int, int]
@@ -58,10 +58,10 @@ class StrokeMoments:
             if (b, a) in self._products:
                 return np.asarray(self._products[b, a].transpose(0, 2, 1))
             left, right = self._columns(a), self._columns(b)
-            found = np.zeros((len(self.labels), len(left), len(right)))
+            sums = np.zeros((len(self.labels), len(left), len(right)))
             for stroke, low, high in self._runs:
-                found[stroke] += left[:, low:high] @ right[:, low:high].T
-            self._products[a, b] = found
+                sums[stroke] += left[:, low:high] @ right[:, low:high].T
+            self._products[a, b] = sums
         return self._products[a, b]
 
     def squares(self, cell: Cell, factors: Array) -> Array:
@@ -251,7 +251,7 @@ class ReducedLaw:
     @cached_property
     def _transformed(self) -> list[tuple[Transform, Integers]]:
         """Each transform but the identity, with the places of its parameters."""
-        own = [one.transform for one in self.layout.parameters]
+        own = [parameter.transform for parameter in self.layout.parameters]
         kinds = [one for one in dict.fromkeys(own) if one != IDENTITY]
         return [(kind, np.flatnonzero([one == kind for one in own])) for kind in kinds]
 

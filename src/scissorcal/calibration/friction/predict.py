@@ -8,6 +8,7 @@ import numpy as np
 
 from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.friction.columns import FrictionBasis
+from scissorcal.calibration.friction.layout import LawChoice
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.search import search_from
 from scissorcal.calibration.friction.transmission import LoadSolver, two_ended
@@ -100,10 +101,8 @@ def effort_band(design: FrictionExperiment, fit: FitResult, level: float = 0.9) 
     folds = _Folds.of(design, fit)
     return _band(
         folds,
-        design.strokes,
-        design.bins.recording,
+        _Judged(design.strokes, design.bins.recording, np.ones(len(design.observed), dtype=bool)),
         lambda point: design.observed - design.mean(point),
-        np.ones(len(design.observed), dtype=bool),
         level,
         folds.freedom(),
     )
@@ -128,10 +127,8 @@ def load_band(
     folds = _Folds.of(design, fit)
     return _band(
         folds,
-        _carried(design, windows),
-        windows.bins.recording,
+        _Judged(_carried(design, windows), windows.bins.recording, windows.bins.moving),
         lambda point: solver(design.layout.natural(point)) - measured,
-        windows.bins.moving,
         level,
         float(len(folds.recordings)),
     )
@@ -151,12 +148,12 @@ def predict_effort(
     cleaned = recordings if known is None else without_zeros(recordings, known.sd, known)[0]
     windows = weigh(cleaned, cutoff_Hz)
     bins = windows.bins
-    adopt = tuple(fit.structure.get("adopt", ()))
+    choice = LawChoice.of(fit.structure)
     basis = FrictionBasis(
         windows,
         float(fit.structure["angle_center"]),
-        terms_of(str(fit.structure["law"]), adopt),
-        cogging=float(fit.structure.get("cogging_periods_per_turn", 0.0)),
+        terms_of(choice.name, choice.adopt),
+        cogging=choice.cogging,
     )
     values = _values(fit)
     values.pop("delay", None)
@@ -231,18 +228,17 @@ def _quantile(ascending: Array, mass: Array, level: float) -> float:
 
 def _band(
     folds: "_Folds",
-    strokes: Integers,
-    recordings: Integers,
+    judged: "_Judged",
     errors: Callable[[Array], Array],
-    moving: Mask,
     level: float,
     freedom: float,
 ) -> Band:
-    """The band of windows (n,) in ``strokes`` and ``recordings``; ``errors`` (n,) are by a point.
+    """The band of the windows that are ``judged``; ``errors`` (n,) are by a point.
 
     Strokes are the units until recordings are enough; ``freedom`` is that of the recordings' mean
     squared error.
     """
+    strokes, recordings, moving = judged.strokes, judged.recordings, judged.moving
     left_out = np.full(len(moving), np.nan)
     whole = np.full(len(moving), np.nan)
     labels, several = folds.strokes, folds.recordings
@@ -270,6 +266,15 @@ def _band(
 
 
 @dataclass(frozen=True)
+class _Judged:
+    """Windows (n,) whose errors are judged: their strokes, recordings, and whether they move."""
+
+    strokes: Integers
+    recordings: Integers
+    moving: Mask
+
+
+@dataclass(frozen=True)
 class _Folds:
     """A law without some of its ``strokes`` (k,), or one of its ``recordings`` (r,), at a time."""
 
@@ -287,8 +292,7 @@ class _Folds:
                 "A band needs hold-out strokes, and there is only one stroke: record several "
                 "strokes, or two recordings, and fit again."
             )
-        values = {name: float(value) for name, value in _values(fit).items()}
-        return cls(normal, design.layout.unconstrained(values), strokes, recordings)
+        return cls(normal, design.layout.unconstrained(fit.best), strokes, recordings)
 
     def of_recording(self, label: int) -> Integers:
         """The strokes of one recording."""
@@ -326,8 +330,7 @@ class _Folds:
 
 def _values(fit: FitResult) -> dict[str, Array]:
     """The fit's best point by name, nuisance parameters at their means."""
-    values = {p.name: np.asarray(v) for p, v in zip(fit.parameters, fit.map_point, strict=True)}
-    return values | {p.name: np.asarray(p.mean) for p in fit.nuisance}
+    return {name: np.asarray(value) for name, value in fit.best.items()}
 
 
 def _carried(design: FrictionExperiment, windows: Windows) -> Integers:

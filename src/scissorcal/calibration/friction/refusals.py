@@ -4,9 +4,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from scissorcal.calibration.signals.filtering import Bins, position_error
-from scissorcal.calibration.signals.interruptions import interruptions
 from scissorcal.calibration.signals.segments import gaps_in_words
 from scissorcal.calibration.signals.sensors import Sensors
+from scissorcal.calibration.signals.soundness import interruptions
 from scissorcal.calibration.signals.usage import EDGE, GAP, INVALID, SLOW, Usage
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.errors import InputError
@@ -26,7 +26,7 @@ STROKE_WINDOWS = 2.0
 def refuse_friction(
     recordings: tuple[Recording, ...],
     settings: FitFriction,
-    every: Windows,
+    recorded: Windows,
     windows: Windows,
     sensors: Sensors,
     usage: Usage,
@@ -34,7 +34,7 @@ def refuse_friction(
     """Raise InputError where the moving windows cannot determine what ``settings`` ask for."""
     joint = recordings[0].joint
     if len(windows.first) < FEWEST_BINS:
-        raise _too_little(recordings, every, windows, sensors, usage)
+        raise _too_little(recordings, recorded, windows, sensors, usage)
     _refuse_poor_motion(windows.bins, recordings, joint)
     _refuse_drift(windows.bins, recordings, joint)
     _refuse_terms(settings, windows, joint)
@@ -42,7 +42,7 @@ def refuse_friction(
 
 def _too_little(
     recordings: tuple[Recording, ...],
-    every: Windows,
+    recorded: Windows,
     windows: Windows,
     sensors: Sensors,
     usage: Usage,
@@ -52,7 +52,7 @@ def _too_little(
     The cause is what most of the time was lost to, not the last filter that found nothing.
     """
     lost, broken = usage.lost, interruptions(recordings)
-    needed_s, used_s = FEWEST_BINS * every.bins.bin_s, len(windows.first) * every.bins.bin_s
+    needed_s, used_s = FEWEST_BINS * recorded.bins.bin_s, len(windows.first) * recorded.bins.bin_s
     parted = lost.get(GAP, 0.0) + lost.get(EDGE, 0.0)
     slow, invalid = lost.get(SLOW, 0.0), lost.get(INVALID, 0.0)
     if invalid > max(slow, parted) and sensors.verdict.status == "fail":
@@ -65,21 +65,21 @@ def _too_little(
             "Record for longer, and without losing samples."
         )
     else:
-        cause = _motion_cause(recordings, every)
+        cause = _motion_cause(recordings, recorded)
     names = ", ".join(recording.source or "the recording" for recording in recordings)
     return InputError(
         f"{names}: {used_s:.3g} s of motion are left to fit, and friction needs at least "
-        f"{needed_s:.3g} s. {cause} {usage.counted}: {len(windows.first)} of {len(every.first)} "
+        f"{needed_s:.3g} s. {cause} {usage.counted}: {len(windows.first)} of {len(recorded.first)} "
         "windows."
     )
 
 
-def _motion_cause(recordings: tuple[Recording, ...], every: Windows) -> str:
+def _motion_cause(recordings: tuple[Recording, ...], recorded: Windows) -> str:
     """Why the joint's own motion leaves too few windows without a rest or a turn."""
-    unit, floor = recordings[0].joint.position_unit, every.bins.rate_floor
-    travel = max(float(np.ptp(one.samples["opening"])) for one in recordings)
-    below = float(np.mean(np.abs(every.rate) <= floor)) if len(every.rate) else 1.0
-    window_s, stroke_s = len(every.weights) * every.tick_s, _stroke_s(recordings)
+    unit, floor = recordings[0].joint.position_unit, recorded.bins.rate_floor
+    travel = max(float(np.ptp(recording.samples["opening"])) for recording in recordings)
+    below = float(np.mean(np.abs(recorded.rate) <= floor)) if len(recorded.rate) else 1.0
+    window_s, stroke_s = len(recorded.weights) * recorded.tick_s, _stroke_s(recordings)
     if stroke_s < STROKE_WINDOWS * window_s:
         return (
             f"The joint turns too soon: half of the strokes last less than {stroke_s:.2g} s, and "
@@ -104,17 +104,19 @@ def _motion_cause(recordings: tuple[Recording, ...], every: Windows) -> str:
 def _stroke_s(recordings: tuple[Recording, ...]) -> float:
     """Median time of the strokes; infinite where there are none."""
     found = [
-        float(np.median(np.diff(one.device_time_s))) * np.bincount(label[label >= 0])
-        for one in recordings
-        if np.any((label := np.asarray(one.samples["stroke"], dtype=np.int64)) >= 0)
+        float(np.median(np.diff(recording.device_time_s))) * np.bincount(label[label >= 0])
+        for recording in recordings
+        if np.any((label := np.asarray(recording.samples["stroke"], dtype=np.int64)) >= 0)
     ]
     return float(np.median(np.concatenate(found))) if found else float("inf")
 
 
 def _hiding(recordings: tuple[Recording, ...], unit: str) -> str:
     """What hides the sense of motion: the encoder's step, or the noise of the position."""
-    errors = [position_error(np.asarray(one.samples["opening"], float)) for one in recordings]
-    worst = max(errors, key=lambda one: one.sd)
+    errors = [
+        position_error(np.asarray(recording.samples["opening"], float)) for recording in recordings
+    ]
+    worst = max(errors, key=lambda error: error.sd)
     if np.isfinite(worst.step) and worst.sd < worst.step:
         turned = f" ({np.degrees(worst.step):.3g} deg)" if unit == "rad" else ""
         return f"the encoder's step of {worst.step:.3g} {unit}{turned}"

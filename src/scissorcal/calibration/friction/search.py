@@ -9,7 +9,7 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.fit_candidate import CandidateProblem
 from scissorcal.calibration.friction.columns import Cell
 from scissorcal.calibration.friction.moments import ReducedLaw
-from scissorcal.inference.least_squares import least_squares
+from scissorcal.inference.ascent import least_squares
 from scissorcal.inference.optimise import Cluster, Optimum, is_rounded
 from scissorcal.inference.problem import Problem
 from scissorcal.inference.status import SearchStatus, about, picked
@@ -45,12 +45,12 @@ def search(problem: CandidateProblem) -> Optimum:
     """
     starts = [*problem.starts, *_scanned(problem)]
     ended = [search_from(problem, start) for start in starts]
-    best = max(ended, key=lambda one: one.value)
-    agreeing = sum(one.value > best.value - SAME_HEIGHT for one in ended)
+    best = max(ended, key=lambda end: end.value)
+    agreeing = sum(end.value > best.value - SAME_HEIGHT for end in ended)
     optima: list[Cluster] = []
-    for one in sorted(ended, key=lambda one: -one.value):
-        if all(np.abs((one.point - c.point) / problem.prior_sd).max() > 1e-3 for c in optima):
-            optima.append(Cluster(one.point, one.value, 1, True))
+    for end in sorted(ended, key=lambda end: -end.value):
+        if all(np.abs((end.point - c.point) / problem.prior_sd).max() > 1e-3 for c in optima):
+            optima.append(Cluster(end.point, end.value, 1, True))
     optima = [c for i, c in enumerate(optima) if i == 0 or _dips(problem, optima[0], c)]
     status, concerns = _status(problem, best.point)
     sentence = about(status, concerns)
@@ -63,7 +63,7 @@ def search(problem: CandidateProblem) -> Optimum:
         sentence=sentence,
         agreeing=agreeing,
         starts=len(ended),
-        evaluations=sum(one.evaluations for one in ended),
+        evaluations=sum(end.evaluations for end in ended),
         status=status,
         optima=tuple(optima),
         concerns=concerns,
@@ -165,7 +165,7 @@ def _scanned(problem: CandidateProblem) -> list[Array]:
     for rate, length in product(rates, lengths):
         cell: Cell = (() if rate is None else (rate,), (length,))
         found.append((_free_squares(law, problem.starts[0], cell), rate, length))
-    found.sort(key=lambda one: one[0])
+    found.sort(key=lambda end: end[0])
     starts: list[Array] = []
     taken: list[int] = []
     for _, rate, length in found:

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scissorcal.calibration.camera.checks import MOST_SD_PX
-from scissorcal.calibration.camera.there import CameraThere
+from scissorcal.calibration.camera.checks import MOST_SD_PX, CameraThere
 from scissorcal.calibration.plate.result import Halves, PoseView
 from scissorcal.verdicts import STATED, Check, Verdict
 from scissorcal.vision.geometry.board_pose import ODDS, BoardPose

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.calibration.camera.checks import CameraThere
 from scissorcal.calibration.camera.result import PixelMap
-from scissorcal.calibration.camera.there import CameraThere
 from scissorcal.calibration.plate.checks import plate_verdicts
 from scissorcal.calibration.plate.result import Halves, PlateFit, PoseView
 from scissorcal.errors import InputError, MissingError, VerdictError
-from scissorcal.recipe.photograph_priors import PlatePriors
+from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference
@@ -77,8 +77,8 @@ def fit_plate(
     halves = _halves(corners, camera, priors)
     back = plate_target.inverse()
     views = tuple(
-        _view(photo, found, whole, corners.frame == i)
-        for i, (photo, found) in enumerate(zip(photos, alone, strict=True))
+        _view(photo, located, whole, corners.frame == i)
+        for i, (photo, located) in enumerate(zip(photos, alone, strict=True))
     )
     pose = whole.pose.after(back)
     in_rig = rig.holds(whole, camera).after(back) if rig else None

@@ -20,7 +20,7 @@ from scissorcal.recipe.euler_angles import (
     euler_deg,
     one_rotation,
 )
-from scissorcal.vision.located_frames import State
+from scissorcal.vision.live import State
 
 
 class TrackPose(BaseModel):

@@ -123,12 +123,12 @@ def no_piece(recordings: tuple[Recording, ...]) -> InputError:
 
 def gaps_in_words(recordings: tuple[Recording, ...]) -> str:
     """How many gaps there are, the longest with its place, and the longest stretch between them."""
-    recordings = tuple(one for one in recordings if len(one.samples) > 1)
-    steps = [np.diff(one.device_time_s) for one in recordings]
+    recordings = tuple(recording for recording in recordings if len(recording.samples) > 1)
+    steps = [np.diff(recording.device_time_s) for recording in recordings]
     wide = [np.asarray(step > GAP_FACTOR * np.median(step)) for step in steps]
     count = sum(int(np.count_nonzero(one)) for one in wide)
     if not count:
-        seconds = max((one.duration_s for one in recordings), default=0.0)
+        seconds = max((recording.duration_s for recording in recordings), default=0.0)
         return f"There are no gaps, and the longest recording lasts {seconds:.3g} s."
     index = int(np.argmax([step.max(initial=0.0) for step in steps]))
     at = int(np.argmax(steps[index]))

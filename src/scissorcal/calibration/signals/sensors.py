@@ -9,7 +9,7 @@ import numpy as np
 
 from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.segments import still_clock, stretches
-from scissorcal.recording.marks import marks_in
+from scissorcal.recording.faulty_values import marks_in
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of
 from scissorcal.verdicts import Check, Verdict
@@ -62,8 +62,9 @@ class Channel:
     ``step`` is its resolution (NaN: none to be seen), ``saturated`` and ``dead`` (m,) mark
     samples at an end of its range and within a dead band; ``low`` and ``high`` are those ends.
     ``marks`` are values in the place of a measurement (see
-    :func:`~scissorcal.recording.marks.marks_in`); their samples count as saturated. ``at_ends`` is
-    the share of samples at ``low`` or ``high``, whether or not the sensor is cut off there.
+    :func:`~scissorcal.recording.faulty_values.marks_in`); their samples count as saturated.
+    ``at_ends`` is the share of samples at ``low`` or ``high``, whether or not the sensor is cut off
+    there.
     ``held`` are the first sample, and the one past the last, of the longest run of one value within
     the range that noise does not repeat so often, while the joint moves; None where there is none.
     """

@@ -13,8 +13,8 @@ from scissorcal.calibration.signals.sensors import (
     held_sentence,
     mark_sentence,
 )
+from scissorcal.recording.faulty_values import lone_excursion
 from scissorcal.recording.layout import unit_of
-from scissorcal.recording.marks import lone_excursion
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.summarising import Gaps, find_gaps
 
@@ -75,10 +75,10 @@ def survey(recording: Recording, measured: Iterable[str]) -> Survey:
         interval_high_ms=float(high_ms),
         longest_ms=float(intervals_ms.max()),
         gaps=find_gaps(recording.samples),
-        sensors=tuple(_sensor(recording, one) for one in channels),
+        sensors=tuple(_sensor(recording, channel) for channel in channels),
         closings=counts["closing"],
         openings=counts["opening"],
-        notes=tuple(said for one in channels for said in _told(recording, one)),
+        notes=tuple(said for channel in channels for said in _told(recording, channel)),
     )
 
 

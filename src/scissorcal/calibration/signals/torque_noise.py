@@ -63,7 +63,7 @@ def torque_noise(
     kept = [k for k, one in enumerate(stretches) if len(one) > 2 * LENGTHS[0]]
     if not kept:
         return None
-    moved = momenta or tuple(np.zeros(len(one)) for one in stretches)
+    moved = momenta or tuple(np.zeros(len(stretch)) for stretch in stretches)
     tables = np.stack([_squares(stretches[k], moved[k] / tick_s) for k in kept])
     if tables[:, -1, 1].sum() < FEWEST_SUMS:
         return None

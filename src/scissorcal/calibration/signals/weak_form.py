@@ -209,7 +209,7 @@ def _common_knot(recordings: tuple[Recording, ...], cutoff_Hz: float) -> int:
 
     Raises InputError where rates differ by so much that it would differ by half a sample.
     """
-    timed = [one for one in recordings if len(one.samples) > 1]
+    timed = [recording for recording in recordings if len(recording.samples) > 1]
     rates = [1.0 / usual_tick(one) for one in timed]
     knot = knot_samples(cutoff_Hz, max(rates))
     if max(rates) - min(rates) > 0.5 * min(rates) / knot:

@@ -10,17 +10,16 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.comparison import names_of_contenders
 from scissorcal.calibration.cut import fit_cut
 from scissorcal.calibration.cut.known import KnownFriction
-from scissorcal.calibration.cut.path import torque_noise_of
+from scissorcal.calibration.cut.path_work import torque_noise_of
+from scissorcal.calibration.fit_model import CutRun, FrictionRun
 from scissorcal.calibration.friction.fit import fit_friction
-from scissorcal.calibration.parameters import Layout
+from scissorcal.calibration.parameters import Layout, StatedPrior
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
-from scissorcal.calibration.stated_prior import StatedPrior
-from scissorcal.calibration.verify.simulation import (
-    Motion,
+from scissorcal.calibration.verify.simulated_motion import Motion, motion_of
+from scissorcal.calibration.verify.simulated_recordings import (
     cut_truth,
     friction_truth,
-    motion_of,
     simulate_cut,
     simulate_friction,
 )
@@ -97,8 +96,7 @@ class FrictionSimulator:
             self.settings,
             effort=effort,
             rng=rng,
-            last_chosen=self.rung,
-            prior=replace(prior, laws=self.contenders),
+            run=FrictionRun(last_chosen=self.rung, prior=replace(prior, laws=self.contenders)),
         )
 
     @property
@@ -157,9 +155,9 @@ class CutSimulator:
             self.friction,
             effort=effort,
             rng=rng,
-            edge=self.edge,
-            last_chosen=self.rung,
-            prior=replace(prior, laws=self.contenders),
+            run=CutRun(
+                edge=self.edge, last_chosen=self.rung, prior=replace(prior, laws=self.contenders)
+            ),
         )
 
 

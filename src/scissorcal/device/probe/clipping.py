@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.device.probe.result import MOTORS, Estimate
+from scissorcal.device.probe.guards import MOTORS
 from scissorcal.device.probe.talk import RELEASE, Answer, Stage, StalledError, Talk
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import ConfigKey, StateFlag
+from scissorcal.recording.probe import Estimate
 from scissorcal.verdicts import Check, Verdict
 
 ATTEMPTS = 3

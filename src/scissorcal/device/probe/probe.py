@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from scissorcal.device.link import PortLink
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.probe.clipping import clipping
+from scissorcal.device.probe.guards import REAL_TIME
 from scissorcal.device.probe.hand_pass import (
     HandPass,
     by_virtual_hand,
@@ -31,7 +32,6 @@ from scissorcal.device.probe.judge_push import (
 from scissorcal.device.probe.lag import judge_lag, lag
 from scissorcal.device.probe.measured_torque import follow
 from scissorcal.device.probe.pushes import axis_of, push
-from scissorcal.device.probe.result import REAL_TIME, Estimate, ProbeResult
 from scissorcal.device.probe.search import search, sense
 from scissorcal.device.probe.swings import Swung, swings
 from scissorcal.device.probe.talk import Bounds, RunawayError, Talk
@@ -42,6 +42,7 @@ from scissorcal.errors import DeviceError, InputError
 from scissorcal.identity import digest
 from scissorcal.kernel import Capability, ConfigKey, Identity
 from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.probe import Estimate, ProbeResult
 from scissorcal.verdicts import Verdict, failed
 
 REQUEST = (

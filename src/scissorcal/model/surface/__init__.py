@@ -4,11 +4,20 @@ All in the plate's frame: x along the cut from the near edge, y to the left of t
 the upper face. A surface passes through the origin with its normal along +z, a probed one nearly.
 """
 
-from scissorcal.model.surface.differential import curvatures, nearest, normal, shape_operator
 from scissorcal.model.surface.height_field import HeightField
 from scissorcal.model.surface.probed import ProbedSurface, fit_height_field
-from scissorcal.model.surface.protocol import NearestPoints, Surface, SurfacePoint
-from scissorcal.model.surface.quadrics import Cylinder, Plane, Sphere
+from scissorcal.model.surface.protocol import (
+    Cylinder,
+    NearestPoints,
+    Plane,
+    Sphere,
+    Surface,
+    SurfacePoint,
+    curvatures,
+    nearest,
+    normal,
+    shape_operator,
+)
 
 __all__ = [
     "Cylinder",

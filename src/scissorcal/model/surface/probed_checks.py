@@ -7,8 +7,8 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.model.surface.differential import curvatures
 from scissorcal.model.surface.height_field import HeightField
+from scissorcal.model.surface.protocol import curvatures
 
 FEWEST_POINTS = 25
 MOST_POINTS = 20_000
@@ -177,8 +177,8 @@ def _refuse_line(points: Array) -> None:
 def _refuse_neighbours(points: Array, noise_m: float, labels: Sequence[str]) -> None:
     from scipy.spatial import KDTree
 
-    found = KDTree(points[:, :2]).query(points[:, :2], k=2)
-    gaps, near = np.asarray(found[0]), np.asarray(found[1])
+    neighbours = KDTree(points[:, :2]).query(points[:, :2], k=2)
+    gaps, near = np.asarray(neighbours[0]), np.asarray(neighbours[1])
     # which of two equal places comes first is not defined: take the other one
     rows = np.arange(len(points))
     other = np.where(near[:, 1] == rows, near[:, 0], near[:, 1])
@@ -191,12 +191,12 @@ def _refuse_neighbours(points: Array, noise_m: float, labels: Sequence[str]) -> 
         (gap < _APART_M, "the point is repeated: keep one of the two, or their mean"),
     ):
         if wrong.any():
-            one = int(wrong.argmax())
-            first, second = sorted((one, int(other[one])))
+            worst = int(wrong.argmax())
+            first, second = sorted((worst, int(other[worst])))
             raise InputError(
-                f"{_first_up(labels[first])} and {labels[second]} are {gap[one] * 1e3:.2g} mm "
+                f"{_first_up(labels[first])} and {labels[second]} are {gap[worst] * 1e3:.2g} mm "
                 f"apart in the x-y plane at {_mm(points[first, :2])}, and their heights differ by "
-                f"{rise[one] * 1e3:.3g} mm: {reason}."
+                f"{rise[worst] * 1e3:.3g} mm: {reason}."
             )
 
 

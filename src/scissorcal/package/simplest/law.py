@@ -26,7 +26,7 @@ class Law:
 
     @classmethod
     def of_fits(cls, cut: FitResult, friction: FitResult | None, draws: Mapping[str, Array]) -> Law:
-        """The law of two fits; ``draws`` are those of :func:`scissorcal.package.build.pick_draws`.
+        """The law of two fits; ``draws`` are those of :func:`scissorcal.package.exact.pick_draws`.
 
         They have the keys "draws/cut.npy" and, with friction, "draws/friction.npy".
         """

@@ -47,7 +47,7 @@ def step_times(
     rate = np.concatenate([np.full(STEPS // 2, -speed), np.full(STEPS // 2, speed)])
     advance = np.zeros(STEPS)
     took: list[list[float]] = [[] for _ in tables]
-    kernels = [_kernel(each, recipe) for each in tables]
+    kernels = [_kernel(table, recipe) for table in tables]
     for _ in range(repeats + 1):
         for kernel, times in zip(kernels, took, strict=True):
             kernel.reset(scene.contact_m[0])

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scissorcal.calibration.cut.edge_force import (
+from scissorcal.calibration.cut.curves import (
     FEWEST_STROKES,
     NOTICED,
     EdgePlace,
+    ResponseCurve,
+    StrokeWork,
     force_along_edge,
+    fracture_work,
+    response_curve,
 )
-from scissorcal.calibration.cut.fracture_work import StrokeWork, fracture_work
-from scissorcal.calibration.cut.response_curve import ResponseCurve, response_curve
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import ScissorcalError
 from scissorcal.recording.recording import Recording

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
-from scissorcal.recording.probe import ESTIMATES, Estimate, ProbeResult, Swing, newest_probe
+from scissorcal.recording.probe import ESTIMATES, FACTS, Estimate, ProbeResult, Swing, newest_probe
 from scissorcal.report.inputs import RecordingSummary
 from scissorcal.report.panel import (
     Axis,
@@ -25,25 +26,32 @@ LOOKS: tuple[Look, ...] = ("blue", "vermillion", "green", "purple", "orange", "i
 
 def rig_panels(recordings: Sequence[RecordingSummary]) -> tuple[Panel, ...]:
     """What the latest probe in the recordings says; none where none was probed."""
-    last = newest_probe(one.device for one in recordings)
-    if last is None:
-        return ()
-    rows = [
-        _row(name, found, scale, unit)
+    last = newest_probe(recording.device for recording in recordings)
+    return () if last is None else (rig_panel(last),)
+
+
+def rig_panel(probe: ProbeResult) -> Panel:
+    """Estimates with their intervals, the facts that people ask for, pushes beside the model."""
+    values = [
+        (name, _estimated(estimate, scale, unit))
         for name, key, scale, unit in ESTIMATES
-        if isinstance(found := getattr(last, key), Estimate)
+        if (estimate := getattr(probe, key)) is not None
     ]
-    said = f"{last.device}, probed at {last.made_at}."
-    shown = _charts(last)
-    return (Panel(ID, PART, TITLE, said, tuple(rows), shown, caption="Intervals of 90 %."),)
-
-
-def _row(name: str, found: Estimate, scale: float, unit: str) -> Row:
-    low, high = found.interval
-    told: Value = number(
-        "value", scale * found.mean, unit, sd=scale * found.sd, low=scale * low, high=scale * high
+    values += [
+        (name, number("value", scale * probe.facts[key], unit))
+        for name, key, scale, unit in FACTS
+        if math.isfinite(probe.facts.get(key, math.nan))
+    ]
+    rows = tuple(Row(name, (value,)) for name, value in values)
+    sentence = f"{probe.device}, probed at {probe.made_at}."
+    return Panel(
+        ID, PART, TITLE, sentence, rows, _charts(probe), caption="Estimates: intervals of 90 %."
     )
-    return Row(name, (told,))
+
+
+def _estimated(estimate: Estimate, scale: float, unit: str) -> Value:
+    mean, sd, low, high = (scale * v for v in (estimate.mean, estimate.sd, *estimate.interval))
+    return number("value", mean, unit, sd=sd, low=low, high=high)
 
 
 def _charts(probe: ProbeResult) -> tuple[Chart, ...]:
@@ -68,6 +76,6 @@ def _charts(probe: ProbeResult) -> tuple[Chart, ...]:
 def _series(place: int, swing: Swing, look: Look) -> tuple[Series, Series]:
     times = [1e3 * value for value in swing.times_s]
     name = f"{place}: {1e3 * swing.torque_Nm:+.3g} mN m"
-    seen = [1e3 * value for value in swing.places_rad]
+    places = [1e3 * value for value in swing.places_rad]
     goes = [1e3 * value for value in swing.model_rad]
-    return points(name, times, seen, look), curve(f"{name}, model", times, goes, look)
+    return points(name, times, places, look), curve(f"{name}, model", times, goes, look)

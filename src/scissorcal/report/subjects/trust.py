@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.verify.result import Calibration, VerifyResult
+from scissorcal.calibration.verify.result import Calibration, Halves, Sensitivity, VerifyResult
 from scissorcal.report.numbers import percent, short, significant
 from scissorcal.report.panel import (
     Axis,
@@ -33,30 +33,35 @@ LARGE_Z = 3.0
 
 
 def trust_panels(fit: FitResult, check: VerifyResult | None, part: str) -> tuple[Panel, ...]:
-    """Panels on simulated data, halves and prior sensitivity, as far as they were made."""
-    title, id_ = "Trust check", f"{part}-verify"
+    """The trust check of a fit in the report; how to make it where it was not made."""
     if check is None:
         why = f"It has not been made for this fit: run `scissorcal verify {fit.words}`."
-        return (absent(id_, part, title, why),)
+        return (absent(f"{part}-verify", part, "Trust check", why),)
+    return check_panels(check, part)
+
+
+def check_panels(check: VerifyResult, part: str) -> tuple[Panel, ...]:
+    """Panels on simulated data, halves and prior sensitivity, as far as they were made."""
+    id_ = f"{part}-verify"
     panels = []
     if check.calibration is not None:
         panels.append(_calibration(check.calibration, part, id_))
     if check.halves is not None:
-        panels.append(_halves(check, part, id_))
+        panels.append(_halves(check.halves, part, id_))
     if check.sensitivity is not None:
-        panels.append(_sensitivity(check, part, id_))
-    if check.not_done or not panels:
-        why = " ".join(check.not_done) or f"Run `scissorcal verify {fit.words}`."
-        panels.append(absent(f"{id_}-open", part, f"{title}: not done", why))
+        panels.append(_sensitivity(check.sensitivity, part, id_))
+    if check.not_done:
+        why = " ".join(check.not_done)
+        panels.append(absent(f"{id_}-open", part, "Trust check: not done", why))
     return tuple(panels)
 
 
 def coverage_found(check: VerifyResult | None) -> str:
     """In a sentence, how often intervals held the truth; empty where that was not tested."""
-    found = check.calibration if check is not None else None
-    if found is None:
+    calibration = check.calibration if check is not None else None
+    if calibration is None:
         return ""
-    covers = [(c, q.name) for q in found.quantities for c in q.coverage if c.level >= 0.9]
+    covers = [(c, q.name) for q in calibration.quantities for c in q.coverage if c.level >= 0.9]
     if not covers:
         return ""
     level = min(c.level for c, _ in covers)
@@ -64,13 +69,13 @@ def coverage_found(check: VerifyResult | None) -> str:
     worst, name = min(((c.share, name) for c, name in covers if c.level == level))
     return (
         f"{percent(level)} intervals held the truth in {percent(float(np.mean(shares)), 3)} of "
-        f"{found.fits} simulated fits; lowest {name} with {percent(worst, 3)}"
+        f"{calibration.fits} simulated fits; lowest {name} with {percent(worst, 3)}"
     )
 
 
-def _calibration(found: Calibration, part: str, id_: str) -> Panel:
+def _calibration(calibration: Calibration, part: str, id_: str) -> Panel:
     rows = []
-    for quantity in found.quantities:
+    for quantity in calibration.quantities:
         covers = [
             percent_of(f"{percent(c.level)} interval holds", c.share, 3, low=c.low, high=c.high)
             for c in quantity.coverage
@@ -94,27 +99,29 @@ def _calibration(found: Calibration, part: str, id_: str) -> Panel:
         else "Intervals hold the truth as often as they claim."
     )
     note = (
-        f"{found.fits} fits to data simulated from known values, with this fit's motion and size "
-        f"({found.generating}; {found.noise}). {percent(found.escalated)} of them went to a higher "
-        f"effort, {percent(found.unreliable)} failed their diagnostics, {len(found.broken)} gave "
-        "no result."
+        f"{calibration.fits} fits to data simulated from known values, with this fit's motion and "
+        f"size ({calibration.generating}; {calibration.noise}). {percent(calibration.escalated)} "
+        f"of them went to a higher effort, {percent(calibration.unreliable)} failed their "
+        f"diagnostics, {len(calibration.broken)} gave no result."
     )
     caption = (
         "Share of intervals that held the truth; in brackets the range that correct intervals "
         "keep to."
     )
     title = "Trust check: intervals on simulated data"
-    charts = (_ranks(found, f"{id_}-ranks"),)
+    charts = (_ranks(calibration, f"{id_}-ranks"),)
     return Panel(id_, part, title, sentence, tuple(rows), charts, notes=(note,), caption=caption)
 
 
-def _ranks(found: Calibration, id_: str) -> Chart:
+def _ranks(calibration: Calibration, id_: str) -> Chart:
     """The ranks' distribution function less that of uniform ranks, with its simultaneous band."""
-    z, low, high = (np.array(v) for v in (found.band.z, found.band.low, found.band.high))
+    z, low, high = (
+        np.array(v) for v in (calibration.band.z, calibration.band.low, calibration.band.high)
+    )
     series = [band("correct intervals", z, low - z, high - z)]
     outside = []
-    for place, quantity in enumerate(found.quantities):
-        ranks = (np.array(quantity.ranks) + 0.5) / found.levels
+    for place, quantity in enumerate(calibration.quantities):
+        ranks = (np.array(quantity.ranks) + 0.5) / calibration.levels
         share = np.searchsorted(np.sort(ranks), z, side="right") / max(len(ranks), 1)
         look, style = LOOKS[place % len(LOOKS)]
         series.append(curve(quantity.name, z, share - z, look, style=style, toggle=True))
@@ -122,16 +129,14 @@ def _ranks(found: Calibration, id_: str) -> Chart:
             outside.append(quantity.name)
     caption = (
         f"Each line is a quantity; one with correct intervals leaves the shade with probability "
-        f"{percent(found.band.alpha)}. "
+        f"{percent(calibration.band.alpha)}. "
         + (f"Outside: {', '.join(outside)}." if outside else "None leaves it.")
     )
     x, y = Axis("share of the range of ranks"), Axis("ECDF − uniform")
     return Chart(id_, "Ranks of the truth among the draws", x, y, tuple(series), caption)
 
 
-def _halves(check: VerifyResult, part: str, id_: str) -> Panel:
-    halves = check.halves
-    assert halves is not None
+def _halves(halves: Halves, part: str, id_: str) -> Panel:
     rows = tuple(
         Row(
             row.name,
@@ -157,9 +162,7 @@ def _halves(check: VerifyResult, part: str, id_: str) -> Panel:
     return Panel(f"{id_}-halves", part, title, sentence, rows, notes=(note,), caption=caption)
 
 
-def _sensitivity(check: VerifyResult, part: str, id_: str) -> Panel:
-    found = check.sensitivity
-    assert found is not None
+def _sensitivity(sensitivity: Sensitivity, part: str, id_: str) -> Panel:
     rows = tuple(
         Row(
             row.name,
@@ -170,7 +173,7 @@ def _sensitivity(check: VerifyResult, part: str, id_: str) -> Panel:
             ),
             marked=row.diagnosis != "fine",
         )
-        for row in found.rows
+        for row in sensitivity.rows
     )
     odd = [row.name for row in rows if row.marked]
     sentence = (
@@ -180,7 +183,7 @@ def _sensitivity(check: VerifyResult, part: str, id_: str) -> Panel:
     )
     caption = (
         "How far the posterior moves when prior or data count slightly more (power scaling); above "
-        f"{short(found.threshold)} it matters."
+        f"{short(sensitivity.threshold)} it matters."
     )
     title = "Trust check: prior sensitivity"
     return Panel(f"{id_}-sensitivity", part, title, sentence, rows, caption=caption)

@@ -5,10 +5,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d, median_filter
+from scipy.optimize import least_squares
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.vision.blade.parts import BladeParts
 from scissorcal.vision.blade.profile import (
     Crossings,
     Light,
@@ -16,6 +17,7 @@ from scissorcal.vision.blade.profile import (
     outermost_sharp,
     steepest,
 )
+from scissorcal.vision.blade.silhouette import BACK_FIRST, FIRST, BladeParts
 from scissorcal.vision.blade.view import View
 
 _MOST_POINTS = 3000
@@ -29,6 +31,22 @@ _SHARP_SHARE = 1.0 / 300.0
 _LEAST_GOOD = {"edge": 0.75, "back": 0.3}
 _LEAST_IN_SHADOW = {"edge": 0.4, "back": 0.2}
 _MOST_BLUR_PX, _MOST_BLUR_SHARE = 8.0, 0.15
+
+
+Side = Literal["edge", "back"]
+
+
+@dataclass(frozen=True)
+class PicturedBlade:
+    """A blade in a photograph of linear ``light``, seen by ``view``, whose parts are roughly known.
+
+    ``source`` names the photograph in refusals.
+    """
+
+    light: Light
+    view: View
+    parts: BladeParts
+    source: str
 
 
 @dataclass(frozen=True)
@@ -46,27 +64,19 @@ class BorderPoints:
     good_share: float
 
 
-def find_border(
-    light: Light,
-    view: View,
-    parts: BladeParts,
-    side: Array,
-    first: float,
-    last: float,
-    source: str,
-    what: str,
-    search: float,
-) -> BorderPoints:
+def find_border(blade: PicturedBlade, side: Side, last: float, search: float) -> BorderPoints:
     """Cross one side of a blade in the picture, about once every pixel.
 
-    ``side`` are rough points of it on the sheet, of which those between the shares ``first`` and
-    ``last`` of the blade's length count. Raises InputError where the picture is too blurred, or
-    too little of the side has a clear border.
+    Of its rough points those before the share ``last`` of the blade's length count; ``search`` is
+    how far from them the border may lie, in blade lengths. Raises InputError where the picture is
+    too blurred, or too little of the side has a clear border.
     """
-    frame = parts.frame(side)
+    light, view, parts, source = blade.light, blade.view, blade.parts, blade.source
+    first = FIRST if side == "edge" else BACK_FIRST
+    frame = parts.frame(parts.edge if side == "edge" else parts.back)
     there = (frame[:, 0] > first * parts.length) & (frame[:, 0] < last * parts.length)
     if there.sum() < 20:
-        raise InputError(f"{source}: too little of the blade's {what} is visible.")
+        raise InputError(f"{source}: too little of the blade's {side} is visible.")
     s, e = _thinned(frame[there])
     rough = view.to_pixels(parts.points(s, e))
     count = int(np.clip(np.sum(np.linalg.norm(np.diff(rough, axis=0), axis=1)), 60, _MOST_POINTS))
@@ -74,33 +84,31 @@ def find_border(
     per_unit = count / max(s[-1] - s[0], 1e-12)
     offsets = np.interp(stations, s, e)
     shadowed = search > _SHADOW_SEARCH
-    rough_side = _Rough(view, parts, stations, offsets, float(np.sign(np.median(e))), per_unit)
+    rough_side = _Rough(blade, stations, offsets, float(np.sign(np.median(e))), per_unit)
     if shadowed:
         lines = [
-            rough_side.followed(light, search, "innermost"),
-            rough_side.followed(light, search, "outermost sharp"),
+            rough_side.followed(search, "innermost"),
+            rough_side.followed(search, "outermost sharp"),
         ]
         inner, outer = (_crossed(light, *line) for line in lines)
         best = inner if _merit(inner) > _INNER_MERIT * _merit(outer) else outer
-        if what == "back" and _merit(best) < _LEAST_MERIT:
-            return _as_followed(lines[-1], in_focus(parts, per_unit))
-        points, normals, found, blur = best
+        if side == "back" and _merit(best) < _LEAST_MERIT:
+            return _as_followed(lines[-1], _in_focus(parts, per_unit))
+        points, normals, crossed, blur = best
     else:
-        points, normals, found, blur = _crossed(
-            light, *rough_side.followed(light, search, "steepest")
-        )
-    good = found.good & _alike(found)
+        points, normals, crossed, blur = _crossed(light, *rough_side.followed(search, "steepest"))
+    good = crossed.good & _alike(crossed)
     share = float(good.mean())
     _refuse_blur(blur, per_unit, parts, source)
-    if share < (_LEAST_IN_SHADOW if shadowed else _LEAST_GOOD)[what]:
+    if share < (_LEAST_IN_SHADOW if shadowed else _LEAST_GOOD)[side]:
         raise InputError(
-            f"{source}: only {100 * share:.0f} % of the blade's {what} shows a clear border: a "
+            f"{source}: only {100 * share:.0f} % of the blade's {side} shows a clear border: a "
             "mirror's glare, a shadow or dirt hides the rest. Turn the blade or the lamp so that "
             "the metal looks darker than the sheet."
         )
-    seen = points + normals * found.place[:, None]
+    places = points + normals * crossed.place[:, None]
     return BorderPoints(
-        seen[good], normals[good], found.sd[good], found.blur[good] / blur, blur, share
+        places[good], normals[good], crossed.sd[good], crossed.blur[good] / blur, blur, share
     )
 
 
@@ -108,23 +116,21 @@ def find_border(
 class _Rough:
     """A side of the blade, roughly: stations and offsets of points about a pixel apart."""
 
-    view: View
-    parts: BladeParts
+    blade: PicturedBlade
     stations: Array
     offsets: Array
     outward: float
     per_unit: float
 
     def followed(
-        self, light: Light, search: float, kind: Literal["steepest", "innermost", "outermost sharp"]
+        self, search: float, kind: Literal["steepest", "innermost", "outermost sharp"]
     ) -> tuple[Array, Array]:
         """Points (n, 2) on a border near this side and normals there, both in the picture."""
-        length, offsets = self.parts.length, self.offsets
-        sharp = in_focus(self.parts, self.per_unit)
+        light, offsets = self.blade.light, self.offsets
+        length = self.blade.parts.length
+        sharp = _in_focus(self.blade.parts, self.per_unit)
         for first, far in ((True, search), (False, 0.012)):
-            points, normals = _with_normals(
-                self.view, self.parts, self.stations, offsets, self.outward
-            )
+            points, normals = _with_normals(self.blade, self.stations, offsets, self.outward)
             reach = float(np.clip(far * length * self.per_unit, 6.0, 80.0))
             if kind == "outermost sharp":
                 shift = outermost_sharp(light, points, normals, reach, sharp)
@@ -133,23 +139,23 @@ class _Rough:
                 soft = 1.5 if not first else 1.2 if inner else 2.0
                 shift = steepest(light, points, normals, reach, soft, innermost=inner)
             offsets = offsets + self.outward * shift / self.per_unit
-        return _with_normals(self.view, self.parts, self.stations, offsets, self.outward)
+        return _with_normals(self.blade, self.stations, offsets, self.outward)
 
 
 def _crossed(light: Light, points: Array, normals: Array) -> tuple[Array, Array, Crossings, float]:
     """A line of points and normals with its crossings, wide enough for their blur, and that."""
-    found = crossings(light, points, normals, 6.0)
-    blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
+    crossed = crossings(light, points, normals, 6.0)
+    blur = float(np.median(crossed.blur[crossed.good])) if crossed.good.any() else np.inf
     if blur > 1.6:
-        found = crossings(light, points, normals, float(np.clip(4.0 * blur, 6.0, 30.0)))
-        blur = float(np.median(found.blur[found.good])) if found.good.any() else np.inf
-    return points, normals, found, blur
+        crossed = crossings(light, points, normals, float(np.clip(4.0 * blur, 6.0, 30.0)))
+        blur = float(np.median(crossed.blur[crossed.good])) if crossed.good.any() else np.inf
+    return points, normals, crossed, blur
 
 
 def _merit(line: tuple[Array, Array, Crossings, float]) -> float:
     """How much of a line is one clear border, divided by its blur: a shadow's is soft."""
-    _, _, found, blur = line
-    return float(np.mean(found.good & _alike(found))) / max(blur, 1.0)
+    _, _, crossed, blur = line
+    return float(np.mean(crossed.good & _alike(crossed))) / max(blur, 1.0)
 
 
 def _as_followed(line: tuple[Array, Array], soft: float) -> BorderPoints:
@@ -158,11 +164,11 @@ def _as_followed(line: tuple[Array, Array], soft: float) -> BorderPoints:
     It is good to about the blur ``soft`` of a border in focus.
     """
     points, normals = line
-    one = np.ones(len(points))
-    return BorderPoints(points, normals, soft * one, one, soft, 1.0)
+    ones = np.ones(len(points))
+    return BorderPoints(points, normals, soft * ones, ones, soft, 1.0)
 
 
-def in_focus(parts: BladeParts, per_unit: float) -> float:
+def _in_focus(parts: BladeParts, per_unit: float) -> float:
     """Blur in pixels of a border in focus, of a blade that has ``per_unit`` pixels a unit."""
     return max(_SHARP_SHARE * parts.length * per_unit, 1.0)
 
@@ -176,20 +182,21 @@ def _refuse_blur(blur: float, per_unit: float, parts: BladeParts, source: str) -
         )
 
 
-def _alike(found: Crossings) -> NDArray[np.bool_]:
+def _alike(crossed: Crossings) -> NDArray[np.bool_]:
     """Crossings whose blur and contrast are like those of most."""
-    contrast = found.outer - found.inner
-    usual = np.median(contrast[found.good]) if found.good.any() else 0.0
-    blur = np.median(found.blur[found.good]) if found.good.any() else 1.0
+    contrast = crossed.outer - crossed.inner
+    usual = np.median(contrast[crossed.good]) if crossed.good.any() else 0.0
+    blur = np.median(crossed.blur[crossed.good]) if crossed.good.any() else 1.0
     return np.asarray(
         (contrast * np.sign(usual) > 0.25 * abs(usual))
-        & (found.blur < 1.8 * blur + 0.2)
-        & (found.blur > 0.4 * blur - 0.3)
+        & (crossed.blur < 1.8 * blur + 0.2)
+        & (crossed.blur > 0.4 * blur - 0.3)
     )
 
 
-def find_hole(light: Light, view: View, parts: BladeParts) -> BorderPoints | None:
+def find_hole(blade: PicturedBlade) -> BorderPoints | None:
     """Cross the pivot hole's border all around; None where there is no hole, or no clear one."""
+    light, view, parts = blade.light, blade.view, blade.parts
     if not len(parts.hole):
         return None
     middle = parts.hole.mean(axis=0)
@@ -201,28 +208,26 @@ def find_hole(light: Light, view: View, parts: BladeParts) -> BorderPoints | Non
         inward = view.to_pixels(middle + 0.98 * radius * ring) - points
         size = float(np.median(np.linalg.norm(points - points.mean(axis=0), axis=1)))
         normals = inward / np.linalg.norm(inward, axis=1, keepdims=True)
-        found = crossings(light, points, normals, float(np.clip(0.6 * size, 3.0, 12.0)))
-        if found.good.sum() < 60:
+        crossed = crossings(light, points, normals, float(np.clip(0.6 * size, 3.0, 12.0)))
+        if crossed.good.sum() < 60:
             return None
-        seen = points + normals * found.place[:, None]
-        middle, radius = fit_circle(view.to_sheet(seen[found.good]))
-        off = np.abs(np.linalg.norm(view.to_sheet(seen) - middle, axis=1) - radius)
-        sure = found.good & (off < 4.0 * 1.4826 * np.median(off[found.good]) + 1e-12)
-        middle, radius = fit_circle(view.to_sheet(seen[sure]))
+        places = points + normals * crossed.place[:, None]
+        middle, radius = fit_circle(view.to_sheet(places[crossed.good]))
+        off = np.abs(np.linalg.norm(view.to_sheet(places) - middle, axis=1) - radius)
+        sure = crossed.good & (off < 4.0 * 1.4826 * np.median(off[crossed.good]) + 1e-12)
+        middle, radius = fit_circle(view.to_sheet(places[sure]))
     return BorderPoints(
-        seen[sure],
+        places[sure],
         normals[sure],
-        found.sd[sure],
+        crossed.sd[sure],
         np.ones(int(sure.sum())),
-        float(np.median(found.blur[sure])),
+        float(np.median(crossed.blur[sure])),
         1.0,
     )
 
 
 def fit_circle(points: Array) -> tuple[Array, float]:
     """Centre (2,) and radius of the circle with the least squared distances from points (n, 2)."""
-    from scipy.optimize import least_squares
-
     middle = points.mean(axis=0)
     away = points - middle
     size = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
@@ -236,8 +241,6 @@ def fit_circle(points: Array) -> tuple[Array, float]:
 
 def _thinned(frame: Array) -> tuple[Array, Array]:
     """One offset per station, smoothed over a few flat pixels."""
-    from scipy.ndimage import median_filter
-
     order = np.argsort(frame[:, 0])
     s, e = frame[order, 0], frame[order, 1]
     cells = np.linspace(s[0], s[-1], max(len(s) // 4, 10))
@@ -247,12 +250,9 @@ def _thinned(frame: Array) -> tuple[Array, Array]:
     return thin[:, 0], np.asarray(median_filter(thin[:, 1], size=5, mode="nearest"))
 
 
-def _with_normals(
-    view: View, parts: BladeParts, s: Array, e: Array, outward: float
-) -> tuple[Array, Array]:
+def _with_normals(blade: PicturedBlade, s: Array, e: Array, outward: float) -> tuple[Array, Array]:
     """Points in the picture and unit normals there that lead out of the blade."""
-    from scipy.ndimage import gaussian_filter1d
-
+    view, parts = blade.view, blade.parts
     smooth = gaussian_filter1d(e, 8.0, mode="nearest")
     points = view.to_pixels(parts.points(s, e))
     line = view.to_pixels(parts.points(s, smooth))

@@ -7,8 +7,14 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.recipe.photograph_priors import BladePriors
-from scissorcal.vision.blade.borders import BorderPoints, find_border, find_hole, fit_circle
+from scissorcal.recipe.priors import BladePriors
+from scissorcal.vision.blade.borders import (
+    BorderPoints,
+    PicturedBlade,
+    find_border,
+    find_hole,
+    fit_circle,
+)
 from scissorcal.vision.blade.modes import (
     SHARP,
     BladeFrame,
@@ -16,8 +22,7 @@ from scissorcal.vision.blade.modes import (
     edge_modes,
     halving_stations,
 )
-from scissorcal.vision.blade.parts import BACK_FIRST, BACK_LAST, FIRST, LAST, BladeParts
-from scissorcal.vision.blade.profile import Light
+from scissorcal.vision.blade.silhouette import BACK_LAST, LAST, BladeParts
 from scissorcal.vision.blade.view import View
 
 _ANCHORS, _STRETCHES = 14, 30
@@ -61,13 +66,7 @@ class BladeMeasurement:
 
 
 def measure_blade(
-    light: Light,
-    view: View,
-    parts: BladeParts,
-    source: str,
-    priors: BladePriors = BladePriors(),
-    *,
-    search: float = 0.035,
+    blade: PicturedBlade, priors: BladePriors = BladePriors(), *, search: float = 0.035
 ) -> BladeMeasurement:
     """Measure a blade whose parts are roughly known, in the photograph's pixels.
 
@@ -76,16 +75,15 @@ def measure_blade(
     ``search`` is how far from the rough outline a border may lie, in blade lengths.
     Raises InputError where the picture is too blurred or too much of the edge is hidden.
     """
-    edge = find_border(light, view, parts, parts.edge, FIRST, LAST, source, "edge", search)
-    back = find_border(
-        light, view, parts, parts.back, BACK_FIRST, BACK_LAST, source, "back", search
-    )
+    view, parts, source = blade.view, blade.parts, blade.source
+    edge = find_border(blade, "edge", LAST, search)
+    back = find_border(blade, "back", BACK_LAST, search)
     for border, what in ((edge, "edge"), (back, "back")):
         _refuse_unhalved(view, parts, border, f"{source}: too little of the blade's {what}")
-    seen = SeenBorders(edge, back, find_hole(light, view, parts))
-    frame = _framed(view, parts, seen)
+    borders = SeenBorders(edge, back, find_hole(blade))
+    frame = _framed(view, parts, borders)
     pivot, axis, up = frame.pivot, frame.axis, frame.up
-    columns, names = edge_modes(view, seen, frame, parts, priors)
+    columns, names = edge_modes(view, borders, frame, parts, priors)
     there = view.to_sheet(edge.pixels)
     station, offset = frame.of(there)
     # noise along the normals in pixels becomes noise along ``up`` in sheet units
@@ -128,14 +126,15 @@ def _refuse_unhalved(view: View, parts: BladeParts, border: BorderPoints, what: 
         )
 
 
-def _framed(view: View, parts: BladeParts, seen: SeenBorders) -> BladeFrame:
+def _framed(view: View, parts: BladeParts, borders: SeenBorders) -> BladeFrame:
     """The blade's frame as its borders give it."""
-    if seen.hole is None:
+    if borders.hole is None:
         pivot, radius = parts.pivot, 0.0
     else:
-        pivot, radius = fit_circle(view.to_sheet(seen.hole.pixels))
+        pivot, radius = fit_circle(view.to_sheet(borders.hole.pixels))
     sides = [
-        view.to_sheet(border.pixels[border.softness < SHARP]) for border in (seen.edge, seen.back)
+        view.to_sheet(border.pixels[border.softness < SHARP])
+        for border in (borders.edge, borders.back)
     ]
     axis, up = parts.axis, parts.up
     for _ in range(3):
@@ -185,9 +184,9 @@ def _smooth(station: Array, offset: Array, along: Array) -> Array:
     places = 0.5 * (cells[1:] + cells[:-1])
     values = np.polyval(curve, places - middle)
     for cell in range(_STRETCHES):
-        own = kept & (index == cell)
-        if own.sum() >= 2:
-            shift = e[own] - np.polyval(curve, s[own] - middle)
+        in_cell = kept & (index == cell)
+        if in_cell.sum() >= 2:
+            shift = e[in_cell] - np.polyval(curve, s[in_cell] - middle)
             values[cell] += float(np.median(shift))
     return np.asarray(np.interp(along, places, values))
 

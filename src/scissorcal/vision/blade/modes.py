@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.borders import BorderPoints
-from scissorcal.vision.blade.parts import BladeParts
+from scissorcal.vision.blade.silhouette import BladeParts
 from scissorcal.vision.blade.view import View
 
 SHARP = 1.4
@@ -47,7 +47,7 @@ def halving_stations(parts: BladeParts) -> Array:
 
 
 def edge_modes(
-    view: View, seen: SeenBorders, frame: BladeFrame, parts: BladeParts, priors: BladePriors
+    view: View, borders: SeenBorders, frame: BladeFrame, parts: BladeParts, priors: BladePriors
 ) -> tuple[Array, tuple[str, ...]]:
     """Effect on the edge of one standard deviation of each common error source.
 
@@ -57,29 +57,29 @@ def edge_modes(
     turns after them; and a point that moves along the edge changes the offset by the edge's slope.
     That slope is a cubic's, so that no column carries the noise of the points.
     """
-    edge, back = view.to_sheet(seen.edge.pixels), view.to_sheet(seen.back.pixels)
-    response = _Response.of(frame, parts, (edge, seen.edge), (back, seen.back))
-    outward = _Outward.of(view, seen)
+    edge, back = view.to_sheet(borders.edge.pixels), view.to_sheet(borders.back.pixels)
+    response = _Response.of(frame, parts, (edge, borders.edge), (back, borders.back))
+    outward = _Outward.of(view, borders)
     rows: list[Array] = []
     names: list[str] = []
-    for name, moved in _mapping_moves(view, seen, frame, parts):
+    for name, moved in _mapping_moves(view, borders, frame, parts):
         rows.append(response.to(*moved))
         names.append(name)
-    tone = 0.01 * priors.tone_sd_percent * seen.edge.blur_px
+    tone = 0.01 * priors.tone_sd_percent * borders.edge.blur_px
     rows.append(response.to(tone * outward.edge, tone * outward.back, tone * outward.pivot(frame)))
     names.append("tone")
     still = np.zeros(2)
     grain = 0.01 * priors.grain_percent
-    rough = grain * float(np.median(seen.edge.sd_px))
+    rough = grain * float(np.median(borders.edge.sd_px))
     along = np.linspace(-1.0, 1.0, len(edge))
     rows += [
         response.to((rough * drift)[:, None] * outward.edge, 0.0 * back, still)
         for drift in (np.ones_like(along), along, (3.0 * along**2 - 1.0) / 2.0)
     ]
-    behind = grain * float(np.median(seen.back.sd_px))
+    behind = grain * float(np.median(borders.back.sd_px))
     rows.append(response.to(0.0 * edge, behind * outward.back, still))
     names += ["grain"] * 4
-    for shift in _pivot_shifts(outward, frame, seen, parts, grain):
+    for shift in _pivot_shifts(outward, frame, borders, parts, grain):
         rows.append(response.to(0.0 * edge, 0.0 * back, shift))
         names.append("pivot")
     rows.append(-_turn_sd(*frame.of(back)) * response.swing)
@@ -217,13 +217,13 @@ def _mapping_errors(view: View) -> list[tuple[str, Array]]:
 
 
 def _pivot_shifts(
-    outward: _Outward, frame: BladeFrame, seen: SeenBorders, parts: BladeParts, grain: float
+    outward: _Outward, frame: BladeFrame, borders: SeenBorders, parts: BladeParts, grain: float
 ) -> Array:
     """Two shifts of the pivot, one standard deviation each.
 
     ``grain`` is the share of a point's noise that its neighbours have too.
     """
-    if seen.hole is None or outward.hole is None or outward.hole_place is None:
+    if borders.hole is None or outward.hole is None or outward.hole_place is None:
         return np.eye(2) * parts.pivot_sd
     away = outward.hole_place - frame.pivot
     radial = away / np.linalg.norm(away, axis=1, keepdims=True)
@@ -232,7 +232,7 @@ def _pivot_shifts(
     spread = float(np.sqrt(np.mean(off**2)))
     information = radial.T @ radial / 4.0
     pixel = float(np.median(np.linalg.norm(outward.hole, axis=1)))
-    common = grain * float(np.median(seen.hole.sd_px)) * pixel
+    common = grain * float(np.median(borders.hole.sd_px)) * pixel
     covariance = np.linalg.inv(information) * spread**2 + common**2 * np.eye(2)
     return np.asarray(np.linalg.cholesky(covariance)).T
 

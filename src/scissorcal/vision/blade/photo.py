@@ -1,22 +1,47 @@
-"""One photograph of a blade, from the file to its measured edge."""
+"""One photograph of a blade on the mat, or of open scissors: measured, and then drawn over."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scissorcal.recipe.photograph_priors import BladePriors
-from scissorcal.vision.blade.lamp import lamp_direction
+from scissorcal.aliases import Array
+from scissorcal.recipe.priors import BladePriors
+from scissorcal.vision.blade.borders import PicturedBlade
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
 from scissorcal.vision.blade.pair import PairLengths, measure_pair
-from scissorcal.vision.blade.parts import EdgeSide, lone_blade
-from scissorcal.vision.blade.plain_view import PlainView
-from scissorcal.vision.blade.scissors import Scissors, find_scissors
-from scissorcal.vision.blade.silhouette import LONGEST, Silhouette, silhouette
-from scissorcal.vision.blade.view import View, see_mat
+from scissorcal.vision.blade.scissors import Scissors, find_scissors, lamp_direction
+from scissorcal.vision.blade.silhouette import LONGEST, EdgeSide, Silhouette, lone_blade, silhouette
+from scissorcal.vision.blade.view import PlainView, View, see_mat
 from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.photo import Photo
-from scissorcal.vision.targets.marker_corners import linear_light
+from scissorcal.vision.overlay import Canvas
+from scissorcal.vision.photo import Photo, Picture
+from scissorcal.vision.targets.detect import linear_light
+
+LARGEST = 1600
+"""Pixels along the longer side of a picture."""
+
+OUTLINE, END, EDGE, ARROW, NICK, PIVOT, AXIS = (
+    (60, 140, 255),
+    (255, 120, 200),
+    (80, 220, 60),
+    (220, 60, 220),
+    (40, 40, 240),
+    (240, 200, 0),
+    (230, 230, 60),
+)
+
+_MARGIN = 0.12
+_MOST_ARROWS = 120
+_ARROW_PX = 30.0
+
+
+@dataclass(frozen=True)
+class NickMark:
+    """A nick to be shown: where along the edge, and what to write beside it."""
+
+    station: float
+    text: str
 
 
 @dataclass(frozen=True)
@@ -56,10 +81,16 @@ class BladePhoto:
         if self.scissors is not None and not self.measured:
             return f"{name}: closed scissors; their edges hide each other"
         parts = []
-        for one in self.measured:
-            length = f"{1e3 * one.length:.2f} mm" if one.metric else f"{one.length:.0f} px"
-            blur = one.edge.blur_px
-            parts.append(f"{length} long, {len(one.station)} points, borders {blur:.1f} px soft")
+        for measurement in self.measured:
+            length = (
+                f"{1e3 * measurement.length:.2f} mm"
+                if measurement.metric
+                else f"{measurement.length:.0f} px"
+            )
+            blur = measurement.edge.blur_px
+            parts.append(
+                f"{length} long, {len(measurement.station)} points, borders {blur:.1f} px soft"
+            )
         text = f"{name}: " + "; ".join(parts)
         if self.scissors is not None:
             text += f"; open by {np.degrees(self.scissors.opening):.1f} deg"
@@ -70,11 +101,11 @@ class BladePhoto:
 
 def by_blade(photos: Sequence[BladePhoto]) -> dict[str, list[BladeMeasurement]]:
     """Measurements of all photographs by blade's name, in alphabetical order."""
-    found: dict[str, list[BladeMeasurement]] = {}
+    measurements: dict[str, list[BladeMeasurement]] = {}
     for photo in photos:
         for name, measured in zip(photo.names, photo.measured, strict=True):
-            found.setdefault(name, []).append(measured)
-    return dict(sorted(found.items()))
+            measurements.setdefault(name, []).append(measured)
+    return dict(sorted(measurements.items()))
 
 
 @dataclass(frozen=True)
@@ -132,7 +163,7 @@ def photograph_blade(
         there = view.to_sheet(photo.within([pivot_px, beside]))
         pivot, sd = there[0], priors.pivot_sd_px * float(np.hypot(*(there[1] - there[0])))
     parts = lone_blade(outline, photo.source, edge_side=edge_side, pivot=pivot, pivot_sd=sd)
-    measured = measure_blade(light, view, parts, photo.source, priors)
+    measured = measure_blade(PicturedBlade(light, view, parts, photo.source), priors)
     return BladePhoto(photo, view, outline, (measured,))
 
 
@@ -163,9 +194,95 @@ def photograph_scissors(
     if not scissors.blades:
         return BladePhoto(photo, view, outline, (), scissors)
     view, measured, lengths = measure_pair(light, view, scissors.blades, photo.source, priors)
-    blades = tuple(one.parts for one in measured)
+    blades = tuple(measurement.parts for measurement in measured)
     along = float(blades[0].axis @ blades[1].axis)
     opening = float(np.arccos(np.clip(along, -1.0, 1.0)))
     scissors = replace(scissors, blades=blades, opening=opening)
     lamp = lamp_direction(outline, scissors)
     return BladePhoto(photo, view, outline, measured, scissors, lengths, lamp)
+
+
+def blade_picture(
+    photo: BladePhoto,
+    edges: Sequence[Callable[[Array], Array]],
+    nicks: Sequence[Sequence[NickMark]],
+) -> Picture:
+    """Draw a measurement over its photograph: bytes (rows, columns, 3), BGR.
+
+    The segmented outline (orange), each blade's back and the end of its metal (violet), its points
+    of the edge, the fitted edge (green) as ``edges`` gives e(s), the enlarged residuals as arrows,
+    the nicks (red), the pivot and the centreline. Cropped to what matters and enlarged or reduced
+    to `LARGEST` pixels.
+    """
+    borders = [
+        photo.view.to_pixels(border) for border in (photo.outline.outer, *photo.outline.others)
+    ]
+    left, top, right, bottom = _frame(photo, borders)
+    part = photo.photo.image[top:bottom, left:right]
+    canvas = Canvas(part, min(LARGEST / max(part.shape[:2]), 4.0), (left, top))
+    for border in borders:
+        canvas.line(border, OUTLINE, closed=True)
+    factor = 0.0
+    for measured, edge, marks in zip(photo.measured, edges, nicks, strict=True):
+        factor = max(factor, _blade(canvas, photo.view, measured, edge, marks))
+    words = [photo.photo.source]
+    if factor:
+        words.append(f"residuals x {factor:.0f}")
+    canvas.title("   ".join(words))
+    return canvas.picture
+
+
+def _blade(
+    canvas: Canvas,
+    view: View,
+    blade: BladeMeasurement,
+    edge: Callable[[Array], Array],
+    marks: Sequence[NickMark],
+) -> float:
+    def on_picture(station: Array, offset: Array) -> Array:
+        return view.to_pixels(blade.parts.points(station, offset))
+
+    canvas.line(np.array([blade.pivot_px, blade.axis_px]), AXIS)
+    if blade.parts.end is not None:
+        canvas.line(view.to_pixels(blade.parts.end), END)
+    back = blade.back.pixels[np.argsort(blade.parts.frame(view.to_sheet(blade.back.pixels))[:, 0])]
+    canvas.line(back, END)
+    canvas.cross(blade.pivot_px, PIVOT)
+    points = on_picture(blade.station, blade.offset)
+    station = np.linspace(blade.station[0], blade.station[-1], 400)
+    canvas.line(on_picture(station, edge(station)), EDGE)
+    factor = _arrows(canvas, points, on_picture(blade.station, edge(blade.station)))
+    for mark in marks:
+        here = float(np.interp(mark.station, blade.station, blade.offset))
+        place = on_picture(np.array([mark.station]), np.array([here]))[0]
+        canvas.ring(place, NICK, 14)
+        canvas.words(mark.text, canvas.whole(place) + 18)
+    return factor
+
+
+def _arrows(canvas: Canvas, points: Array, fitted: Array) -> float:
+    """Draw residuals from the fitted edge, enlarged; returns the factor."""
+    off = points - fitted
+    usual = float(np.quantile(np.linalg.norm(off, axis=1), 0.9)) * canvas.scale
+    factor = float(np.clip(_ARROW_PX / max(usual, 1e-6), 1.0, 1000.0))
+    factor = float(f"{factor:.1g}")
+    step = max(len(points) // _MOST_ARROWS, 1)
+    longest = 4.0 * _ARROW_PX / canvas.scale / factor
+    for base, gap in zip(fitted[::step], off[::step], strict=True):
+        size = float(np.linalg.norm(gap))
+        shown = gap * min(1.0, longest / max(size, 1e-12)) * factor
+        canvas.line(np.array([base, base + shown]), ARROW)
+    return factor
+
+
+def _frame(photo: BladePhoto, borders: Sequence[Array]) -> tuple[int, int, int, int]:
+    height, width = photo.photo.image.shape[:2]
+    points = [blade.edge.pixels for blade in photo.measured]
+    points += [blade.pivot_px[None] for blade in photo.measured]
+    corners = np.concatenate([*points, *borders])
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    room = _MARGIN * float((high - low).max())
+    left, top = np.maximum(np.floor(low - room).astype(int), 0)
+    right, bottom = np.minimum(np.ceil(high + room).astype(int), [width, height])
+    return int(left), int(top), int(right), int(bottom)

@@ -2,8 +2,11 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.special import ndtr
 
 from scissorcal.aliases import Array
 
@@ -42,8 +45,6 @@ class Crossings:
 
 def sampled(light: Light, points: Array, normals: Array, reach: float, step: float) -> Array:
     """Light (n, m) along each normal, from -reach to +reach pixels about each point."""
-    import cv2
-
     u = np.arange(-round(reach / step), round(reach / step) + 1) * step
     x = points[:, :1] + normals[:, :1] * u
     y = points[:, 1:] + normals[:, 1:] * u
@@ -68,8 +69,6 @@ def steepest(
     may have the stronger border: with ``innermost``, the innermost of the lines that are steep
     enough (a share of the steepest, in the logarithm of light) is taken.
     """
-    from scipy.ndimage import gaussian_filter1d
-
     profile = sampled(light, points, normals, reach, 1.0)
     if innermost:
         profile = np.log(np.maximum(profile, DARKEST))
@@ -108,8 +107,6 @@ def _sharpness_across(profile: Array, soft: float) -> Array:
     A step of blur b has the slope 1 / sqrt(b^2 + s^2) after smoothing by s; what remains of it
     less `LOSS` times that at `COARSE` times the scale is positive for b below 1.8 ``soft`` only.
     """
-    from scipy.ndimage import gaussian_filter1d
-
     fine, coarse = (
         gaussian_filter1d(profile, s, axis=1, order=1, mode="nearest")
         for s in (soft, COARSE * soft)
@@ -187,8 +184,6 @@ def _start(profile: Array, u: Array) -> Array:
 
 
 def _model(state: Array, u: Array) -> tuple[Array, Array]:
-    from scipy.special import ndtr
-
     a, b, c, d, place, blur = (state[:, [k]] for k in range(6))
     v = u - place
     z = v / blur

@@ -1,14 +1,21 @@
-"""Handles, blades, pivot and opening angle in the outline of scissors."""
+"""Handles, blades, pivot and opening angle in the outline of scissors, and their lamp's side."""
 
 from dataclasses import dataclass, replace
 from typing import Any
 
+import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.vision.blade.parts import BACK_LAST, BladeParts
-from scissorcal.vision.blade.silhouette import Silhouette
+from scissorcal.vision.blade.silhouette import BACK_LAST, BladeParts, Silhouette
+
+_LEAST_DARK, _MOST_DARK = 0.04, 0.6
+_REACH = 0.12
+_LEAST_LEAN = 0.2
+"""Mean direction of penumbra from the silhouette, from 0 (alike on all sides) to 1, that counts."""
+
 
 OPEN_FIRST = 0.55
 """Where halving begins on open blades, in shares of the length: a range that is seen at most
@@ -92,8 +99,6 @@ def find_scissors(shape: Silhouette, source: str, *, whole: bool = False) -> Sci
 
 def _refuse_others(shape: Silhouette, source: str) -> None:
     """Refuse further objects; a handle that bright metal separates from the rest is near it."""
-    from scipy.spatial import cKDTree
-
     size = float(np.ptp(shape.outer, axis=0).max())
     tree = cKDTree(shape.outer)
     away = [float(np.min(tree.query(other)[0])) for other in shape.others]
@@ -105,15 +110,13 @@ def _refuse_others(shape: Silhouette, source: str) -> None:
 
 
 def _rings(shape: Silhouette) -> tuple[Array, ...]:
-    import cv2
-
     size = float(np.ptp(shape.outer, axis=0).max())
-    found = []
+    rings = []
     for hole in shape.holes:
         _, sides, _ = cv2.minAreaRect(hole.astype(np.float32))
         if min(sides) > _RING_SHARE * size:
-            found.append(hole)
-    return tuple(found)
+            rings.append(hole)
+    return tuple(rings)
 
 
 def _prongs(outline: Array) -> str:
@@ -126,8 +129,6 @@ def _prongs(outline: Array) -> str:
 
 def _notches(outline: Array) -> list[tuple[int, int, int, float]]:
     """Start, end, deepest point (indices) and depth of an outline's convexity defects."""
-    import cv2
-
     scale = 1e4 / float(np.ptp(outline, axis=0).max())
     whole = np.rint((outline - outline.min(axis=0)) * scale).astype(np.int32)[:, None, :]
     hull = np.sort(cv2.convexHull(whole, returnPoints=False).ravel())[::-1]
@@ -189,13 +190,13 @@ def _open(
         axis = line[1] * np.sign(line[1] @ axis)
         up = np.array([axis[1], -axis[0]])
         up = up * np.sign(np.median((back - pivot) @ up) - np.median((edge - pivot) @ up))
-        own = BladeParts(pivot, axis, up, edge, back, np.empty((0, 2)), 0.0, sd)
-        stop = float(own.frame(np.concatenate([edge, back]))[:, 0].max())
-        clear = own.frame(crotch[None])[0, 0] + _CLEAR_OF_CROTCH * stop
+        rough = BladeParts(pivot, axis, up, edge, back, np.empty((0, 2)), 0.0, sd)
+        stop = float(rough.frame(np.concatenate([edge, back]))[:, 0].max())
+        clear = rough.frame(crotch[None])[0, 0] + _CLEAR_OF_CROTCH * stop
         last = stop * (1.0 - _TIP_SHARE)
-        edge, back = (_between(own, side, clear, last) for side in (own.edge, own.back))
+        edge, back = (_between(rough, side, clear, last) for side in (rough.edge, rough.back))
         halved = (max(OPEN_FIRST, clear / stop), BACK_LAST)
-        blades.append(replace(own, edge=edge, back=back, length=stop, halved=halved))
+        blades.append(replace(rough, edge=edge, back=back, length=stop, halved=halved))
     cosine = float(np.clip(blades[0].axis @ blades[1].axis, -1.0, 1.0))
     opening = float(np.arccos(cosine))
     if min(len(b.edge) for b in blades) < 20 or opening < LEAST_OPENING:
@@ -235,10 +236,10 @@ def _closed(shape: Silhouette, tip: Array, handles: Array, rings: tuple[Array, .
 
 
 def _pivot(shape: Silhouette, guess: Array, length: float) -> tuple[Array, float, bool]:
-    found = _best_screw(shape, guess[None], length, _SCREW_NEAR)
-    if found is None:
+    screw = _best_screw(shape, guess[None], length, _SCREW_NEAR)
+    if screw is None:
         return guess, _GUESS_SD_SHARE * length, False
-    return found[0], 0.2 * found[1], True
+    return screw[0], 0.2 * screw[1], True
 
 
 def _best_screw(
@@ -249,8 +250,6 @@ def _best_screw(
     A circle is clear where the light changes across most of its length, in either sense. Larger
     circles score higher than a glint, and those with structure inside higher than even patches.
     """
-    import cv2
-
     centre = shape.grid(near)
     size = length / shape.pixel
     light = np.clip(shape.relative * 170.0, 0, 255).astype(np.uint8)
@@ -332,3 +331,35 @@ def _between(parts: BladeParts, side: Array, first: float, last: float) -> Array
     station = parts.frame(side)[:, 0]
     kept = side[(station > first) & (station < last)]
     return np.asarray(kept[np.argsort(parts.frame(kept)[:, 0])])
+
+
+def lamp_direction(shape: Silhouette, scissors: Scissors) -> float | None:
+    """The direction in which the shadow falls, in degrees from between the tips; None without one.
+
+    Around the silhouette the sheet is darkened by the penumbra, on the side away from the lamp
+    farther than on the other. Each darkened place counts with its darkness and its direction from
+    the nearest place of the silhouette.
+    """
+    inside = (shape.mask > 0).astype(np.uint8)
+    distance, nearest = cv2.distanceTransformWithLabels(
+        1 - inside, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    dark = 1.0 - cv2.GaussianBlur(shape.relative, (0, 0), 1.0)
+    reach = _REACH * scissors.length / shape.pixel
+    rows, columns = np.nonzero(
+        (distance > 1.5) & (distance < reach) & (dark > _LEAST_DARK) & (dark < _MOST_DARK)
+    )
+    if len(rows) < 50 or not len(scissors.blades):
+        return None
+    places = np.zeros((int(nearest.max()) + 1, 2))
+    inner = np.nonzero(inside)
+    places[nearest[inner]] = np.column_stack([inner[1], inner[0]])
+    away = np.column_stack([columns, rows]) - places[nearest[rows, columns]]
+    weight = dark[rows, columns]
+    total = float(np.sum(weight * np.linalg.norm(away, axis=1)))
+    lean = np.sum(weight[:, None] * away, axis=0) / max(total, 1e-12)
+    if float(np.linalg.norm(lean)) < _LEAST_LEAN:
+        return None
+    forward = np.sum([blade.axis for blade in scissors.blades], axis=0)
+    turn = np.arctan2(lean[1], lean[0]) - np.arctan2(forward[1], forward[0])
+    return float(np.degrees(turn) % 360.0)

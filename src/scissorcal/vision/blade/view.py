@@ -1,18 +1,122 @@
-"""The mapping from pixels to the sheet under a blade, with its covariance."""
+"""The mapping from pixels to the sheet under a blade, with its covariance.
+
+The sheet is the mat with its markers, or bare, under a camera that is held above it by hand.
+"""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
+import cv2
 import numpy as np
+from scipy.optimize import least_squares
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.recipe.photograph_priors import BladePriors
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.geometry.board_pose import Corners, locate_board, project_pose
 from scissorcal.vision.geometry.camera import PARAMETERS, Camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import BLADE_MAT, MAT_FIELD_M
 from scissorcal.vision.targets.detect import Detection, find_board
+
+FOCAL_SHARE = 0.85
+"""Focal length over the picture's longer side: 0.72 of a telephone's wide lens to 1.0 of a normal
+one. It only turns a tilt into a change of scale across the picture."""
+
+
+@dataclass(frozen=True)
+class PlainView:
+    """A photograph of a bare sheet: shapes up to similarity, or to scale with ``scale``.
+
+    ``scale`` is metres per pixel, None where it is unknown. ``lean`` is the camera's tilt (rad,
+    towards x and y of the picture) and the two components by which the tilt foreshortens lengths;
+    ``lean_covariance`` (4, 4) is theirs. The sheet's unit is that of a pixel in the middle.
+    """
+
+    bounds: tuple[float, float, float, float]
+    scale: float | None = None
+    scale_share_sd: float = 0.0
+    lean: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    lean_covariance: Array | None = None
+
+    @classmethod
+    def by_hand(
+        cls, width: int, height: int, priors: BladePriors, scale: float | None = None
+    ) -> "PlainView":
+        """A picture of ``width`` by ``height`` pixels by a camera whose tilt has a prior only.
+
+        Foreshortening is of second order: with tilts p and q it is (p^2 - q^2) / 4 and p q / 2.
+        """
+        unit = scale or 1.0
+        tilt = np.radians(priors.tilt_sd_deg) ** 2
+        covariance = np.diag([tilt, tilt, 0.25 * tilt**2, 0.25 * tilt**2])
+        bounds = (0.0, 0.0, (width - 1) * unit, (height - 1) * unit)
+        sd = 0.01 * priors.scale_sd_percent if scale else 0.0
+        return cls(bounds, scale, sd, lean_covariance=covariance)
+
+    @property
+    def metric(self) -> bool:
+        return self.scale is not None
+
+    @property
+    def uncertainty(self) -> str:
+        tilt = np.degrees(np.hypot(*self.lean[:2]))
+        tilt_sentence = (
+            f"the blades' lengths suggest a tilt of {tilt:.1f} deg, which is allowed for"
+        )
+        if self.scale is None:
+            return f"No mat: the shape has no scale, and {tilt_sentence}."
+        return f"No mat: the scale is as stated, and {tilt_sentence}."
+
+    @property
+    def values(self) -> Array:
+        return np.array([*self.lean, 1.0])
+
+    @property
+    def covariance(self) -> Array:
+        covariance = np.zeros((5, 5))
+        if self.lean_covariance is not None:
+            covariance[:4, :4] = self.lean_covariance
+        covariance[4, 4] = self.scale_share_sd**2
+        return covariance
+
+    @property
+    def shared(self) -> int:
+        return 1
+
+    @property
+    def own_error(self) -> str:
+        return "tilt"
+
+    def leaning(self, lean: Array, covariance: Array) -> "PlainView":
+        """The same view with another estimate of its tilt."""
+        p, q, u, v = (float(value) for value in lean)
+        return replace(self, lean=(p, q, u, v), lean_covariance=covariance)
+
+    def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
+        p, q, u, v, share = self.values if values is None else values
+        middle, focal, unit = self._frame()
+        n = (pixels - middle) / focal
+        stretched = n @ np.array([[1.0 + u, v], [v, 1.0 - u]])
+        depth = 1.0 - n @ np.array([p, q])
+        return np.asarray((middle + focal * stretched / depth[:, None]) * (unit * share))
+
+    def to_pixels(self, points: Array) -> Array:
+        p, q, u, v, share = self.values
+        middle, focal, unit = self._frame()
+        m = (points / (unit * share) - middle) / focal
+        # (S + m t') n = m, two by two for each point
+        a, b = 1.0 + u + m[:, 0] * p, v + m[:, 0] * q
+        c, d = v + m[:, 1] * p, 1.0 - u + m[:, 1] * q
+        n = np.column_stack([d * m[:, 0] - b * m[:, 1], a * m[:, 1] - c * m[:, 0]])
+        return np.asarray(middle + focal * n / (a * d - b * c)[:, None])
+
+    def _frame(self) -> tuple[Array, float, float]:
+        """Middle of the picture and focal length in pixels, and the size of a pixel."""
+        unit = self.scale or 1.0
+        size = np.array(self.bounds[2:]) / unit
+        return 0.5 * size, FOCAL_SHARE * float(size.max() + 1.0), unit
+
 
 LEAST_MARKERS = 6
 
@@ -66,18 +170,18 @@ def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePrio
     where no mat, another target, or too little of it is seen, or where the camera is not that of
     the photograph.
     """
-    seen = find_board(photo, BLADE_MAT)
-    if len(seen.ids) < 4 * LEAST_MARKERS:
+    detection = find_board(photo, BLADE_MAT)
+    if len(detection.ids) < 4 * LEAST_MARKERS:
         raise InputError(
-            f"{photo.source} shows {len(seen.ids) // 4} of the {BLADE_MAT.name}'s "
+            f"{photo.source} shows {len(detection.ids) // 4} of the {BLADE_MAT.name}'s "
             f"{len(BLADE_MAT.ids)} markers sharply; {LEAST_MARKERS} are needed. Photograph the "
             "whole mat, in focus and without glare."
         )
     height, width = photo.image.shape[:2]
-    seen = replace(seen, pixels=photo.within(seen.pixels))
+    detection = replace(detection, pixels=photo.within(detection.pixels))
     printed = (0.01 * priors.print_scale_sd_percent) ** 2 * np.eye(2)
     if camera is None:
-        return _homography_view(seen, (width, height), printed, photo.source)
+        return _homography_view(detection, (width, height), printed, photo.source)
     if (camera.width, camera.height) != (photo.width, photo.height):
         raise InputError(
             f"{photo.source} has {photo.width} x {photo.height} pixels, but the camera was fitted "
@@ -85,7 +189,7 @@ def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePrio
         )
     if photo.reduction > 1:
         camera = camera.scaled(width, height)
-    return _camera_view(seen, camera, printed, photo.source)
+    return _camera_view(detection, camera, printed, photo.source)
 
 
 @dataclass(frozen=True)
@@ -115,8 +219,6 @@ class CameraView(_MatView):
         return np.concatenate([self.pose, self.camera.parameters, np.ones(2)])
 
     def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
-        import cv2
-
         v = self.values if values is None else values
         rays = _with_intrinsics(self.camera, v[6:-2]).rays(pixels)
         rotation = cv2.Rodrigues(v[:3])[0]
@@ -126,8 +228,6 @@ class CameraView(_MatView):
         return np.asarray((origin[:2] - directions[:, :2] * reach[:, None]) * v[-2:])
 
     def to_pixels(self, points: Array) -> Array:
-        import cv2
-
         rotation = cv2.Rodrigues(self.pose[:3])[0]
         return self.camera.project(points @ rotation[:, :2].T + self.pose[3:6])
 
@@ -162,10 +262,8 @@ class HomographyView(_MatView):
         return np.asarray(bent * _half(self.size) + _middle(self.size))
 
 
-def _camera_view(seen: Detection, camera: Camera, printed: Array, source: str) -> CameraView:
-    import cv2
-
-    corners = Corners.of(seen)
+def _camera_view(detection: Detection, camera: Camera, printed: Array, source: str) -> CameraView:
+    corners = Corners.of(detection)
     try:
         board = locate_board(corners, camera)
     except ValueError as error:
@@ -175,11 +273,11 @@ def _camera_view(seen: Detection, camera: Camera, printed: Array, source: str) -
     pose = np.concatenate([np.ravel(turn), np.asarray(board.pose.translation_m)])
     residual, slope = project_pose(pose, corners.where(whole), camera)
     J, inner = slope[:, :6], slope[:, 6:]
-    own, spread = _covariance(J, residual.ravel())
+    measured, spread = _covariance(J, residual.ravel())
     follow = -np.linalg.solve(J.T @ J, J.T @ inner)
     known = np.zeros((9, 9)) if camera.covariance is None else camera.covariance
     covariance = np.zeros((17, 17))
-    covariance[:6, :6] = own + follow @ known @ follow.T
+    covariance[:6, :6] = measured + follow @ known @ follow.T
     covariance[:6, 6:15] = follow @ known
     covariance[6:15, :6] = covariance[:6, 6:15].T
     covariance[6:15, 6:15] = known
@@ -189,12 +287,9 @@ def _camera_view(seen: Detection, camera: Camera, printed: Array, source: str) -
 
 
 def _homography_view(
-    seen: Detection, size: tuple[int, int], printed: Array, source: str
+    detection: Detection, size: tuple[int, int], printed: Array, source: str
 ) -> HomographyView:
-    import cv2
-    from scipy.optimize import least_squares
-
-    sheet, pixels = seen.points[:, :2], seen.pixels
+    sheet, pixels = detection.points[:, :2], detection.pixels
     start, _ = cv2.findHomography(_straightened(pixels, 0.0, size), sheet, 0)
     if start is None:
         raise InputError(f"{source}: the mat's markers do not fit a flat sheet.")
@@ -214,9 +309,9 @@ def _homography_view(
         solved = least_squares(miss, solved.x, x_scale="jac", method="lm")
     # what a lens does beyond one radial term is smooth: no more pieces of it than parameters
     J = np.asarray(solved.jac)
-    own, spread = _covariance(J, np.asarray(solved.fun), len(J) / J.shape[1])
+    measured, spread = _covariance(J, np.asarray(solved.fun), len(J) / J.shape[1])
     covariance = np.zeros((11, 11))
-    covariance[:9, :9] = own
+    covariance[:9, :9] = measured
     covariance[9:, 9:] = printed
     words = (
         "No camera fit: a homography and one radial term, with corner residuals of "

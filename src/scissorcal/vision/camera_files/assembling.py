@@ -6,16 +6,28 @@ from typing import Literal
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.vision.camera_files.checks import check_coefficients, check_matrix, check_size
-from scissorcal.vision.camera_files.keys import Entry, Facts, is_off, is_zero
-from scissorcal.vision.camera_files.models import (
+from scissorcal.vision.camera_files.keys import (
     ONLY_PINHOLE,
     Distortion,
+    Entry,
+    Facts,
+    RefusedError,
     distortion_of,
+    is_off,
+    is_zero,
     refused_model,
+    short,
+    shown,
 )
-from scissorcal.vision.camera_files.numbers import array_at, number_at, size_at, vector_at
-from scissorcal.vision.camera_files.refusal import RefusedError, short, shown
+from scissorcal.vision.camera_files.values import (
+    array_at,
+    check_coefficients,
+    check_matrix,
+    check_size,
+    number_at,
+    size_at,
+    vector_at,
+)
 from scissorcal.vision.camera_files.vocabulary import OWN
 from scissorcal.vision.geometry.camera import Camera
 
@@ -57,23 +69,23 @@ def _model(facts: Facts) -> Distortion | Literal["open"]:
     for entry in stated:
         kind = refused_model(str(entry.value))
         if kind and not ("Brown" in kind and _without_distortion(facts)):
-            name = "-".join(short(one.value) for one in stated)
+            name = "-".join(short(stated_distortion.value) for stated_distortion in stated)
             raise RefusedError(f"has the model {name} ({entry.place}), {kind}; {ONLY_PINHOLE}")
-    found: Distortion | Literal["open"] = "open"
+    distortion: Distortion | Literal["open"] = "open"
     for entry in stated:
         unused = refused_model(str(entry.value)) is not None
-        one = "none" if unused else distortion_of(str(entry.value))
-        if one is None or not isinstance(entry.value, str):
+        stated_distortion = "none" if unused else distortion_of(str(entry.value))
+        if stated_distortion is None or not isinstance(entry.value, str):
             raise RefusedError(
                 f"has the model {short(entry.value)} ({entry.place}), which is not known. Where "
                 f"that is the name of a product, delete it; otherwise {ONLY_PINHOLE}"
             )
-        if one != "open" and found not in ("open", one):
+        if stated_distortion != "open" and distortion not in ("open", stated_distortion):
             raise RefusedError(
                 f"states two models ({shown([str(e.value) for e in stated])}): correct it."
             )
-        found = one if one != "open" else found
-    return found
+        distortion = stated_distortion if stated_distortion != "open" else distortion
+    return distortion
 
 
 def _without_distortion(facts: Facts) -> bool:
@@ -127,12 +139,12 @@ def _refuse_unknown(facts: Facts) -> None:
 
 
 def _size(facts: Facts) -> tuple[float, float]:
-    sizes = [(one, size_at(one)) for one in facts.get("size")]
-    sizes += [(one, size_at(one)[::-1]) for one in facts.get("shape")]
-    widths = [(one.place, number_at(one)) for one in facts.get("width")]
-    heights = [(one.place, number_at(one)) for one in facts.get("height")]
-    width = _agreed(widths + [(one.place, size[0]) for one, size in sizes])
-    height = _agreed(heights + [(one.place, size[1]) for one, size in sizes])
+    sizes = [(entry, size_at(entry)) for entry in facts.get("size")]
+    sizes += [(entry, size_at(entry)[::-1]) for entry in facts.get("shape")]
+    widths = [(entry.place, number_at(entry)) for entry in facts.get("width")]
+    heights = [(entry.place, number_at(entry)) for entry in facts.get("height")]
+    width = _agreed(widths + [(entry.place, size[0]) for entry, size in sizes])
+    height = _agreed(heights + [(entry.place, size[1]) for entry, size in sizes])
     assert width is not None  # as _refuse_unknown has found them
     assert height is not None
     check_size(width, height)
@@ -155,7 +167,7 @@ def _refuse_part_of_picture(facts: Facts, width: float, height: float) -> None:
         value = entry.value
         binned = list(value.values()) if isinstance(value, dict) else value
         binned = binned if isinstance(binned, list) else [binned]
-        if any(number_at(Entry(entry.place, one)) not in (0.0, 1.0) for one in binned):
+        if any(number_at(Entry(entry.place, number)) not in (0.0, 1.0) for number in binned):
             raise RefusedError(
                 f"it is {short(entry.value)}: pictures are smaller than the size of the matrix. "
                 "Calibrate with pictures as the camera gives them, or switch binning off.",
@@ -163,12 +175,14 @@ def _refuse_part_of_picture(facts: Facts, width: float, height: float) -> None:
             )
     for entry in facts.get("roi"):
         part = entry.value if isinstance(entry.value, dict) else {"roi": entry.value}
-        numbers = {key: one for key, one in part.items() if key != "do_rectify"}
+        numbers = {key: number for key, number in part.items() if key != "do_rectify"}
         full = {"x_offset": 0.0, "y_offset": 0.0, "width": width, "height": height}
-        for key, one in numbers.items():
-            if not is_zero(one) and number_at(Entry(f"{entry.place}.{key}", one)) != full.get(key):
+        for key, number in numbers.items():
+            if not is_zero(number) and number_at(Entry(f"{entry.place}.{key}", number)) != full.get(
+                key
+            ):
                 raise RefusedError(
-                    f"{key} is {short(one)}: pictures are a part of {width:g} x {height:g}. "
+                    f"{key} is {short(number)}: pictures are a part of {width:g} x {height:g}. "
                     "Calibrate with pictures as the camera gives them, or with its whole picture.",
                     entry.place,
                 )
@@ -176,21 +190,23 @@ def _refuse_part_of_picture(facts: Facts, width: float, height: float) -> None:
 
 def _matrix(facts: Facts) -> tuple[Array, str]:
     """The matrix (3, 3) and its place."""
-    found = [(one.place, _square(one)) for one in facts.get("matrix")]
-    for one in facts.get("intrinsics"):
-        values = array_at(one)
+    matrices = [(entry.place, _square(entry)) for entry in facts.get("matrix")]
+    for entry in facts.get("intrinsics"):
+        values = array_at(entry)
         if values.ndim == 1 and values.size not in (4, 9):
             raise RefusedError(
                 f"it has {values.size} numbers; fx, fy, cx and cy are needed. Save the file again.",
-                one.place,
+                entry.place,
             )
-        found.append((one.place, _of_four(*values) if values.shape == (4,) else _square(one)))
-    for place, other in found[1:]:
-        if not np.allclose(other, found[0][1], rtol=1e-6, atol=1e-6, equal_nan=True):
-            raise RefusedError(f"states {found[0][0]} and {place}, which differ. Keep one.")
-    named = {name: _named(facts, name, found) for name in ("fx", "fy", "cx", "cy")}
-    if found:
-        return found[0][1], found[0][0]
+        matrices.append(
+            (entry.place, _of_four(*values) if values.shape == (4,) else _square(entry))
+        )
+    for place, other in matrices[1:]:
+        if not np.allclose(other, matrices[0][1], rtol=1e-6, atol=1e-6, equal_nan=True):
+            raise RefusedError(f"states {matrices[0][0]} and {place}, which differ. Keep one.")
+    named = {name: _named(facts, name, matrices) for name in ("fx", "fy", "cx", "cy")}
+    if matrices:
+        return matrices[0][1], matrices[0][0]
     missing = [name for name, value in named.items() if value is None]
     if missing:
         raise RefusedError(f"has no {' and no '.join(missing)}. Add what is missing.")
@@ -202,24 +218,24 @@ def _named(facts: Facts, name: str, matrices: list[tuple[str, Array]]) -> float 
     """fx, fy, cx or cy by its name, of a list of two, or of a matrix; all must agree."""
     at = {"fx": (0, 0), "fy": (1, 1), "cx": (0, 2), "cy": (1, 2)}[name]
     stated = [(place, float(K[at])) for place, K in matrices]
-    stated += [(one.place, number_at(one)) for one in facts.get(name)]
+    stated += [(entry.place, number_at(entry)) for entry in facts.get(name)]
     focal = name in ("fx", "fy")
-    stated += [(one.place, number_at(one)) for one in facts.get("f") if focal]
-    for one in facts.get("focal" if focal else "centre"):
-        structured = isinstance(one.value, (list, dict))
-        values = [number_at(one)] * 2 if focal and not structured else list(vector_at(one))
+    stated += [(entry.place, number_at(entry)) for entry in facts.get("f") if focal]
+    for entry in facts.get("focal" if focal else "centre"):
+        structured = isinstance(entry.value, (list, dict))
+        values = [number_at(entry)] * 2 if focal and not structured else list(vector_at(entry))
         if len(values) != 2:
-            raise RefusedError("it is not two numbers.", one.place)
-        stated.append((one.place, float(values[int(name in ("fy", "cy"))])))
+            raise RefusedError("it is not two numbers.", entry.place)
+        stated.append((entry.place, float(values[int(name in ("fy", "cy"))])))
     return _agreed(stated)
 
 
 def _square(entry: Entry) -> Array:
-    found = array_at(entry)
-    if found.size != 9 or found.shape not in ((9,), (3, 3), (1, 9), (9, 1)):
-        shape = " x ".join(map(str, found.shape))
+    values = array_at(entry)
+    if values.size != 9 or values.shape not in ((9,), (3, 3), (1, 9), (9, 1)):
+        shape = " x ".join(map(str, values.shape))
         raise RefusedError(f"it is {shape} numbers where a 3 x 3 matrix is needed.", entry.place)
-    return found.reshape(3, 3)
+    return values.reshape(3, 3)
 
 
 def _of_four(fx: float, fy: float, cx: float, cy: float) -> Array:
@@ -228,10 +244,10 @@ def _of_four(fx: float, fy: float, cx: float, cy: float) -> Array:
 
 def _distortion(facts: Facts, model: str) -> Array:
     """Coefficients in OpenCV's order, as many as the file has; five where k6 to k4 are zero."""
-    found = [(one.place, vector_at(one)) for one in facts.get("distortion")]
+    stated = [(entry.place, vector_at(entry)) for entry in facts.get("distortion")]
     if facts.get(*_COEFFICIENTS):
-        found.append(_by_name(facts))
-    for place, values in found:
+        stated.append(_by_name(facts))
+    for place, values in stated:
         check_coefficients(values, place)
         if len(values) not in _LENGTHS:
             raise RefusedError(
@@ -245,13 +261,13 @@ def _distortion(facts: Facts, model: str) -> Array:
                 f"zero; {ONLY_PINHOLE}",
                 place,
             )
-        others = found[0][1]
+        others = stated[0][1]
         size = max(len(values), len(others))
         if not np.allclose(_padded(values, size), _padded(others, size), rtol=1e-6, atol=0.0):
-            raise RefusedError(f"states {found[0][0]} and {place}, which differ. Keep one.")
-    if not found and model in ("plumb_bob", "rational_polynomial"):
+            raise RefusedError(f"states {stated[0][0]} and {place}, which differ. Keep one.")
+    if not stated and model in ("plumb_bob", "rational_polynomial"):
         raise RefusedError(f"names the model {model} and has no distortion coefficients. Add them.")
-    place, values = found[0] if found else ("", np.zeros(0))
+    place, values = stated[0] if stated else ("", np.zeros(0))
     values = values[:8] if any(values[5:8]) else values[:5]
     if model == "none" and values.any():
         raise RefusedError("the model is without distortion, and coefficients are not zero.", place)
@@ -265,7 +281,7 @@ def _distortion(facts: Facts, model: str) -> Array:
 def _by_name(facts: Facts) -> tuple[str, Array]:
     """k1, k2, p1, p2, k3 to k6 by name, as far as they go; those between are zero."""
     stated = {
-        name: _agreed([(one.place, number_at(one)) for one in facts.get(name)])
+        name: _agreed([(entry.place, number_at(entry)) for entry in facts.get(name)])
         for name in _COEFFICIENTS
     }
     place = facts.get(*_COEFFICIENTS)[0].place
@@ -290,8 +306,8 @@ def _said_of_open_model(coefficients: Array, facts: Facts) -> str:
             "The file states no distortion, so the camera was taken as a pinhole without any: add "
             "distortion_coefficients unless its pictures are undistorted."
         )
-    said = f"The file names no distortion model; its coefficients were taken as {names} "
-    said += "(rational_polynomial)." if count > 5 else "(plumb_bob)."
+    sentence = f"The file names no distortion model; its coefficients were taken as {names} "
+    sentence += "(rational_polynomial)." if count > 5 else "(plumb_bob)."
     if count == 4 and not facts.get("p1", "p2"):
-        said += " A fisheye calibration has four, too: check that it is none."
-    return said
+        sentence += " A fisheye calibration has four, too: check that it is none."
+    return sentence

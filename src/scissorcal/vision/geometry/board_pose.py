@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.recipe.photograph_priors import PlatePriors
+from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
 from scissorcal.vision.targets.detect import Detection
@@ -147,22 +148,20 @@ class _Refined:
 
 
 def _both(corners: Corners, camera: Camera) -> list[Array]:
-    import cv2
-
     middle = np.append(corners.points[:, :2].mean(axis=0), 0.0)
     rays = camera.rays(corners.pixels)
     _, turns, shifts, _ = cv2.solvePnPGeneric(
         corners.points - middle, rays[:, None, :], np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
     )
-    found = []
+    poses = []
     for turn, shift in zip(turns, shifts, strict=True):
         matrix = cv2.Rodrigues(turn)[0]
         translation = shift.ravel() - matrix @ middle
         if np.all(np.isfinite(translation)):
-            found.append(np.concatenate([turn.ravel(), translation]))
-    if not found:
+            poses.append(np.concatenate([turn.ravel(), translation]))
+    if not poses:
         raise ValueError("no pose in front of the camera explains the corners")
-    return found
+    return poses
 
 
 def project_pose(pose: Array, corners: Corners, camera: Camera) -> tuple[Array, Array]:
@@ -170,8 +169,6 @@ def project_pose(pose: Array, corners: Corners, camera: Camera) -> tuple[Array, 
 
     The slopes are by the pose, then by the camera's parameters.
     """
-    import cv2
-
     pixels, slope = cv2.projectPoints(
         corners.points, pose[:3], pose[3:], camera.matrix, camera.coefficients
     )
@@ -190,8 +187,6 @@ def print_slopes(pose: Array, slope: Array, corners: Corners) -> Array:
 
 def _refine(start: Array, corners: Corners, camera: Camera, used: NDArray[np.bool_]) -> _Refined:
     """Minimise the reprojection error of the corners used (Levenberg-Marquardt)."""
-    import cv2
-
     turn, shift = cv2.solvePnPRefineLM(
         corners.points[used],
         corners.pixels[used],
@@ -206,8 +201,8 @@ def _refine(start: Array, corners: Corners, camera: Camera, used: NDArray[np.boo
     return _Refined(pose, residuals, slope, float(np.sum(residuals[used] ** 2)))
 
 
-def _square(found: _Refined) -> float:
-    return found.square
+def _square(refined: _Refined) -> float:
+    return refined.square
 
 
 def near(residuals: Array, used: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -222,17 +217,19 @@ def _components(
 ) -> tuple[float, float]:
     """Variances of a coordinate: independent between frames, and constant for a corner."""
     frames = len(np.unique(corners.frame[used]))
-    seen = residuals[used]
+    kept_residuals = residuals[used]
     labels, place = np.unique(corners.corner[used], return_inverse=True)
     count = np.bincount(place)
-    spare = 2 * len(seen) - 6
+    spare = 2 * len(kept_residuals) - 6
     least = LEAST_SD_PX**2
     if frames == 1:
         usual = priors.corner_weight * priors.corner_sd_px**2
-        found = (usual + float(np.sum(seen**2))) / (priors.corner_weight + spare)
-        return max(found, least), 0.0
-    mean = np.stack([np.bincount(place, seen[:, k]) / count for k in (0, 1)], axis=1)
-    within = float(np.sum((seen - mean[place]) ** 2)) / max(2 * (len(seen) - len(labels)), 1)
+        variance = (usual + float(np.sum(kept_residuals**2))) / (priors.corner_weight + spare)
+        return max(variance, least), 0.0
+    mean = np.stack([np.bincount(place, kept_residuals[:, k]) / count for k in (0, 1)], axis=1)
+    within = float(np.sum((kept_residuals - mean[place]) ** 2)) / max(
+        2 * (len(kept_residuals) - len(labels)), 1
+    )
     between = float(np.sum(count * np.sum(mean**2, axis=1))) / max(2 * len(labels) - 6, 1)
     kept = max((between - within) / float(count.mean()), 0.0)
     return max(within, least / 2), max(kept, least / 2)
@@ -256,8 +253,8 @@ def _covariance(
     turn[:3, :3] = left_jacobian(best.pose[:3])
     gain = turn @ inverse
     printed = print_slopes(best.pose, best.slope, corners)[np.repeat(used, 2)]
-    own = gain @ spread @ gain.T
-    return np.asarray(own), -gain @ by_pose.T @ slope[:, 6:15], -gain @ by_pose.T @ printed
+    by_noise = gain @ spread @ gain.T
+    return np.asarray(by_noise), -gain @ by_pose.T @ slope[:, 6:15], -gain @ by_pose.T @ printed
 
 
 def _ratio(worse: float, better: float) -> float:
@@ -267,7 +264,5 @@ def _ratio(worse: float, better: float) -> float:
 
 def _apart(a: _Refined, b: _Refined) -> bool:
     """Whether two refined poses are different ones and not one found twice."""
-    import cv2
-
     turn = cv2.Rodrigues(cv2.Rodrigues(a.pose[:3])[0] @ cv2.Rodrigues(b.pose[:3])[0].T)[0]
     return float(np.linalg.norm(turn)) > 1e-3

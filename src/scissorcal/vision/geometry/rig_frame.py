@@ -1,4 +1,7 @@
-"""The camera's pose in the rig's frame, from a card of markers on the moving rig."""
+"""The camera's pose in the rig's frame, from a card of markers on the moving rig.
+
+With it, the plate's pose in one picture: what is new in that picture, and what all pictures share.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -6,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.recipe.photograph_priors import PlatePriors
+from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import (
     LEAST_SD_PX,
     BoardPose,
@@ -19,6 +22,23 @@ from scissorcal.vision.geometry.board_pose import (
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, between, left_jacobian
 from scissorcal.vision.targets.detect import Detection
+
+
+@dataclass(frozen=True, eq=False)
+class PicturePose:
+    """T_rig_plate, or T_camera_plate where the rig's frame is not known.
+
+    The covariance of ``pose`` is the whole one. It is the sum of ``noise`` (6, 6), from the errors
+    of corners, which are new in each picture, and ``shared`` (6, 6), from the errors of camera,
+    print and rig card, which are the same in all of them. ``other`` is the second pose that a plane
+    allows.
+    """
+
+    pose: Pose
+    other: Pose | None
+    noise: Array
+    shared: Array
+
 
 OPEN = 3.0
 """Prior standard deviation (rad and m) of both poses: a turn that may be any has 1.8 rad, and no
@@ -100,17 +120,17 @@ def locate_rig(
             "several openings"
         )
     located = [locate_board(view.corners, camera) for view in views]
-    start = _start(views, tuple(found.pose for found in located), middle_m)
-    every = _Rows(views, camera, middle_m, tuple(found.used for found in located))
-    rows, point = every, every.nearest(start)
+    start = _start(views, tuple(board.pose for board in located), middle_m)
+    all_rows = _Rows(views, camera, middle_m, tuple(board.used for board in located))
+    rows, point = all_rows, all_rows.nearest(start)
     for _ in range(REJECTIONS):
         away = rows.residuals(point).reshape(-1, 2)
         sound = near(away, np.ones(len(away), dtype=bool))
         if np.all(sound):
             break
         rows = rows.where(sound)
-        if rows.most_lost(every) > MOST_OF_A_VIEW:
-            rows, point = every, every.nearest(start)
+        if rows.most_lost(all_rows) > MOST_OF_A_VIEW:
+            rows, point = all_rows, all_rows.nearest(start)
             break
         point = rows.nearest(point)
     residual, slope, shared = rows.residuals(point), rows.by_point(point), rows.by_shared(point)
@@ -161,25 +181,25 @@ def _motion(view: CardView) -> Pose:
     return Pose.from_rotation_vector([0.0, 0.0, view.blade_angle_rad], [view.advance_m, 0.0, 0.0])
 
 
-def _start(views: tuple[CardView, ...], seen: tuple[Pose, ...], middle_m: Array) -> Array:
+def _start(views: tuple[CardView, ...], poses: tuple[Pose, ...], middle_m: Array) -> Array:
     """Axes from the pictures' own poses: advances give x, turns give z and the pivot's place."""
     first = views[0]
     shifts, turns = [], []
-    for view, pose in zip(views[1:], seen[1:], strict=True):
+    for view, pose in zip(views[1:], poses[1:], strict=True):
         moved = view.advance_m - first.advance_m
         turned = view.blade_angle_rad - first.blade_angle_rad
-        relative = Pose.from_matrix(pose.matrix @ seen[0].matrix.T, (0.0, 0.0, 0.0))
+        relative = Pose.from_matrix(pose.matrix @ poses[0].matrix.T, (0.0, 0.0, 0.0))
         if abs(turned) > 1e-3:
             turns.append(relative.rotation_vector * np.sign(turned))
         if abs(turned) <= 1e-3 and abs(moved) > 1e-6:
-            shift = pose.apply([middle_m])[0] - seen[0].apply([middle_m])[0]
+            shift = pose.apply([middle_m])[0] - poses[0].apply([middle_m])[0]
             shifts.append(shift * np.sign(moved))
-    z = _unit(np.sum(turns, axis=0)) if turns else _unit(seen[0].matrix[:, 2])
-    x = np.sum(shifts, axis=0) if shifts else seen[0].matrix[:, 0]
+    z = _unit(np.sum(turns, axis=0)) if turns else _unit(poses[0].matrix[:, 2])
+    x = np.sum(shifts, axis=0) if shifts else poses[0].matrix[:, 0]
     x = _unit(x - z * (x @ z))
     axes = np.stack([x, np.cross(z, x), z], axis=1)
     rows, wanted = [], []
-    for view, pose in zip(views, seen, strict=True):
+    for view, pose in zip(views, poses, strict=True):
         # middle_i = origin + x advance_i + R(angle_i) (middle_0 in the rig): linear in both places
         angle = view.blade_angle_rad
         turn = axes @ Pose.from_rotation_vector([0.0, 0.0, angle], np.zeros(3)).matrix
@@ -187,7 +207,7 @@ def _start(views: tuple[CardView, ...], seen: tuple[Pose, ...], middle_m: Array)
         wanted.append(pose.apply([middle_m])[0] - x * view.advance_m)
     places = np.linalg.lstsq(np.concatenate(rows), np.concatenate(wanted), rcond=1e-6)[0]
     rig = Pose.from_matrix(axes, places[:3])
-    turn0 = _motion(first).matrix.T @ axes.T @ seen[0].matrix
+    turn0 = _motion(first).matrix.T @ axes.T @ poses[0].matrix
     card = Pose.from_matrix(turn0, np.zeros(3))
     return np.concatenate([rig.rotation_vector, places[:3], card.rotation_vector, places[3:5]])
 
@@ -212,7 +232,7 @@ class _Rows:
         """The parameters (11,) that leave the least squares, sought from ``start``."""
         from scipy.optimize import least_squares
 
-        found = least_squares(
+        solved = least_squares(
             self.residuals,
             start,
             jac=self.by_point,
@@ -221,11 +241,11 @@ class _Rows:
             xtol=1e-14,
             ftol=1e-12,
         )
-        return np.asarray(found.x)
+        return np.asarray(solved.x)
 
-    def most_lost(self, every: "_Rows") -> float:
+    def most_lost(self, all_rows: "_Rows") -> float:
         """The largest share of one picture's corners that ``every`` uses and this does not."""
-        pairs = zip(self.used, every.used, strict=True)
+        pairs = zip(self.used, all_rows.used, strict=True)
         return float(max(1.0 - now.sum() / max(begun.sum(), 1) for now, begun in pairs))
 
     def where(self, sound: NDArray[np.bool_]) -> "_Rows":
@@ -274,24 +294,8 @@ class _Rows:
 def _card(poses: tuple[Pose, Pose], view: CardView) -> Array:
     """The card's pose before the camera (6,): rotation vector and translation."""
     rig, card = poses
-    seen = rig.after(_motion(view)).after(card)
-    return np.concatenate([seen.rotation_vector, seen.translation_m])
-
-
-@dataclass(frozen=True, eq=False)
-class PicturePose:
-    """T_rig_plate, or T_camera_plate where the rig's frame is not known.
-
-    The covariance of ``pose`` is the whole one. It is the sum of ``noise`` (6, 6), from the errors
-    of corners, which are new in each picture, and ``shared`` (6, 6), from the errors of camera,
-    print and rig card, which are the same in all of them. ``other`` is the second pose that a plane
-    allows.
-    """
-
-    pose: Pose
-    other: Pose | None
-    noise: Array
-    shared: Array
+    in_camera = rig.after(_motion(view)).after(card)
+    return np.concatenate([in_camera.rotation_vector, in_camera.translation_m])
 
 
 def picture_pose(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | None) -> PicturePose:
@@ -304,8 +308,8 @@ def picture_pose(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | No
     pose = (rig.holds(board, camera) if rig else board.pose).after(back)
     exact = replace(rig.camera_rig, covariance=None).inverse() if rig else None
 
-    def placed(seen: Pose) -> Pose:
-        return (exact.after(seen) if exact else seen).after(back)
+    def placed(pose_of_board: Pose) -> Pose:
+        return (exact.after(pose_of_board) if exact else pose_of_board).after(back)
 
     alone = placed(replace(board.pose, covariance=board.noise))
     assert pose.covariance is not None

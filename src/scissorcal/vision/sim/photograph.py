@@ -1,31 +1,29 @@
-"""Rendering of flat shapes in planes through a lens."""
+"""Rendering of flat shapes in planes through a lens, with soft shadows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
+import cv2
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.vision.sim.coverage import coverage
-from scissorcal.vision.sim.lens import Lens, SimPose
-from scissorcal.vision.sim.looks import Bytes, Looks, Picture, develop
-from scissorcal.vision.sim.shadows import CastShadow, cast
+from scissorcal.vision.sim.optics import Bytes, Lens, Looks, Picture, SimPose, coverage, develop
 
 FINEST_PX = 1.5
 """Projected polygons are subdivided to sides this short, which distortion leaves straight."""
 
 _CUT_ALL = 4000
 
+Box = tuple[int, int, int, int]
+"""Left, top, right and bottom border of a part of a picture, in pixels."""
 
-@dataclass(frozen=True)
-class Glare:
-    """A bright patch on metal: an ellipse in the layer's plane with soft borders, metres."""
 
-    centre_m: tuple[float, float]
-    along_m: float
-    across_m: float
-    angle: float = 0.0
-    strength: float = 1.0
+class Laid(Protocol):
+    """What changes the light of a picture: a layer, or what a benchmark adds."""
+
+    def lay(self, radiance: Picture, lens: Lens, rng: np.random.Generator) -> None:
+        """Change the light (h, w) in place."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +34,7 @@ class PaintLayer:
     way round being holes. ``reflectance`` 1 is perfect white. ``shading`` is the relative gain of
     light over 100 mm along x and y; ``brushed`` is how strongly it is streaked along
     ``grain`` (rad). ``shadow_m`` shifts a shadow of the shapes, soft over ``shadow_soft_m``, and
-    takes ``shadow`` of the light. ``texture`` is the relative sd of the material's light, alike
-    over ``texture_m``.
+    takes ``shadow`` of the light.
     """
 
     outlines_m: Sequence[Array]
@@ -46,16 +43,49 @@ class PaintLayer:
     shading: tuple[float, float] = (0.0, 0.0)
     brushed: float = 0.0
     grain: float = 0.0
-    glares: tuple[Glare, ...] = ()
     shadow: float = 0.0
     shadow_m: tuple[float, float] = (0.0, 0.0)
     shadow_soft_m: float = 0.002
-    texture: float = 0.0
-    texture_m: float = 0.001
+
+    def lay(self, radiance: Picture, lens: Lens, rng: np.random.Generator) -> None:
+        """Draw the shapes over a picture, in place."""
+        if self.shadow > 0.0:
+            _cast_shadow(radiance, self, lens)
+        outlines = _seen(self.outlines_m, self, lens)
+        box = _box(outlines, lens, 1)
+        if box is None:
+            return
+        left, top, right, bottom = box
+        share = coverage([o - (left, top) for o in outlines], right - left, bottom - top)
+        part = radiance[top:bottom, left:right]
+        part += share * (self.shade(lens, box, rng) - part)
+
+    def shade(self, lens: Lens, box: Box, rng: np.random.Generator) -> Picture | np.float32:
+        """Reflectance over a box of pixels; metal's changes slowly: every fourth pixel will do."""
+        if not (any(self.shading) or self.brushed):
+            return np.float32(self.reflectance)
+        left, top, right, bottom = box
+        columns, rows = max((right - left) // 4, 2), max((bottom - top) // 4, 2)
+        x, y = np.meshgrid(
+            np.linspace(left, right - 1, columns), np.linspace(top, bottom - 1, rows)
+        )
+        place = _on_plane(np.column_stack([x.ravel(), y.ravel()]), lens, self.pose)
+        light = self.light(place[:, 0].reshape(x.shape), place[:, 1].reshape(x.shape), rng)
+        light = np.asarray(np.clip(light, 0.01, 1.5), dtype=np.float32)
+        return np.asarray(cv2.resize(light, (right - left, bottom - top)), dtype=np.float32)
+
+    def light(self, x: Array, y: Array, rng: np.random.Generator) -> Array:
+        """Reflectance at places of the layer's plane, metres."""
+        light = self.reflectance * (1.0 + 10.0 * (x * self.shading[0] + y * self.shading[1]))
+        if self.brushed:
+            streaks = rng.standard_normal(512)
+            across = (y * np.cos(self.grain) - x * np.sin(self.grain)) / 2e-4
+            light *= 1.0 + self.brushed * np.interp(across % 511.0, np.arange(512), streaks)
+        return np.asarray(light)
 
 
 def render(
-    layers: Sequence[PaintLayer | CastShadow],
+    layers: Sequence[Laid],
     lens: Lens,
     looks: Looks,
     rng: np.random.Generator,
@@ -69,36 +99,15 @@ def render(
     """
     radiance = np.full((lens.height, lens.width), background, dtype=np.float32)
     for layer in layers:
-        if isinstance(layer, CastShadow):
-            cast(radiance, layer, lens)
-        else:
-            _lay(radiance, layer, lens, rng)
+        layer.lay(radiance, lens, rng)
     return develop(radiance, looks, rng)
 
 
-def _lay(radiance: Picture, layer: PaintLayer, lens: Lens, rng: np.random.Generator) -> None:
-    if layer.shadow > 0.0:
-        _cast_shadow(radiance, layer, lens)
-    seen = _seen(layer.outlines_m, layer, lens)
-    box = _box(seen, lens, 1)
-    if box is None:
-        return
-    left, top, right, bottom = box
-    share = coverage([o - (left, top) for o in seen], right - left, bottom - top)
-    part = radiance[top:bottom, left:right]
-    shade = _shade(layer, lens, box, rng)
-    if layer.texture > 0.0:
-        shade = shade * _texture(layer, lens, (bottom - top, right - left), rng)
-    part += share * (shade - part)
-
-
 def _cast_shadow(radiance: Picture, layer: PaintLayer, lens: Lens) -> None:
-    import cv2
-
     moved = [np.asarray(outline) + layer.shadow_m for outline in layer.outlines_m]
-    seen = _seen(moved, layer, lens)
+    outlines = _seen(moved, layer, lens)
     soft = layer.shadow_soft_m * lens.focal_px / float(layer.pose.shift_m[2])
-    box = _box(seen, lens, int(np.ceil(3.0 * soft)) + 1)
+    box = _box(outlines, lens, int(np.ceil(3.0 * soft)) + 1)
     if box is None:
         return
     left, top, right, bottom = box
@@ -108,54 +117,11 @@ def _cast_shadow(radiance: Picture, layer: PaintLayer, lens: Lens) -> None:
         max(int(np.ceil((bottom - top) / small)), 1),
     )
     scale = np.array([size[0] / (right - left), size[1] / (bottom - top)])
-    share = coverage([(o - (left, top) + 0.5) * scale - 0.5 for o in seen], *size)
+    share = coverage([(o - (left, top) + 0.5) * scale - 0.5 for o in outlines], *size)
     if soft > 0.05:
         share = np.asarray(cv2.GaussianBlur(share, (0, 0), soft / small), dtype=np.float32)
     share = np.asarray(cv2.resize(share, (right - left, bottom - top)), dtype=np.float32)
     radiance[top:bottom, left:right] *= 1.0 - layer.shadow * share
-
-
-def _shade(
-    layer: PaintLayer, lens: Lens, box: tuple[int, int, int, int], rng: np.random.Generator
-) -> Picture | np.float32:
-    """Reflectance over a box of pixels; metal's changes slowly, so every fourth pixel is enough."""
-    import cv2
-
-    plain = np.float32(layer.reflectance)
-    if not (any(layer.shading) or layer.brushed or layer.glares):
-        return plain
-    left, top, right, bottom = box
-    columns, rows = max((right - left) // 4, 2), max((bottom - top) // 4, 2)
-    x, y = np.meshgrid(np.linspace(left, right - 1, columns), np.linspace(top, bottom - 1, rows))
-    place = _on_plane(np.column_stack([x.ravel(), y.ravel()]), lens, layer.pose)
-    u, v = place[:, 0].reshape(x.shape), place[:, 1].reshape(x.shape)
-    shade = layer.reflectance * (1.0 + 10.0 * (u * layer.shading[0] + v * layer.shading[1]))
-    if layer.brushed:
-        streaks = rng.standard_normal(512)
-        across = (v * np.cos(layer.grain) - u * np.sin(layer.grain)) / 2e-4
-        shade *= 1.0 + layer.brushed * np.interp(across % 511.0, np.arange(512), streaks)
-    for glare in layer.glares:
-        du, dv = u - glare.centre_m[0], v - glare.centre_m[1]
-        c, s = np.cos(glare.angle), np.sin(glare.angle)
-        far = ((c * du + s * dv) / glare.along_m) ** 2 + ((c * dv - s * du) / glare.across_m) ** 2
-        shade += glare.strength / (1.0 + far**3)
-    shade = np.clip(shade, 0.01, 1.5)
-    return np.asarray(
-        cv2.resize(np.asarray(shade, dtype=np.float32), (right - left, bottom - top)),
-        dtype=np.float32,
-    )
-
-
-def _texture(
-    layer: PaintLayer, lens: Lens, shape: tuple[int, int], rng: np.random.Generator
-) -> Picture:
-    """Relative light of a rough material over a box of pixels, about 1."""
-    import cv2
-
-    reach = max(layer.texture_m * lens.focal_px / float(layer.pose.shift_m[2]), 0.3)
-    grain = cv2.GaussianBlur(rng.standard_normal(shape, dtype=np.float32), (0, 0), reach)
-    rough = np.asarray(grain, dtype=np.float32)
-    return np.asarray(1.0 + layer.texture * rough / max(float(rough.std()), 1e-9), np.float32)
 
 
 def _on_plane(pixels: Array, lens: Lens, pose: SimPose) -> Array:
@@ -193,8 +159,8 @@ def _seen(outlines: Sequence[Array], layer: PaintLayer, lens: Lens) -> list[Arra
     return np.split(lens.sees(fine, layer.pose), ends[joints])
 
 
-def _box(seen: Sequence[Array], lens: Lens, room: int) -> tuple[int, int, int, int] | None:
-    points = np.concatenate([o[np.isfinite(o).all(axis=1)] for o in seen] or [np.empty((0, 2))])
+def _box(outlines: Sequence[Array], lens: Lens, room: int) -> Box | None:
+    points = np.concatenate([o[np.isfinite(o).all(axis=1)] for o in outlines] or [np.empty((0, 2))])
     if not len(points):
         return None
     low, high = points.min(axis=0) - room, points.max(axis=0) + room + 1

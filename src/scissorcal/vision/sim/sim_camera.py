@@ -5,28 +5,30 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recipe.library import specimen_path
-from scissorcal.vision.sim.blades import BladeShape, blade_layer, scissors_layers
-from scissorcal.vision.sim.lens import Lens, SimPose, about
-from scissorcal.vision.sim.looks import Looks, as_jpeg
+from scissorcal.recipe.schema import Recipe
+from scissorcal.vision.sim.optics import Lens, Looks, SimPose, about, as_jpeg
 from scissorcal.vision.sim.photograph import PaintLayer, render
-from scissorcal.vision.sim.plate_scene import LEVEL, PlateScene, plate_scene
-from scissorcal.vision.sim.targets import target_layers
+from scissorcal.vision.sim.scenes import (
+    LEVEL,
+    BladeShape,
+    PlateScene,
+    blade_layer,
+    plate_scene,
+    scissors_layers,
+    target_layers,
+)
 from scissorcal.vision.targets.boards import (
     BLADE_MAT,
     MAT_PIVOT_M,
     PLATE_BOARD,
     Board,
-    MarkedBoard,
 )
-
-if TYPE_CHECKING:
-    from scissorcal.recipe.schema import Recipe
 
 SIM_LENS = Lens(1900.0, (1003.2, 744.9), 2000, 1500, (-0.08, 0.03, 4e-4, -3e-4, 0.0))
 """The lens of every rendered photograph."""
@@ -101,7 +103,6 @@ def render_plate_photographs(
     folder: Path,
     seed: int,
     *,
-    target: MarkedBoard = PLATE_BOARD,
     count: int = 5,
     rig_plate: SimPose | None = None,
 ) -> tuple[Path, ...]:
@@ -112,7 +113,7 @@ def render_plate_photographs(
     scene = sim_plate_scene(recipe, seed, rig_plate)
     paths = [folder / f"plate-{n:02d}.jpg" for n in range(1, count + 1)]
     for path in paths:
-        path.write_bytes(_plate_jpeg(scene, target, (0.0, OPENINGS_DEG[0]), recipe, path, seed))
+        path.write_bytes(_plate_jpeg(scene, (0.0, OPENINGS_DEG[0]), recipe, path, seed))
     return tuple(paths)
 
 
@@ -125,10 +126,10 @@ def render_card_photographs(
     """
     scene = sim_plate_scene(recipe, seed, rig_plate)
     stances = [(advance, opening) for advance in ADVANCES_MM for opening in OPENINGS_DEG]
-    found = {folder / f"rig-{n:02d}.jpg": stance for n, stance in enumerate(stances, start=1)}
-    for path, stance in found.items():
-        path.write_bytes(_plate_jpeg(scene, PLATE_BOARD, stance, recipe, path, seed))
-    return found
+    stance_of = {folder / f"rig-{n:02d}.jpg": stance for n, stance in enumerate(stances, start=1)}
+    for path, stance in stance_of.items():
+        path.write_bytes(_plate_jpeg(scene, stance, recipe, path, seed))
+    return stance_of
 
 
 def render_frame(
@@ -139,9 +140,7 @@ def render_frame(
     ``stance`` is the rig's advance (mm) and opening (deg); ``number`` gives each picture of a seed
     another noise.
     """
-    return _plate_picture(
-        scene, PLATE_BOARD, stance, recipe, np.random.default_rng([seed, 11, number])
-    )
+    return _plate_picture(scene, stance, recipe, np.random.default_rng([seed, 11, number]))
 
 
 def standing_plate(recipe: "Recipe") -> SimPose | None:
@@ -177,7 +176,7 @@ def _view_of(
     nearness: float = 0.85,
     aside: tuple[float, float] = (0.0, 0.0),
 ) -> SimPose:
-    """Pose of a target before the camera; at ``nearness`` 1 it fills the picture.
+    """SimPose of a target before the camera; at ``nearness`` 1 it fills the picture.
 
     ``aside`` shifts the aim from the target's centre, in its widths and heights.
     """
@@ -200,23 +199,21 @@ def _write(layers: Sequence[PaintLayer], rng: np.random.Generator, path: Path) -
 
 def _plate_jpeg(
     scene: PlateScene,
-    target: MarkedBoard,
     stance: tuple[float, float],
     recipe: "Recipe",
     path: Path,
     seed: int,
 ) -> bytes:
     rng = np.random.default_rng([seed, 10, *path.name.encode()])
-    return as_jpeg(_plate_picture(scene, target, stance, recipe, rng), _JPEG_QUALITY)
+    return as_jpeg(_plate_picture(scene, stance, recipe, rng), _JPEG_QUALITY)
 
 
 def _plate_picture(
     scene: PlateScene,
-    target: MarkedBoard,
     stance: tuple[float, float],
     recipe: "Recipe",
     rng: np.random.Generator,
 ) -> NDArray[np.uint8]:
     advance_mm, opening_deg = stance
     angle = float(np.radians(opening_deg)) / recipe.rig.moving_blades
-    return render(scene.layers(target, 1e-3 * advance_mm, angle), SIM_LENS, _LOOKS, rng)
+    return render(scene.layers(PLATE_BOARD, 1e-3 * advance_mm, angle), SIM_LENS, _LOOKS, rng)

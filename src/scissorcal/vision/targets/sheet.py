@@ -1,11 +1,23 @@
-"""The printed sheets: boards at true scale, with rulers to check the printer."""
+"""The printed sheets: boards at true scale, with rulers to check the printer, as PDF and PNG.
 
+The PDF is version 1.4, written by bytes alone (PDF 32000-1:2008): the objects and their table
+(7.5), paths and grey levels (8.5, 8.6.4), text in Helvetica, which every reader has (9.6.2.2), and
+no scaling by the printer (12.2, PrintScaling). The PNG has 20 pixels per millimetre.
+"""
+
+import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
+from pathlib import Path
 from typing import Literal
 
+import cv2
 import numpy as np
+from PIL import Image, ImageDraw, ImageFont
 
+from scissorcal.errors import file_error
+from scissorcal.files import replacing
 from scissorcal.vision.targets.boards import (
     BLADE_MAT,
     CAMERA_BOARD,
@@ -17,6 +29,12 @@ from scissorcal.vision.targets.boards import (
     MarkedBoard,
     dictionary,
 )
+
+_POINTS_PER_MM = 72.0 / 25.4
+
+
+PIXELS_PER_MM = 20
+
 
 Paper = Literal["A4", "Letter"]
 SheetName = Literal["camera", "blade", "plate"]
@@ -129,8 +147,6 @@ def board_ink(
 
 
 def _marker(board: MarkedBoard, marker: int, x: float, y: float, cells: int) -> Iterator[Rectangle]:
-    import cv2
-
     bits = cv2.aruco.generateImageMarker(dictionary(board.dictionary), marker, cells) == 0
     cell = 1e3 * board.marker_m / cells
     for row, dark in enumerate(bits):
@@ -218,3 +234,122 @@ def _identity(board: MarkedBoard) -> str:
         else f"markers {1e3 * board.marker_m:g} mm"
     )
     return f"{board.name} ({board.dictionary} {board.ids[0]}-{board.ids[-1]}, {size})"
+
+
+def write_target(sheet: Sheet, folder: Path) -> tuple[Path, Path]:
+    """Write target-<name>-<paper>.pdf and .png into ``folder``; both at true scale.
+
+    The same sheet gives the same bytes every time. Raises InputError where the folder cannot be
+    written.
+    """
+    stem = f"target-{sheet.name}-{sheet.paper}"
+    contents = {folder / f"{stem}.pdf": sheet_pdf(sheet), folder / f"{stem}.png": sheet_png(sheet)}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, content in contents.items():
+            with replacing(path) as part:
+                part.write_bytes(content)
+    except OSError as error:
+        raise file_error(error, folder) or error from None
+    pdf, png = contents
+    return pdf, png
+
+
+def sheet_png(sheet: Sheet) -> bytes:
+    """Give a sheet as a grey PNG whose resolution is stated in it."""
+    stream = io.BytesIO()
+    inch = PIXELS_PER_MM * 25.4
+    _sheet_picture(sheet).save(stream, format="PNG", dpi=(inch, inch), compress_level=6)
+    return stream.getvalue()
+
+
+def _sheet_picture(sheet: Sheet) -> "Image.Image":
+    """Draw a sheet at `PIXELS_PER_MM`."""
+    scale = PIXELS_PER_MM
+    picture = Image.new("L", (round(sheet.width * scale), round(sheet.height * scale)), 255)
+    draw = ImageDraw.Draw(picture)
+    for shape in sheet.rectangles:
+        left, top = round(shape.x * scale), round(shape.y * scale)
+        right = round((shape.x + shape.width) * scale) - 1
+        low = round((shape.y + shape.height) * scale) - 1
+        draw.rectangle((left, top, right, low), fill=round(255 * shape.level))
+    for words in sheet.words:
+        font = ImageFont.load_default(words.size * scale)
+        draw.text((words.x * scale, words.y * scale), words.text, fill=0, font=font, anchor="ls")
+    return picture
+
+
+def sheet_pdf(sheet: Sheet) -> bytes:
+    """Give a sheet as a PDF of one page; the same sheet gives the same bytes."""
+    drawn = "\n".join((*_rectangles(sheet), *_lines(sheet))).encode("cp1252")
+    title = _escaped(f"scissorcal target: {sheet.name} ({sheet.paper})")
+    size = f"{_points(sheet.width)} {_points(sheet.height)}"
+    return _file(
+        (
+            b"<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
+            b"<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
+            f"<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {size}] /Contents 4 0 R "
+            "/Resources << /Font << /F 5 0 R >> >> >>".encode(),
+            b"<< /Length %d >>\nstream\n%b\nendstream" % (len(drawn), drawn),
+            b"<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica /Encoding /WinAnsiEncoding >>",
+            f"<< /Title ({title}) >>".encode("cp1252"),
+        )
+    )
+
+
+def _rectangles(sheet: Sheet) -> list[str]:
+    """One path for each shade: neighbours in one path have no seam between them."""
+    drawn = []
+    for level in sorted({shape.level for shape in sheet.rectangles}):
+        drawn.append(f"{level:.4f} g")
+        drawn += [
+            _rectangle(sheet, rectangle)
+            for rectangle in sheet.rectangles
+            if rectangle.level == level
+        ]
+        drawn.append("f")
+    return drawn
+
+
+def _rectangle(sheet: Sheet, shape: Rectangle) -> str:
+    low = sheet.height - shape.y - shape.height  # PDF counts from the lower left corner
+    return " ".join(map(_points, (shape.x, low, shape.width, shape.height))) + " re"
+
+
+def _lines(sheet: Sheet) -> list[str]:
+    return ["0 g", *(_line(sheet, words) for words in sheet.words)]
+
+
+def _line(sheet: Sheet, words: Words) -> str:
+    place = f"{_points(words.x)} {_points(sheet.height - words.y)}"
+    return f"BT /F {_points(words.size)} Tf {place} Td ({_escaped(words.text)}) Tj ET"
+
+
+def _points(millimetres: float) -> str:
+    """A length in PDF's unit, 1/72 inch, to 4 nm."""
+    return f"{millimetres * _POINTS_PER_MM:.5f}".rstrip("0").rstrip(".")
+
+
+def _escaped(text: str) -> str:
+    """Text as it stands between the parentheses of a string."""
+    return text.replace("\\", r"\\").replace("(", r"\(").replace(")", r"\)")
+
+
+def _file(objects: tuple[bytes, ...]) -> bytes:
+    """The file of these objects, numbered from 1: the first is the catalog, the last the title."""
+    head = b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n"
+    numbered = [
+        b"%d 0 obj\n%b\nendobj\n" % (number, content)
+        for number, content in enumerate(objects, start=1)
+    ]
+    *places, table = accumulate(map(len, numbered), initial=len(head))
+    count = len(objects) + 1
+    rows = b"".join(b"%010d 00000 n \n" % place for place in places)
+    return b"".join(
+        (
+            *(head, *numbered),
+            b"xref\n0 %d\n0000000000 65535 f \n%b" % (count, rows),
+            b"trailer\n<< /Size %d /Root 1 0 R /Info %d 0 R >>\n" % (count, count - 1),
+            b"startxref\n%d\n%%%%EOF\n" % table,
+        )
+    )

@@ -9,8 +9,8 @@ from scissorcal.aliases import Progress
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.verdicts import Verdict
+from scissorcal.workday.demo.judged import Judged
 from scissorcal.workday.demo.photographs import (
-    JudgedGeometry,
     fit_photographs,
     judge_photographs,
     photograph,
@@ -28,7 +28,7 @@ from scissorcal.workday.workspace import Workspace, create_workspace
 if TYPE_CHECKING:
     import numpy as np
 
-    from scissorcal.calibration import FitResult, FittedParameter
+    from scissorcal.calibration import FitResult
     from scissorcal.calibration.result import Effort
     from scissorcal.calibration.verify.result import VerifyResult
     from scissorcal.device.lockstep import LockstepLink
@@ -47,15 +47,6 @@ BIN_PLACES = 8
 
 
 @dataclass(frozen=True)
-class Judged:
-    """One estimate beside the truth. ``truth`` is None where the chosen law has no such thing."""
-
-    parameter: "FittedParameter"
-    truth: float | None
-    inside: bool | None
-
-
-@dataclass(frozen=True)
 class DemoResult:
     """What a demo ends in: estimates beside the truth, the torque's error, what was rendered.
 
@@ -66,7 +57,6 @@ class DemoResult:
     workspace: Path
     specimen: str
     judged: tuple[Judged, ...]
-    geometry: tuple[JudgedGeometry, ...]
     torque_error: float
     rungs: tuple[str, ...]
     rendering: "RenderResult"
@@ -78,7 +68,6 @@ class DemoResult:
     def share_inside(self) -> float:
         """Share of the 90 % intervals that hold the truth, photographs' among them."""
         known = [row.inside for row in self.judged if row.inside is not None]
-        known += [row.inside for row in self.geometry]
         return sum(known) / len(known)
 
 
@@ -131,8 +120,10 @@ def run_demo(
     return DemoResult(
         workspace=workspace.root,
         specimen=specimen.name,
-        judged=tuple(row for fit in fits_made for row in judge(fit, specimen)),
-        geometry=judge_photographs(workspace, recipe, specimen, seed),
+        judged=(
+            *(row for fit in fits_made for row in judge(fit, specimen)),
+            *judge_photographs(workspace, recipe, specimen, seed),
+        ),
         torque_error=torque_error(package, specimen, recipe),
         rungs=tuple(f"{fit.what}: {fit.rung}" for fit in fits_made),
         rendering=rendering,
@@ -185,12 +176,17 @@ def judge(fit: "FitResult", specimen: "Specimen") -> tuple[Judged, ...]:
     another family than the truth's has a true force at the reference, but no true exponent.
     """
     truth = _truth_for(fit, specimen)
-    rows = []
-    for parameter in fit.parameters:
-        value = truth.get(parameter.name)
-        inside = None if value is None else parameter.q05 <= value <= parameter.q95
-        rows.append(Judged(parameter, value, inside))
-    return tuple(rows)
+    return tuple(
+        Judged(
+            parameter.name,
+            parameter.unit,
+            truth.get(parameter.name),
+            parameter.moments[0] if parameter.moments else parameter.q50,
+            parameter.q05,
+            parameter.q95,
+        )
+        for parameter in fit.parameters
+    )
 
 
 def torque_error(package: "ModelPackage", specimen: "Specimen", recipe: "Recipe") -> float:

@@ -1,12 +1,13 @@
 """The demo's photographs: rendered, taken in and fitted as a lab's own would be, then judged."""
 
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.aliases import Progress
 from scissorcal.recipe.requirements import requirements
+from scissorcal.recording.probe import NORMAL_90
+from scissorcal.workday.demo.judged import Judged
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.photographs import BladeSetup
@@ -19,24 +20,6 @@ from scissorcal.workday.workspace import Workspace
 if TYPE_CHECKING:
     from scissorcal.device.sim.specimen import Specimen
     from scissorcal.recipe.schema import Recipe
-
-
-@dataclass(frozen=True)
-class JudgedGeometry:
-    """One number from photographs beside the truth, with its standard deviation.
-
-    ``inside`` says whether the truth lies in the 90 % interval.
-    """
-
-    name: str
-    unit: str
-    truth: float
-    estimate: float
-    sd: float
-
-    @property
-    def inside(self) -> bool:
-        return abs(self.estimate - self.truth) <= 1.6449 * self.sd
 
 
 def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Progress) -> None:
@@ -87,13 +70,13 @@ def fit_photographs(
 
 def judge_photographs(
     workspace: Workspace, recipe: "Recipe", specimen: "Specimen", seed: int
-) -> tuple[JudgedGeometry, ...]:
+) -> tuple[Judged, ...]:
     """Put the edge's height and slope and the plate's place beside what was rendered.
 
     The edge is judged where it is used: its offset and taper at a quarter, half and three
     quarters of the blade.
     """
-    rows: list[JudgedGeometry] = []
+    rows: list[Judged] = []
     if requirements(recipe).needs_geometry("blade"):
         rows += _judge_edge(workspace, specimen)
     if requirements(recipe).needs_geometry("plate"):
@@ -101,7 +84,7 @@ def judge_photographs(
     return tuple(rows)
 
 
-def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[JudgedGeometry]:
+def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[Judged]:
     import numpy as np
 
     fit = load_result(Engine.of(workspace), "blade").blades[0]
@@ -130,7 +113,7 @@ def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[JudgedGeomet
     return rows
 
 
-def _judge_plate(workspace: Workspace, recipe: "Recipe", seed: int) -> list[JudgedGeometry]:
+def _judge_plate(workspace: Workspace, recipe: "Recipe", seed: int) -> list[Judged]:
     import numpy as np
 
     from scissorcal.vision.geometry.pose import Pose, difference
@@ -154,5 +137,8 @@ def _judge_plate(workspace: Workspace, recipe: "Recipe", seed: int) -> list[Judg
     return rows
 
 
-def _row(name: str, unit: str, truth: float, estimate: float, sd: float) -> JudgedGeometry:
-    return JudgedGeometry(name, unit, float(truth), float(estimate), float(sd))
+def _row(name: str, unit: str, truth: float, estimate: float, sd: float) -> Judged:
+    reach = NORMAL_90 * sd
+    return Judged(
+        name, unit, float(truth), float(estimate), float(estimate - reach), float(estimate + reach)
+    )

@@ -92,8 +92,8 @@ def trade_workspace(
     cannot be used, or another run holds the file.
     """
     from scissorcal.bench.trade.knob import KNOBS
-    from scissorcal.bench.trade.result import trade_text
     from scissorcal.report.trade import trade_page
+    from scissorcal.report.twin import twin_text
 
     start = time.time() if began is None else began
     chosen = settings or TradeSettings()
@@ -120,7 +120,7 @@ def trade_workspace(
         trade = run.result(engine, curves, together, time.time() - start, pool.workers)
         notes = (file.note,) if file.note else ()
     for path, text in (
-        (workspace.trade_json, trade_text(trade)),
+        (workspace.trade_json, twin_text(trade)),
         (workspace.trade_html, trade_page(trade)),
     ):
         with replacing(path) as part:

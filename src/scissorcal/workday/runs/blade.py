@@ -118,7 +118,7 @@ def _camera_verdicts(engine: "Engine", seen: Sequence["BladePhoto"]) -> tuple[Ve
     """How well the camera is known where the edges were; none where no fitted camera was used."""
     import numpy as np
 
-    from scissorcal.calibration.camera.there import CameraThere
+    from scissorcal.calibration.camera.checks import CameraThere
     from scissorcal.calibration.edge.checks import CAMERA
 
     fitted = _camera_fit(engine)
@@ -169,7 +169,7 @@ def _fits(
 ) -> tuple["BladeFit", ...]:
     import numpy as np
 
-    from scissorcal.calibration.edge.fit import fit_blade
+    from scissorcal.calibration.edge.fit import Blade, fit_blade
     from scissorcal.vision.blade.photo import by_blade
 
     lengths = [c.index.blade.length_mm for c in captures if c.index.blade]
@@ -192,8 +192,7 @@ def _fits(
                 engine.recipe,
                 effort=request.effort,
                 rng=np.random.default_rng([request.seed, STREAM, index]),
-                name=name,
-                length_m=known,
+                blade=Blade(name=name, length_m=known),
                 progress=part,
             )
         )
@@ -201,7 +200,7 @@ def _fits(
 
 
 def _draw(seen: Sequence["BladePhoto"], fits: Sequence["BladeFit"], folder: Path) -> None:
-    from scissorcal.calibration.edge.pictures import edge_picture
+    from scissorcal.calibration.fit_pictures import edge_picture
     from scissorcal.vision.overlay import write_picture
 
     by_name = {found.name: found for found in fits}

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError
-from scissorcal.vision.coverage import ViewCoverage, detection_words
 from scissorcal.vision.photo import Photo, PictureShape, read_photo, same_shape
 from scissorcal.vision.targets.boards import CharucoBoard, Chessboard
+from scissorcal.vision.view_coverage import ViewCoverage, detection_words
 from scissorcal.workday.history import save_version
 from scissorcal.workday.photographs import (
     PhotoCapture,
@@ -109,7 +109,7 @@ def import_camera(engine: "Engine", file: Path) -> tuple["CameraFit", "CameraFil
     Raises InputError where the file is none, or the workspace has photographs of a board: a fit to
     them states its uncertainty, and a file does not.
     """
-    from scissorcal.calibration.camera.imported import imported_camera
+    from scissorcal.calibration.camera.fit import imported_camera
     from scissorcal.vision.camera_files import read_camera_file
 
     if photo_captures(engine.workspace, "camera"):
@@ -166,7 +166,7 @@ def _draw(
     charts: bool,
 ) -> None:
     """Draw the worst photographs, and charts of residuals and uncertainty where ``charts``."""
-    from scissorcal.calibration.camera.pictures import (
+    from scissorcal.calibration.fit_pictures import (
         left_over,
         residual_chart,
         uncertainty_chart,

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.capture_cost import capture_cost, refuse_long
 from scissorcal.recipe.load import parse_recipe, read_text
+from scissorcal.recipe.pace import capture_cost, refuse_long
 from scissorcal.recipe.requirements import CaptureKind, DesignedKind, requirements
 from scissorcal.recipe.show import with_designed_captures
 from scissorcal.workday.options import CaptureOptions, RigOptions

@@ -105,16 +105,18 @@ class _ControlTask(RigTask["ControlResult"]):
 
     def open_writer(self, session: "RigSession", path: Path) -> "RecordingWriter":
         from scissorcal.device.rig_record import rig_facts
-        from scissorcal.recording import Joint, RecordingWriter
+        from scissorcal.recording import Joint, RecordingFacts, RecordingWriter
 
         identity, sign = session.identity, session.recipe.rig.motor_sign
         writer = RecordingWriter(
             path,
             self.kind,
             Joint("rotary"),
-            session.recipe_toml,
-            rig_facts(identity, sign, session.probe),
-            identity.handle_radius,
+            facts=RecordingFacts(
+                recipe_toml=session.recipe_toml,
+                device=rig_facts(identity, sign, session.probe),
+                handle_radius_m=identity.handle_radius,
+            ),
         )
         writer.attach("path.csv", read_foreign(self.options.path_file, PATH), "text/csv")
         return writer

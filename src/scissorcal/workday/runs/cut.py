@@ -23,6 +23,7 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     import numpy as np
 
     from scissorcal.calibration.cut.fit import fit_cut
+    from scissorcal.calibration.fit_model import CutRun
     from scissorcal.workday.runs.fit import Made, load_result
 
     request.progress(0.0, "cut: reading recordings")
@@ -39,12 +40,14 @@ def fit(engine: "Engine", request: "Request") -> "Made":
         friction,
         effort=request.effort,
         rng=np.random.default_rng([request.seed, STREAM]),
-        progress=request.progress,
-        edge=edge,
-        edge_verdicts=verdicts,
-        checkpoint=request.checkpoint,
-        last_chosen=request.last_model or None,
-        stop=request.stop,
+        run=CutRun(
+            progress=request.progress,
+            edge=edge,
+            edge_verdicts=verdicts,
+            checkpoint=request.checkpoint,
+            last_chosen=request.last_model or None,
+            stop=request.stop,
+        ),
     )
     return Made(finished(result, request))
 

@@ -39,6 +39,7 @@ def fitted(
     """Fit an axis by its function and settings to the used recordings of a kind."""
     import numpy as np
 
+    from scissorcal.calibration.fit_model import FrictionRun
     from scissorcal.workday.runs.fit import Made
 
     request.progress(0.0, f"{kind}: reading recordings")
@@ -47,12 +48,14 @@ def fitted(
         settings,
         effort=request.effort,
         rng=np.random.default_rng([request.seed, stream]),
-        progress=request.progress,
-        checkpoint=request.checkpoint,
-        last_chosen=request.last_model or None,
-        stop=request.stop,
-        critic=request.critic,
-        tolerance=0.01 * engine.recipe.scene.tolerance_percent,
+        run=FrictionRun(
+            progress=request.progress,
+            checkpoint=request.checkpoint,
+            last_chosen=request.last_model or None,
+            stop=request.stop,
+            critic=request.critic,
+            tolerance=0.01 * engine.recipe.scene.tolerance_percent,
+        ),
     )
     return Made(finished(result, request))
 

@@ -60,7 +60,7 @@ def build_workspace_package(
     """
     import numpy as np
 
-    from scissorcal.package import build_package, open_package, put_review
+    from scissorcal.package import PackageOptions, build_package, open_package, put_review
     from scissorcal.package.check import check_built
     from scissorcal.package.signature import signed_text
     from scissorcal.recipe.plate_layers import plate_pieces
@@ -100,13 +100,15 @@ def build_workspace_package(
         fits["cut"],
         path,
         np.random.default_rng(seed),
-        review=review,
-        plate=fits["plate"],
-        drawn=plate_pieces(engine.recipe.plate, engine.workspace.root),
-        rig=recorded_rig(engine.workspace.captures_dir, fits),
-        inputs_hash=engine.identity("package build"),
-        allow_failed=allow_failed,
-        sign=sign,
+        options=PackageOptions(
+            review=review,
+            plate=fits["plate"],
+            drawn=plate_pieces(engine.recipe.plate, engine.workspace.root),
+            rig=recorded_rig(engine.workspace.captures_dir, fits),
+            inputs_hash=engine.identity("package build"),
+            allow_failed=allow_failed,
+            sign=sign,
+        ),
     )
     engine.refresh()
     warnings = _void(engine) + summary.warnings

@@ -111,7 +111,7 @@ def read_motion(path: Path, joint: "Joint", handle_radius_m: float) -> "Recordin
 
 
 def _read_table(path: Path, joint: "Joint", handle_radius_m: float) -> "Recording":
-    from scissorcal.recording import import_table
+    from scissorcal.recording import ImportOptions, import_table
     from scissorcal.recording.layout import column_name
 
     headings = _headings(path)
@@ -132,16 +132,18 @@ def _read_table(path: Path, joint: "Joint", handle_radius_m: float) -> "Recordin
     read = import_table(
         path,
         columns=columns,
-        joint=joint,
-        handle_radius_m=handle_radius_m if "handle_force" in columns else float("nan"),
-        motion_only=True,
+        options=ImportOptions(
+            joint=joint,
+            handle_radius_m=handle_radius_m if "handle_force" in columns else float("nan"),
+            motion_only=True,
+        ),
     )
     return replace(read, source=str(path))
 
 
 def _headings(path: Path) -> list[str]:
     if path.suffix.lower() == ".parquet":
-        from scissorcal.recording.parquetfile import parquet_headings
+        from scissorcal.recording.table_file import parquet_headings
 
         return parquet_headings(path)
     import csv

@@ -18,9 +18,9 @@ from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from scissorcal.device.link import Link
-    from scissorcal.device.probe.result import ProbeResult
     from scissorcal.device.session import Operator, RigSession
     from scissorcal.recipe.schema import Recipe
+    from scissorcal.recording.probe import ProbeResult
     from scissorcal.workday.options import RigOptions
 
 
@@ -122,7 +122,7 @@ def _kept(workspace: Workspace) -> ProbeResult | str:
     path = workspace.probe_path
     if not path.exists():
         return "there is no probe of it yet"
-    from scissorcal.device.probe.result import probe_from_dict
+    from scissorcal.recording.probe import probe_from_dict
 
     try:
         with reading(path, STATE):
@@ -170,8 +170,8 @@ def _outdated(last: ProbeResult, recipe: Recipe, now: datetime) -> str:
 def _differs(last: ProbeResult, link: Link) -> bool:
     """Whether a probe is of another rig, or ran in virtual time where this one does not."""
     from scissorcal.device.link import PortLink
+    from scissorcal.device.probe.guards import REAL_TIME
     from scissorcal.device.probe.probe import identity_digest
-    from scissorcal.device.probe.result import REAL_TIME
 
     real = last.facts.get(REAL_TIME) == 1.0
     return last.identity != identity_digest(link.identity) or real != isinstance(link, PortLink)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from scissorcal.device.session import Operator, RigSession
     from scissorcal.package import ModelPackage
-    from scissorcal.recipe.plate_tracking import PlateTracking
+    from scissorcal.recipe.plate_surface import PlateTracking
     from scissorcal.recipe.schema import Recipe
     from scissorcal.recording import RecordingWriter
     from scissorcal.render import PoseSource, RenderResult, RigFacts
@@ -169,7 +169,7 @@ def _camera(
 
 def _refuse_clamped(tracking: "PlateTracking") -> None:
     """Pictures of a plate that is carried would be refused, and what taps told would be lost."""
-    from scissorcal.recipe.plate_tracking import CLAMPED_deg_per_s, CLAMPED_mm_per_s
+    from scissorcal.recipe.plate_surface import CLAMPED_deg_per_s, CLAMPED_mm_per_s
 
     speed, turn = tracking.speed_mm_per_s, tracking.turn_deg_per_s
     if speed > CLAMPED_mm_per_s and turn > CLAMPED_deg_per_s:

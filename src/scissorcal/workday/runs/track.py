@@ -11,10 +11,9 @@ import numpy as np
 
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.recipe.load import read_text
-from scissorcal.recipe.plate_tracking import LONGEST_DELAY_MS
+from scissorcal.recipe.plate_surface import LONGEST_DELAY_MS
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.live import camera_number, frames_of, timed
-from scissorcal.vision.located_frames import STATES, State
+from scissorcal.vision.live import STATES, State, camera_number, frames_of, timed
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, TrackOptions
 from scissorcal.workday.rigs import SIM, open_session

@@ -64,7 +64,7 @@ def verify_workspace(
     cluster cannot be used or another run holds the file.
     """
     from scissorcal.calibration.store import save
-    from scissorcal.calibration.verify.check import assess, make_study, tasks_of
+    from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
 
     chosen = settings or VerifySettings()
     engine = Engine.of(workspace)
@@ -80,9 +80,7 @@ def verify_workspace(
                 experiment,
                 fit,
                 simulator,
-                seed=chosen.seed,
-                prior=chosen.prior,
-                spread=chosen.spread,
+                settings=StudySettings(seed=chosen.seed, prior=chosen.prior, spread=chosen.spread),
                 sheets=sheets,
             )
             tasks = tasks_of(study, chosen.checks, chosen.fits)

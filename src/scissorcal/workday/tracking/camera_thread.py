@@ -5,8 +5,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
-from scissorcal.vision.live import Frame
-from scissorcal.vision.located_frames import LocatedFrame
+from scissorcal.vision.live import Frame, LocatedFrame
 
 CLOSE_S = 2.0
 

@@ -19,7 +19,7 @@ from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import CameraErrors, TrackingSettings, settings_of
 from scissorcal.tracking.tracker import Outcome, PoseEstimate
 from scissorcal.verdicts import Verdict
-from scissorcal.vision.located_frames import STATES, State
+from scissorcal.vision.live import STATES, State
 from scissorcal.workday.tracking.track_pictures import TrackPicture
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackChannels
 

@@ -17,8 +17,8 @@ from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey
 from scissorcal.tracking.rotation import rotation_of, rotation_vector
 from scissorcal.vision.live import Frame
-from scissorcal.vision.sim.lens import SimPose
-from scissorcal.vision.sim.plate_scene import LEVEL
+from scissorcal.vision.sim.optics import SimPose
+from scissorcal.vision.sim.scenes import LEVEL
 from scissorcal.vision.sim.sim_camera import render_frame, sim_plate_scene
 
 if TYPE_CHECKING:

@@ -4,8 +4,7 @@ import math
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.euler_angles import EulerAngles, one_rotation
-from scissorcal.recipe.everyday import EVERYDAY
-from scissorcal.recipe.unlikely import bounds
+from scissorcal.recipe.unlikely import EVERYDAY, bounds
 from scissorcal.tracking.plate_pose import level_plate
 from scissorcal.vision.geometry.pose import Pose
 

@@ -4,12 +4,11 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from scissorcal.recipe.photograph_priors import PlatePriors
+from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import PicturePose, RigPose, picture_pose
-from scissorcal.vision.live import Frame
-from scissorcal.vision.located_frames import LocatedFrame, State, located_frames
+from scissorcal.vision.live import Frame, LocatedFrame, State, located_frames
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 
 TARGETS = ("", PLATE_BOARD.name, PLATE_STRIP.name)

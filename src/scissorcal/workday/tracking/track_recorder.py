@@ -13,8 +13,14 @@ from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.foreign import parse_json, reading
 from scissorcal.foreign.formats import RECORDING
-from scissorcal.recording import Joint, RecordingWriter, read_recording, read_telemetry
-from scissorcal.recording.plate_channels import (
+from scissorcal.recording import (
+    Joint,
+    RecordingFacts,
+    RecordingWriter,
+    read_recording,
+    read_telemetry,
+)
+from scissorcal.recording.telemetry import (
     FRAME,
     OUTCOMES,
     PICTURE,
@@ -135,7 +141,12 @@ class TrackRecorder(TrackChannels):
     ) -> None:
         self.path = path
         joint = Joint("rotary")
-        writer = RecordingWriter(path, "track", joint, recipe_toml, device, radius_m)
+        writer = RecordingWriter(
+            path,
+            "track",
+            joint,
+            facts=RecordingFacts(recipe_toml=recipe_toml, device=device, handle_radius_m=radius_m),
+        )
         super().__init__(writer, base_ns)
 
     def samples(self, samples: NDArray[np.void]) -> None:

@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from scissorcal.calibration.cut.path import (
+from scissorcal.calibration.cut.path_motion import path_motion, turning_points
+from scissorcal.calibration.cut.path_work import (
     advance_line,
     material_of,
     mean_advance,
     mean_torque,
-    path_motion,
     torque_covariance,
     torque_noise_of,
-    turning_points,
     without_tremor,
 )
 from scissorcal.calibration.signals.torque_noise import TorqueNoise

@@ -6,15 +6,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.path import material_of, path_motion
+from scissorcal.calibration.cut.path_motion import path_motion
+from scissorcal.calibration.cut.path_work import material_of
 from scissorcal.calibration.signals.torque_noise import TorqueNoise, torque_noise
-from scissorcal.calibration.verify.simulation import (
+from scissorcal.calibration.verify.simulated_motion import (
     DriveTruth,
     drawn_noise,
     measured_drive,
     motion_of,
-    simulate_friction,
 )
+from scissorcal.calibration.verify.simulated_recordings import simulate_friction
 from scissorcal.model import FrictionLaw
 from tests.calibration.truth import QUICK, Truth, friction_recording
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scissorcal.calibration.verify.simulation import motion_of
+from scissorcal.calibration.verify.simulated_motion import motion_of
 from tests.calibration.cut.path.made import INERTIA, record, swing
 
 STEP_rad = 3.14e-4

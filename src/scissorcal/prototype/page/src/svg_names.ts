@@ -1,5 +1,5 @@
 // Which elements of an SVG file are shown shapes; what is not understood is refused by its name.
-// As recipe/svg/names.py and elements.py, with the same names.
+// As recipe/svg/elements.py, with the same names.
 
 import lists from "../../../recipe/svg/names.json";
 
