@@ -28,7 +28,7 @@ from scissorcal.vision.sim import (
     BladeShape,
     Lens,
     Nick,
-    Pose,
+    SimPose,
     as_jpeg,
     blade_layer,
     render,
@@ -88,7 +88,7 @@ def photographed(width: int, strength: float, rng: np.random.Generator, *, known
     bent = (rng.normal(0, 0.06), rng.normal(0, 0.03), rng.normal(0, 3e-4), rng.normal(0, 3e-4), 0.0)
     lens = Lens(focal, centre, width, height, bent)
     distance = 0.126 / (0.43 * width) * focal * rng.uniform(1.0, 1.25)
-    pose = Pose.looking_at(
+    pose = SimPose.looking_at(
         (0.126 + rng.normal(0, 0.004), 0.09 + rng.normal(0, 0.004)),
         distance,
         tilt=abs(rng.normal(0, 0.12)),

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.vision.sim import BladeShape, Layer, Lens, Looks, Pose
+from scissorcal.vision.sim import BladeShape, Lens, Looks, PaintLayer, SimPose
 from scissorcal.vision.sim.optics import Picture, coverage
 from scissorcal.vision.sim.photograph import Box
 
@@ -65,7 +65,7 @@ class Glare:
 
 
 @dataclass(frozen=True)
-class GlaringLayer(Layer):
+class GlaringLayer(PaintLayer):
     """A layer of metal with bright patches."""
 
     glares: tuple[Glare, ...] = ()
@@ -82,7 +82,7 @@ class GlaringLayer(Layer):
 
 
 @dataclass(frozen=True)
-class TexturedLayer(Layer):
+class TexturedLayer(PaintLayer):
     """A layer of a rough material: ``texture`` is the relative sd of its light, alike over
     ``texture_m``."""
 
@@ -122,7 +122,7 @@ class CastShadow:
 
     outlines_m: Sequence[Array]
     heights_m: Sequence[Array]
-    pose: Pose
+    pose: SimPose
     lamp: Lamp
 
     @classmethod
@@ -130,7 +130,7 @@ class CastShadow:
         cls,
         outlines_m: Sequence[Array],
         height_m: Callable[[Array], Array],
-        pose: Pose,
+        pose: SimPose,
         lamp: Lamp,
     ) -> "CastShadow":
         """The common shadow of outlines in one plane; ``height_m`` of points (n, 2)."""

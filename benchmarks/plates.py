@@ -20,12 +20,11 @@ import cv2
 import numpy as np
 from benchmarks.photographs import random_looks
 
-from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate
+from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
 from scissorcal.errors import ScissorcalError
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
-from scissorcal.vision.sim import Layer, Lens, as_jpeg, render, target_layers
-from scissorcal.vision.sim import Pose as Stand
+from scissorcal.vision.sim import Lens, PaintLayer, SimPose, as_jpeg, render, target_layers
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP, MarkedBoard, dictionary
 from scissorcal.vision.targets.detect import find_board
 
@@ -49,7 +48,7 @@ class View:
     photo: Photo
     board: MarkedBoard
     camera: Camera
-    truth: Stand
+    truth: SimPose
     kind: str
 
 
@@ -97,7 +96,7 @@ def photographed(kind: str, strength: float, rng: np.random.Generator) -> View:
         0.5 * board.height_m + rng.normal(0, 0.03) * span,
     )
     turn = rng.uniform(-0.4, 0.4) + (np.pi if rng.uniform() < 0.3 else 0.0)
-    truth = Stand.looking_at(
+    truth = SimPose.looking_at(
         middle, distance, tilt=tilt, azimuth=rng.uniform(0, 2 * np.pi), turn=turn
     )
     printed = tuple(1.0 + rng.normal(0, PRINT_SD, 2))
@@ -111,12 +110,12 @@ def photographed(kind: str, strength: float, rng: np.random.Generator) -> View:
     return View(photo, board, believed(lens, rng), truth, kind)
 
 
-def _thing(board: MarkedBoard, truth: Stand, rng: np.random.Generator) -> Layer:
+def _thing(board: MarkedBoard, truth: SimPose, rng: np.random.Generator) -> PaintLayer:
     """A dark object with a soft shadow over one end of the target."""
     left = rng.uniform(-0.03, 0.2) * board.width_m
     bar = np.array([[left - 0.02, -0.05], [left, -0.05], [left + 0.01, 0.2], [left - 0.01, 0.2]])
     shift = (rng.uniform(0.004, 0.02), 0.003)
-    return Layer([bar], truth, 0.2, shadow=0.4, shadow_m=shift, shadow_soft_m=0.005)
+    return PaintLayer([bar], truth, 0.2, shadow=0.4, shadow_m=shift, shadow_soft_m=0.005)
 
 
 def believed(lens: Lens, rng: np.random.Generator) -> Camera:
@@ -133,7 +132,7 @@ def measured(view: View) -> dict[str, Any]:
     """Find and fit one view, and compare it with the true pose."""
     start = time.perf_counter()
     try:
-        found = PlatePhoto("rendered.jpg", find_board(view.photo, view.board))
+        found = PosePhoto("rendered.jpg", find_board(view.photo, view.board))
         fit = fit_plate([found], view.camera)
     except ScissorcalError as error:
         return {"refused": str(error)}
@@ -180,7 +179,7 @@ def one_marker(view: View) -> dict[str, Any]:
     return errors(matrix, shift.ravel() - matrix @ points.mean(axis=0), view)
 
 
-def off(matrix: np.ndarray, shift: np.ndarray, truth: Stand) -> np.ndarray:
+def off(matrix: np.ndarray, shift: np.ndarray, truth: SimPose) -> np.ndarray:
     """Difference from the true pose: rotation vector (rad), translation (m)."""
     turn = cv2.Rodrigues(matrix @ truth.rotation.T)[0].ravel()
     return np.concatenate([turn, shift - truth.shift_m])

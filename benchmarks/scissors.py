@@ -27,7 +27,7 @@ from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import (
     BladeShape,
     Lens,
-    Pose,
+    SimPose,
     as_jpeg,
     render,
     scissors_layers,
@@ -97,7 +97,7 @@ def photographed(
     px_per_mm = rng.uniform(0.8, 0.95) * height / 200.0
     turn = rng.uniform(0.0, 2.0 * np.pi)
     middle = 0.012 * np.array([np.cos(turn), np.sin(turn)])
-    pose = Pose.looking_at(
+    pose = SimPose.looking_at(
         (-float(middle[0]), -float(middle[1])),
         focal / px_per_mm * 1e-3,
         tilt=np.radians(tilt),

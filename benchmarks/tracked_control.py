@@ -31,11 +31,11 @@ from scissorcal.tracking.tracker import Outcome
 from scissorcal.vision.sim.sim_camera import SIM_LENS
 from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.inputs import REST_RATE_RAD_PER_S
-from scissorcal.workday.tracking.pictures import PlatePicture
-from scissorcal.workday.tracking.pose_source import TrackedPose
 from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import SimWorld
+from scissorcal.workday.tracking.track_pictures import TrackPicture
 from scissorcal.workday.tracking.track_recorder import TrackAbout
+from scissorcal.workday.tracking.tracking_camera import TrackedPose
 
 PATH_MM = (10.0, 40.0)
 FORCE_N = 2.0
@@ -85,7 +85,7 @@ def run(
     job = prepare(points(*PATH_MM, force=FORCE_N), link=world.link, each=each)
     session = _session(recipe, truth)
 
-    def due(now_s: float) -> Iterator[PlatePicture]:
+    def due(now_s: float) -> Iterator[TrackPicture]:
         return (eye.picture(found) for found in eye.locate(world.frames(now_s)))
 
     source = TrackedPose(session, due)

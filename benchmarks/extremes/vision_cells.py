@@ -10,7 +10,7 @@ from benchmarks.extremes.cells import Cell, Found, judged, worst_of
 
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera
-from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate
+from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
 from scissorcal.verdicts import failed
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference, left_jacobian
@@ -179,7 +179,7 @@ def _plate(name: str, extreme: str, vector: list[float], place: Array, spoil: Sp
                 if spoil is None
                 else spoil(pixels)
             )
-            photos.append(PlatePhoto(f"plate-{index}", _detection(pixels, np.arange(len(points)))))
+            photos.append(PosePhoto(f"plate-{index}", _detection(pixels, np.arange(len(points)))))
         fit = fit_plate(photos, _pinhole())
         bad = failed(fit.verdicts)
         away = difference(fit.camera_plate, Pose.from_matrix(turn, middle))
@@ -198,7 +198,7 @@ def _few(keep: list[int], rng: np.random.Generator) -> Found:
     turn = rotation(np.array([0.6, 0.0, 0.0]))
     pixels = _seen(points, turn, np.array([0.0, 0.0, 0.4]))
     pixels = pixels + NOISE_PX * rng.standard_normal(pixels.shape)
-    fit = fit_plate([PlatePhoto("plate", _detection(pixels, np.array(keep)))], _pinhole())
+    fit = fit_plate([PosePhoto("plate", _detection(pixels, np.array(keep)))], _pinhole())
     bad = failed(fit.verdicts)
     return Found("flagged" if bad else "wrong", "; ".join(verdict.why for verdict in bad))
 

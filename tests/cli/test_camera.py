@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scissorcal.vision.sim import Lens, Looks, Pose, as_jpeg, render, target_layers
+from scissorcal.vision.sim import Lens, Looks, SimPose, as_jpeg, render, target_layers
 from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD
 from tests.cli.conftest import Cli
 
@@ -19,13 +19,13 @@ LOOKS = Looks(softness_px=0.6, noise=0.008)
 SLANTS = [(0.0, 0.0), (0.6, 0.0), (0.6, 1.6), (0.6, 3.1), (0.6, 4.7), (0.4, 0.8), (0.5, 2.4)]
 
 
-def rendered(pose: Pose, board: object = CAMERA_BOARD, seed: int = 0) -> np.ndarray:
+def rendered(pose: SimPose, board: object = CAMERA_BOARD, seed: int = 0) -> np.ndarray:
     return render(target_layers(board, pose), EYE, LOOKS, np.random.default_rng(seed))  # type: ignore[arg-type]
 
 
-def looking(tilt: float, azimuth: float, number: int, distance_m: float = 0.32) -> Pose:
+def looking(tilt: float, azimuth: float, number: int, distance_m: float = 0.32) -> SimPose:
     aside = (0.117 + 0.04 * ((number % 3) - 1), 0.091 + 0.03 * ((number % 2) - 0.5))
-    return Pose.looking_at(aside, distance_m, tilt=tilt, azimuth=azimuth, turn=0.1 * number)
+    return SimPose.looking_at(aside, distance_m, tilt=tilt, azimuth=azimuth, turn=0.1 * number)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def album(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pictures[f"flat-{number}.jpg"] = rendered(
             looking(0.0, 0.0, number, 0.3 + 0.02 * number), seed=number
         )
-    pictures["mat.jpg"] = rendered(Pose.looking_at((0.128, 0.089), 0.4), BLADE_MAT)
+    pictures["mat.jpg"] = rendered(SimPose.looking_at((0.128, 0.089), 0.4), BLADE_MAT)
     pictures["nothing.jpg"] = np.full((480, 640, 3), 120, np.uint8)
     for name, picture in pictures.items():
         (folder / name).write_bytes(as_jpeg(picture, 92))

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from scissorcal.recipe.schema import Recipe
-from scissorcal.vision.geometry.pose import Pose as Found
-from scissorcal.vision.geometry.pose import difference
-from scissorcal.vision.sim import Pose
+from scissorcal.vision.geometry.pose import Pose, difference
+from scissorcal.vision.sim import SimPose
 from scissorcal.vision.sim.sim_camera import (
     sim_plate_scene,
 )
@@ -28,10 +27,10 @@ def captured(workspace: Path) -> list[str]:
     return sorted(path.name for path in (workspace / "captures").glob("*"))
 
 
-def off(pose: dict[str, list[float]], truth: Pose) -> tuple[float, float]:
+def off(pose: dict[str, list[float]], truth: SimPose) -> tuple[float, float]:
     """Degrees and millimetres by which a printed pose is off."""
-    found = Found(tuple(pose["quaternion"]), tuple(pose["translation_m"]))  # type: ignore[arg-type]
-    away = difference(found, Found.from_matrix(truth.rotation, truth.shift_m))
+    found = Pose(tuple(pose["quaternion"]), tuple(pose["translation_m"]))  # type: ignore[arg-type]
+    away = difference(found, Pose.from_matrix(truth.rotation, truth.shift_m))
     return float(np.degrees(np.linalg.norm(away[:3]))), float(1e3 * np.linalg.norm(away[3:]))
 
 

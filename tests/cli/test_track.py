@@ -12,15 +12,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scissorcal.calibration.plate.track import PoseRecord, TrackHead, TrackRow
+from scissorcal.calibration.plate.track_lines import TrackHead, TrackPose, TrackRow
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording, read_telemetry
 from scissorcal.recording.telemetry import FRAME, PICTURE, POSE
-from scissorcal.vision.geometry.pose import Pose as Found
-from scissorcal.vision.geometry.pose import difference
+from scissorcal.vision.geometry.pose import Pose, difference
 from scissorcal.vision.live import Frame
-from scissorcal.vision.sim import Pose, chained
+from scissorcal.vision.sim import SimPose, chained
 from scissorcal.vision.sim.sim_camera import OPENINGS_DEG, SIM_LENS, render_frame, sim_plate_scene
 from tests.cli.conftest import Cli
 from tests.guard import GUARD_S
@@ -32,7 +31,7 @@ def sliding_plate(recipe: Recipe, number: int) -> NDArray[np.uint8]:
     """What a camera sees of a plate that moves 0.3 mm per picture along its cut."""
     start = sim_plate_scene(recipe, 0).rig_plate
     shift = start.shift_m + 3e-4 * number * start.rotation[:, 0]
-    scene = sim_plate_scene(recipe, 0, Pose(start.rotation, shift))
+    scene = sim_plate_scene(recipe, 0, SimPose(start.rotation, shift))
     return render_frame(scene, recipe, (0.0, OPENINGS_DEG[0]), 0, number)
 
 
@@ -76,7 +75,7 @@ def test_a_video_is_tracked_and_its_drop_outs_named(
     assert result["longest_gap_s"] == pytest.approx(0.2)
     assert result["travel_mm"] == pytest.approx(2.7, abs=0.15)
     assert (result["frame"], result["state"]) == ("camera", "pictures")
-    pose = Found(tuple(result["quaternion"]), tuple(result["translation_m"]))
+    pose = Pose(tuple(result["quaternion"]), tuple(result["translation_m"]))
     angles, same = result["euler_angles"], pose.euler_angles
     assert angles["roll_deg"] == pytest.approx(same.roll_deg)
     assert min(angles["sd_deg"]) > 0.0
@@ -93,10 +92,10 @@ def test_a_video_is_tracked_and_its_drop_outs_named(
     assert len(poses) == len(read_telemetry(path, FRAME)) == 8
     for row in poses:
         number = round(10.0 * (row["row_time_s"] + 0.04))
-        slid = Pose(np.eye(3), np.array([3e-4 * number, 0.0, 0.0]))
+        slid = SimPose(np.eye(3), np.array([3e-4 * number, 0.0, 0.0]))
         truth = chained(scene.camera_plate, slid)
-        found = Found(tuple(row["quaternion"].tolist()), tuple(row["translation"].tolist()))
-        away = difference(found, Found.from_matrix(truth.rotation, truth.shift_m))
+        found = Pose(tuple(row["quaternion"].tolist()), tuple(row["translation"].tolist()))
+        away = difference(found, Pose.from_matrix(truth.rotation, truth.shift_m))
         assert np.degrees(np.linalg.norm(away[:3])) < 0.15
         assert 1e3 * np.linalg.norm(away[3:]) < 0.4
 
@@ -277,7 +276,7 @@ def test_tracks_of_lines_stay_readable(cli: Cli, workspace: Path) -> None:
     head = TrackHead(
         source="0", started_utc="2026-01-01T00:00:00Z", frame="rig", camera_inputs_hash="ab"
     )
-    pose = PoseRecord(quaternion=(1.0, 0.0, 0.0, 0.0), translation_m=(0.1, 0.2, 0.3))
+    pose = TrackPose(quaternion=(1.0, 0.0, 0.0, 0.0), translation_m=(0.1, 0.2, 0.3))
     rows = [
         TrackRow(number=0, time_s=0.0, state="seen", corners=24, odds=9.0, pose=pose),
         TrackRow(number=1, time_s=0.1, state="blank"),

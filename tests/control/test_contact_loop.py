@@ -12,10 +12,9 @@ from scipy.optimize import brentq
 from scissorcal.control import (
     ContactGains,
     ContactLoop,
-    contact_decay,
     contact_gains,
-    contact_poles,
 )
+from tests.control.loop_poles import contact_decay, contact_poles
 from tests.control.plant import Blade, Disc, Plant
 from tests.control.rig import loop_of, mass_at, resting
 from tests.control.steering import Known, Steering

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scissorcal.control.result import control_figures
+from scissorcal.control.control_result import control_figures
 from scissorcal.device.sim.rig import VirtualRig
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import CONTROL_DTYPE, ControlFlag, HybridFlag, Mode

@@ -15,7 +15,6 @@ from scissorcal.control import (
     HybridGains,
     approach_speed,
     choose_gains,
-    contact_decay,
     contact_decays,
     contact_gains,
     friction_rates,
@@ -24,6 +23,7 @@ from scissorcal.control.gains import TOUCH_FORCE_N
 from scissorcal.device.control import Axis, Gains, loop_margins
 from scissorcal.errors import InputError
 from scissorcal.kernel import HybridConfig
+from tests.control.loop_poles import contact_decay
 
 LOOP = ContactLoop(3e3, 0.05, 0.0, 1e-3, 1.5e-3, 1e-3, rate_cutoff_Hz=400.0, step_m=3.4e-6)
 HARD = ContactLoop(1e4, 0.055, 0.0, 0.0, 1.5e-3, 1e-3, 400.0, stiffness_factor=1.0, mass_factor=1.0)

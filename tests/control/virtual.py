@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from scissorcal.control import follow
+from scissorcal.control.control_result import ControlResult
 from scissorcal.control.follow import Job, control
 from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.path_file import SurfacePoints
-from scissorcal.control.result import ControlResult
 from scissorcal.control.settings import Material
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.session import Operator, RigSession

@@ -340,7 +340,7 @@ def _track_lines(path: Path) -> None:
 
 
 def _read_track_lines(path: Path) -> None:
-    from scissorcal.calibration.plate.track import read_track_lines
+    from scissorcal.calibration.plate.track_lines import read_track_lines
 
     read_track_lines(path)
 

@@ -29,7 +29,7 @@ def test_the_program_computes_what_the_kernel_does() -> None:
     assert found.torque == pytest.approx(own, rel=1e-5, abs=1e-8)
     assert len(found.stroke) == len(found.settled) == 2
     assert min(found.stroke) > 0
-    double = compiled_step(TABLES, at, real="double")
+    double = compiled_step(TABLES, at, arrays={})
     assert double.torque == pytest.approx(own, rel=1e-4, abs=1e-7)
     assert not np.array_equal(double.torque, found.torque)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.kernel import ModelTables, Piece, PiecesModel, StepFlag, Strip, Table
-from scissorcal.package.plate_slopes import PlateSlopes
+from scissorcal.package.layer_slopes import LayerSlopes
 from tests.kernel.zoo import BLADE_LENGTH, arc_edge, line_edge, make_tables, power_response
 
 STROKES, PLACES = 24, 160
@@ -169,7 +169,7 @@ def main(seed: int, count: int) -> None:
     for index in range(count):
         rng = np.random.default_rng([seed, index])
         case = random_case(rng)
-        slopes, found = PlateSlopes(case.tables, case.limit, case.pieces), steepest(case, rng)
+        slopes, found = LayerSlopes(case.tables, case.limit, case.pieces), steepest(case, rng)
         for name in ratios:
             bound = slopes.bound("opening" if name == "closing" else name).value  # type: ignore[arg-type]
             measured = getattr(found, name)

@@ -22,7 +22,7 @@ from scissorcal.package import (
     put_review,
     read_manifest,
 )
-from scissorcal.package.manifest import PlateRecord
+from scissorcal.package.manifest import PoseRecord
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict
 from tests.package.fits import cut_fit, friction_fit, recipe
@@ -126,7 +126,7 @@ def test_a_package_keeps_the_plates_covariance_and_failed_checks(tmp_path: Path)
     assert "fit.plate, ambiguity: Two poses." in " ".join(package.warnings)
     for broken in ({"quaternion": (2.0, 0.0, 0.0, 0.0)}, {"covariance": ((0.0,),)}):
         with pytest.raises(ValueError, match="a plate's"):
-            PlateRecord(**{**dict(record), **broken})
+            PoseRecord(**{**dict(record), **broken})
     unsure = replace(plate, rig_plate=replace(plate.rig_plate, covariance=None))
     with pytest.raises(InputError, match="no covariance of its pose"):
         build_package(
@@ -147,9 +147,9 @@ def test_a_manifests_pose_is_read_in_either_notation() -> None:
     turn = {"quaternion": [0.5**0.5, -(0.5**0.5), 0.0, 0.0]}
     angles = {"euler_angles": {"yaw_deg": 0.0, "pitch_deg": 0.0, "roll_deg": -90.0}}
 
-    def read(*parts: dict[str, Any]) -> PlateRecord:
+    def read(*parts: dict[str, Any]) -> PoseRecord:
         facts = {name: value for part in (written, *parts) for name, value in part.items()}
-        return PlateRecord.model_validate_json(json.dumps(facts))
+        return PoseRecord.model_validate_json(json.dumps(facts))
 
     for given in ((turn,), (angles,), (turn, angles)):
         assert read(*given).quaternion == pytest.approx(turn["quaternion"])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser, expect
 
 from scissorcal.model.plate_pieces import Layer, Outline
-from scissorcal.prototype.drawn_plate import drawn_plate
+from scissorcal.prototype.page_parts import layers_part
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.plate_layers import plate_pieces
 from scissorcal.workday.runs.prototype import workspace_plate
@@ -112,7 +112,7 @@ def test_contours_of_one_shape_are_plates_and_holes(browser: Browser, tmp_path: 
     part = Layer("part", 1e-4, 1.0, two)
     ring = Layer("ring", 1e-4, 1.0, two, (Outline((square(1, 1, 8), square(2, 2, 4))),))
     with open_bed(browser, tmp_path) as bed:
-        told = drawn_plate(0.0, [part]).model_dump()
+        told = layers_part(0.0, [part]).model_dump()
         bed.run("(drawn_plate) => Object.assign(scene, { pieces: [], drawn_plate })", told)
         bed.mount()
         names = bed.page.locator(".design-layers input[type=text]")
@@ -120,7 +120,7 @@ def test_contours_of_one_shape_are_plates_and_holes(browser: Browser, tmp_path: 
         bed.page.get_by_label("instead of the package's plate").check()
         assert spans(bed) == [(0, 5), (15, 20), (30, 50)]
     with open_bed(browser, tmp_path) as bed:
-        told = drawn_plate(0.0, [ring]).model_dump()
+        told = layers_part(0.0, [ring]).model_dump()
         bed.run("(drawn_plate) => Object.assign(scene, { pieces: [], drawn_plate })", told)
         bed.mount()
         assert "a hole of its layer ring has a hole" in bed.said

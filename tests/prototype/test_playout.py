@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.prototype.playout import MOST_AT_ONCE, MOST_WAITING, LAG_s, MOST_A_s, Playout
+from scissorcal.prototype.rig_feed import MOST_AT_ONCE, MOST_WAITING, LAG_s, MOST_A_s, Playout
 
 TICK_s = 0.025
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scissorcal.package import ModelPackage, PackageSummary, build_package, open_package
 from scissorcal.package.compile import table_file
 from scissorcal.package.variations import Variations, central_values, variations
-from scissorcal.prototype.arrays import Numbers
-from scissorcal.prototype.parts import Slider
+from scissorcal.prototype.page_parts import Numbers, Slider
 from scissorcal.prototype.scene import NODES, Scene, scene_of, slider_nodes
 from tests.package.conftest import pad
 from tests.package.fits import cut_fit, friction_fit, recipe
@@ -159,10 +158,9 @@ def test_only_fits_of_the_package_say_what_its_parameters_mean(package: ModelPac
 
 
 def test_warnings_stand_before_those_of_the_package(package: ModelPackage) -> None:
-    scene = scene_of(package, made_utc="", version="", warnings=["Simulated."], notes=["A note."])
+    scene = scene_of(package, made_utc="", version="", warnings=["Simulated."])
     assert scene.warnings == ("Simulated.", *package.warnings)
     assert any("not signed" in sentence for sentence in package.warnings)
-    assert scene.notes == ("A note.",)
 
 
 @given(

@@ -19,7 +19,7 @@ from scissorcal.package import ModelPackage
 from scissorcal.recording import read_attachments, read_recording
 from scissorcal.render import Rendering, RenderResult, VirtualStrokes, open_writer, render
 from scissorcal.render.admission import rendered_tables
-from scissorcal.render.plate_pose import FALL_S, STALE_S
+from scissorcal.render.pose_placer import FALL_S, STALE_S
 from tests.render.plate_motion import Move, Tracker, true_torque
 
 STROKES = VirtualStrokes(count=3, rate_rad_per_s=0.5)

@@ -12,7 +12,7 @@ from scissorcal.errors import InputError
 from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel, Strip, Table
 from scissorcal.model import Cutting, Edge, Response
 from scissorcal.model.cutting import torque_at
-from scissorcal.package.plate_slopes import PlateSlopes
+from scissorcal.package.layer_slopes import LayerSlopes
 from scissorcal.package.tangent import Tangent
 from scissorcal.render.admission import admit
 from scissorcal.render.admission_rule import allowed_stiffness
@@ -78,7 +78,7 @@ def test_what_is_found_is_just_below_what_is_proved(times: float, closure: str) 
     """For a sheet, for the same one as a piece, and for a stack of two."""
     tables = stiffer(times, closure=closure)
     sheet = Piece(0.0, tables.upper_face, 1.0, (Strip(0.2, tables.fracture_energy),))
-    proved = PlateSlopes(tables, LIMIT, [sheet]).bound("opening").value
+    proved = LayerSlopes(tables, LIMIT, [sheet]).bound("opening").value
     assert 0.98 * proved < needs_of(tables, LIMIT).stiffness <= 1.001 * proved
     assert 0.97 * proved < needs_on(tables, LIMIT, [sheet]).found <= 1.001 * proved
     double = replace(sheet, scale=2.0, strips=(Strip(0.2, 2.0 * tables.fracture_energy),))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.kernel import PlacedModel
-from scissorcal.render.plate_section import plate_section
+from scissorcal.render.pose_section import pose_section
 from tests.kernel.zoo import make_tables
 from tests.render.plate_motion import FLAT, turned
 from tests.render.two_blades import Held, TwoBlades
@@ -22,7 +22,7 @@ def both(
     pitch = math.radians(pitch_deg)
     rotation = turned(np.array([0.0, 0.0, pitch])) @ FLAT
     middle = np.array([0.0, height_m, 0.0])
-    found = plate_section(
+    found = pose_section(
         rotation, middle + rotation @ np.array([0.0, 0.0, 0.5 * thickness_m]), tables.upper_face, 2
     )
     assert found is not None

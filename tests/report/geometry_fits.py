@@ -15,7 +15,7 @@ from scissorcal.calibration.edge.result import (
     PhotographRow,
     RungRow,
 )
-from scissorcal.calibration.plate.result import Halves, PlateFit, PlateView
+from scissorcal.calibration.plate.result import Halves, PlateFit, PoseView
 from scissorcal.model import Edge, EdgeBelief
 from scissorcal.report import Geometry
 from scissorcal.verdicts import Verdict
@@ -128,8 +128,8 @@ def plate_fit() -> PlateFit:
         ambiguity=3.2,
         rig_plate=Pose.from_rotation_vector([0.0, 0.0, 0.1], [0.08, 0.0, 0.001], np.diag(sd**2)),
         views=(
-            PlateView("plate-1.jpg", 24, 24, 0.06, 0.055, 60.0, 0.41, 40.0, 3.1, 0.01, 0.02),
-            PlateView("plate-2.jpg", 24, 20, 0.30, 0.06, 60.0, 0.41, 40.0, float("inf"), 0.4, 0.9),
+            PoseView("plate-1.jpg", 24, 24, 0.06, 0.055, 60.0, 0.41, 40.0, 3.1, 0.01, 0.02),
+            PoseView("plate-2.jpg", 24, 20, 0.30, 0.06, 60.0, 0.41, 40.0, float("inf"), 0.4, 0.9),
         ),
         halves=Halves(0.05, 0.07, 6.1),
         rms_px=0.07,

@@ -15,8 +15,9 @@ from scissorcal.aliases import Array
 from scissorcal.errors import DeviceError
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
-from scissorcal.tracking.follow import PlateFollower, SeenPose
+from scissorcal.tracking.follow import PoseFollower
 from scissorcal.tracking.rotation import pose_error
+from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.tracker import Outcome
 
 SHORTEST_S = 0.06
@@ -51,10 +52,10 @@ def followed(
     camera: tuple[float, float] = CAMERA,
     delay_s: float = SHORTEST_S,
     seed: int = 0,
-) -> PlateFollower:
+) -> PoseFollower:
     """Feed samples in blocks of 50 ms and pictures as they arrive, on the clocks of each."""
     rng = np.random.default_rng(seed)
-    follower = PlateFollower(
+    follower = PoseFollower(
         Plane(), settings_for(MOVING), camera_delay_s=delay_s, rig=True, contacts=Given(world, RIG)
     )
     waiting = [(p.exposed_s + SHORTEST_S + 0.04 * rng.random(), p) for p in world.pictures]
@@ -67,10 +68,10 @@ def followed(
         while waiting and waiting[0][0] <= end:
             at, picture = waiting.pop(0)
             stamp = _on(camera, picture.exposed_s)
-            pose = SeenPose(
-                stamp, at, picture.rotation, picture.place_m, picture.covariance, picture.certain
+            pose = CameraPose(
+                stamp, picture.rotation, picture.place_m, picture.covariance, picture.certain
             )
-            follower.picture(pose)
+            follower.picture(pose, at)
     return follower
 
 
@@ -118,17 +119,17 @@ def test_tracks_are_consistent_on_drifting_clocks(plates: Iterable[int], limit: 
 
 def test_rows_tell_what_the_pose_rests_on() -> None:
     world = a_world(3)
-    follower = PlateFollower(Plane(), settings_for(MOVING), rig=True, contacts=Given(world, RIG))
+    follower = PoseFollower(Plane(), settings_for(MOVING), rig=True, contacts=Given(world, RIG))
     assert follower.state == "waiting"
     picture = world.pictures[0]
-    early = SeenPose(0.0, 0.06, picture.rotation, picture.place_m, picture.covariance)
-    assert follower.picture(early) is None, "the rig has sent no time"
+    early = CameraPose(0.0, picture.rotation, picture.place_m, picture.covariance)
+    assert follower.picture(early, 0.06) is None, "the rig has sent no time"
     none = np.zeros(50)
     block = 1e-3 * np.arange(1, 51)
     rows = follower.samples(RIG[0] + RIG[1] * block, block, none, none, none)
     assert {row.outcome for row in rows} == {Outcome.WAITING}
     assert all(row.estimate is None and row.state == "waiting" for row in rows)
-    row = follower.picture(replace(early, stamp_s=0.01, arrived_s=0.07))
+    row = follower.picture(replace(early, time_s=0.01), 0.07)
     assert row is not None
     assert (row.outcome, row.state, row.source) == (Outcome.RESTARTED, "pictures", "picture")
     assert row.estimate is not None
@@ -153,11 +154,11 @@ def test_a_contact_away_from_the_surface_is_told_in_mm_against_its_sd() -> None:
 
 
 def test_a_camera_alone_keeps_its_own_time() -> None:
-    follower = PlateFollower(Plane(), settings_for(MOVING), camera_delay_s=0.05)
+    follower = PoseFollower(Plane(), settings_for(MOVING), camera_delay_s=0.05)
     for number in range(60):
         at = number / 30.0
-        picture = SeenPose(100.0 + at, 5.0 + at + 0.05, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
-        row = follower.picture(picture)
+        picture = CameraPose(100.0 + at, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
+        row = follower.picture(picture, 5.0 + at + 0.05)
         assert row is not None
         assert row.time_s == pytest.approx(100.0 + at - 0.05)
     estimate = follower.estimate(5.0 + 59 / 30.0)
@@ -168,10 +169,10 @@ def test_a_camera_alone_keeps_its_own_time() -> None:
 
 def test_pictures_without_a_pose_let_it_age() -> None:
     """The target is hidden: the pose coasts, and is known less and less."""
-    follower = PlateFollower(Plane(), settings_for(MOVING))
+    follower = PoseFollower(Plane(), settings_for(MOVING))
     for number in range(30):
         at = number / 30.0
-        follower.picture(SeenPose(at, at, np.eye(3), np.zeros(3), 1e-7 * np.eye(6)))
+        follower.picture(CameraPose(at, np.eye(3), np.zeros(3), 1e-7 * np.eye(6)), at)
     known = follower.now()
     assert known is not None
     assert follower.state == "pictures"
@@ -186,13 +187,13 @@ def test_pictures_without_a_pose_let_it_age() -> None:
 
 @pytest.mark.parametrize("jump_s", [-60.0, 60.0])
 def test_a_camera_alone_whose_clock_jumps_is_followed_on(jump_s: float) -> None:
-    follower = PlateFollower(Plane(), settings_for(MOVING))
+    follower = PoseFollower(Plane(), settings_for(MOVING))
     outcomes = []
     for number in range(120):
         at = number / 30.0
         stamp = 100.0 + at + (jump_s if number >= 60 else 0.0)
-        pose = SeenPose(stamp, at + 0.05, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
-        row = follower.picture(pose)
+        pose = CameraPose(stamp, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
+        row = follower.picture(pose, at + 0.05)
         assert row is not None
         outcomes.append(row.outcome)
     assert Outcome.TOO_LATE not in outcomes[65:]
@@ -201,23 +202,23 @@ def test_a_camera_alone_whose_clock_jumps_is_followed_on(jump_s: float) -> None:
 
 
 def test_a_camera_whose_clock_stands_ends_it() -> None:
-    follower = PlateFollower(Plane(), settings_for(MOVING))
-    picture = SeenPose(1.0, 0.0, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
+    follower = PoseFollower(Plane(), settings_for(MOVING))
+    picture = CameraPose(1.0, np.eye(3), np.zeros(3), 1e-7 * np.eye(6))
     for number in range(30):
-        follower.picture(replace(picture, arrived_s=number / 30.0))
+        follower.picture(picture, number / 30.0)
     with pytest.raises(DeviceError, match=r"camera's clock stands"):
-        follower.picture(replace(picture, arrived_s=1.1))
+        follower.picture(picture, 1.1)
 
 
 def test_a_turned_plate_gives_the_normal_of_its_face() -> None:
-    follower = PlateFollower(
+    follower = PoseFollower(
         Plane(), settings_for(MOVING), rig=True, contacts=Given(a_world(0), RIG)
     )
     assert follower._normal(0.3, 0.0) == pytest.approx([0.0, 1.0, 0.0])
     block = 1e-3 * np.arange(1, 51)
     follower.samples(block, block, *[np.zeros(50)] * 3)
     turn = Rotation.from_rotvec([0.3, -0.4, 0.2]).as_matrix()
-    follower.picture(SeenPose(0.0, 0.06, turn, np.zeros(3), 1e-7 * np.eye(6)))
+    follower.picture(CameraPose(0.0, turn, np.zeros(3), 1e-7 * np.eye(6)), 0.06)
     assert follower._normal(0.3, 0.0) == pytest.approx(turn[:, 2])
 
 
@@ -226,7 +227,7 @@ def test_a_rig_whose_clock_begins_anew_keeps_the_pose(expected: bool) -> None:
     """As by a new motion: the filter's times go along, so that no picture is too late or early."""
     world = a_world(1)
     rng = np.random.default_rng(0)
-    follower = PlateFollower(
+    follower = PoseFollower(
         Plane(), settings_for(MOVING), camera_delay_s=SHORTEST_S, rig=True, contacts=None
     )
     waiting = [(p.exposed_s + SHORTEST_S + 0.04 * rng.random(), p) for p in world.pictures]
@@ -242,10 +243,10 @@ def test_a_rig_whose_clock_begins_anew_keeps_the_pose(expected: bool) -> None:
         while waiting and waiting[0][0] <= end:
             at, picture = waiting.pop(0)
             stamp = _on(CAMERA, picture.exposed_s)
-            pose = SeenPose(
-                stamp, at, picture.rotation, picture.place_m, picture.covariance, picture.certain
+            pose = CameraPose(
+                stamp, picture.rotation, picture.place_m, picture.covariance, picture.certain
             )
-            follower.picture(pose)
+            follower.picture(pose, at)
     counts = follower.tracker.estimate().counts
     assert (counts.restarts, counts.late_pictures) == (0, 0)
     assert counts.pictures > 0.9 * len(world.pictures) - counts.refused_pictures - 5

@@ -10,8 +10,9 @@ from benchmarks.control.world import Scenario
 
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
-from scissorcal.tracking.follow import PlateFollower, SeenPose
+from scissorcal.tracking.follow import PoseFollower
 from scissorcal.tracking.judge import RowCounts, TrackFigures, track_figures, track_verdicts
+from scissorcal.tracking.rows import CameraPose
 
 COUNTS = RowCounts(used=100, refused=2, late=0, waiting=0, mean_nis=6.1, freedom=6)
 NONE = RowCounts(used=0, refused=0, late=0, waiting=0, mean_nis=math.nan, freedom=1)
@@ -60,7 +61,7 @@ def test_errors_larger_than_stated_fail_the_consistency() -> None:
 
 def test_figures_are_those_of_what_was_given() -> None:
     settings = settings_for(Scenario("fixed"))
-    follower = PlateFollower(Plane(), settings, rig=True)
+    follower = PoseFollower(Plane(), settings, rig=True)
     time = 1e-3 * np.arange(1, 1001)
     follower.samples(5.0 + time, time, *[np.zeros(1000)] * 3)
     rng = np.random.default_rng(0)
@@ -69,7 +70,7 @@ def test_figures_are_those_of_what_was_given() -> None:
         place = 1e-3 * rng.standard_normal(3)
         doubt = number < 2
         follower.picture(
-            SeenPose(at, at + 0.06, np.eye(3), place, 1e-6 * np.eye(6), certain=not doubt)
+            CameraPose(at, np.eye(3), place, 1e-6 * np.eye(6), certain=not doubt), at + 0.06
         )
     figures = track_figures(follower)
     assert figures.pictures.used + figures.pictures.refused == 58

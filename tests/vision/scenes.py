@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.vision.photo import Photo
-from scissorcal.vision.sim import Lens, Looks, Pose, render, target_layers
+from scissorcal.vision.sim import Lens, Looks, SimPose, render, target_layers
 from scissorcal.vision.targets.boards import Board
 
 SOFT = Looks(softness_px=0.7, noise=0.01)
@@ -18,14 +18,14 @@ def lens(width: int = 1280, height: int = 720, focal_px: float = 1150.0) -> Lens
 
 def pose_before(
     board: Board, distance_m: float, *, tilt: float = 0.0, azimuth: float = 0.0, turn: float = 0.0
-) -> Pose:
+) -> SimPose:
     """Look at the middle of a board."""
     middle = (0.5 * board.width_m, 0.5 * board.height_m)
-    return Pose.looking_at(middle, distance_m, tilt=tilt, azimuth=azimuth, turn=turn)
+    return SimPose.looking_at(middle, distance_m, tilt=tilt, azimuth=azimuth, turn=turn)
 
 
 def picture(
-    board: Board, pose: Pose, seen_by: Lens, looks: Looks = SOFT, seed: int = 0
+    board: Board, pose: SimPose, seen_by: Lens, looks: Looks = SOFT, seed: int = 0
 ) -> NDArray[np.uint8]:
     """Photograph one board: (height, width, 3)."""
     return render(target_layers(board, pose), seen_by, looks, np.random.default_rng(seed))

@@ -10,10 +10,10 @@ from benchmarks.photographs import centreline_turn, random_looks
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.sim import (
     BladeShape,
-    Layer,
     Lens,
     Looks,
-    Pose,
+    PaintLayer,
+    SimPose,
     as_jpeg,
     blade_layer,
     render,
@@ -67,9 +67,9 @@ def test_a_rendered_straight_edge_is_accurate(angle):
         [corner - far * along, corner + far * along, corner + far * (along + across),
          corner - far * (along - across)]
     )  # fmt: skip
-    pose = Pose.looking_at((0.0, 0.0), 0.3, tilt=0.2, azimuth=0.5)
+    pose = SimPose.looking_at((0.0, 0.0), 0.3, tilt=0.2, azimuth=0.5)
     lens = Lens(1500.0, (319.5, 239.5), 640, 480)
-    picture = render([Layer([plane], pose, 0.9)], lens, SHARP, np.random.default_rng(0))
+    picture = render([PaintLayer([plane], pose, 0.9)], lens, SHARP, np.random.default_rng(0))
     bright = linear(picture)
     share = (bright - bright.min()) / (bright.max() - bright.min())
     ends = lens.sees(np.array([corner - 0.02 * along, corner + 0.02 * along]), pose)
@@ -97,7 +97,7 @@ def test_charuco_corners_have_no_bias():
     rng = np.random.default_rng(2)
     board = CAMERA_BOARD
     for tilt, azimuth in ((0.0, 0.0), (0.3, 0.7), (0.4, 2.5)):
-        pose = Pose.looking_at(
+        pose = SimPose.looking_at(
             (board.width_m / 2, board.height_m / 2), 0.32, tilt=tilt, azimuth=azimuth, turn=0.2
         )
         looks = Looks(exposure=0.9, softness_px=0.7, noise=0.005)
@@ -114,7 +114,7 @@ def test_charuco_corners_have_no_bias():
 def test_the_rendered_lens_equals_the_fitted_camera_model():
     """Two implementations of one formula, which share no code."""
     camera = Camera(1500.0, 1500.0, 639.5, 479.5, LENS.distortion, 1280, 960)
-    pose = Pose.looking_at((0.1, 0.05), 0.3, tilt=0.4, azimuth=1.0, turn=0.3)
+    pose = SimPose.looking_at((0.1, 0.05), 0.3, tilt=0.4, azimuth=1.0, turn=0.3)
     points = np.random.default_rng(1).uniform(0.0, 0.2, (50, 2))
     solid = np.column_stack([points, np.zeros(50)]) @ pose.rotation.T + pose.shift_m
     np.testing.assert_allclose(LENS.sees(points, pose), camera.project(solid), atol=1e-6)
@@ -122,7 +122,7 @@ def test_the_rendered_lens_equals_the_fitted_camera_model():
 
 def test_every_marker_of_the_mat_is_read_in_a_poor_photograph():
     rng = np.random.default_rng(5)
-    pose = Pose.looking_at((0.126, 0.09), 0.36, tilt=0.25, azimuth=1.0)
+    pose = SimPose.looking_at((0.126, 0.09), 0.36, tilt=0.25, azimuth=1.0)
     layers = target_layers(BLADE_MAT, pose)
     picture = render(layers, LENS, random_looks(rng, 4.0), rng)
     data = np.frombuffer(as_jpeg(picture, 85), dtype=np.uint8)
@@ -133,10 +133,10 @@ def test_every_marker_of_the_mat_is_read_in_a_poor_photograph():
 
 
 def test_a_blade_covers_the_sheet_except_in_its_hole():
-    pose = Pose.looking_at((0.1, 0.05), 0.3)
+    pose = SimPose.looking_at((0.1, 0.05), 0.3)
     sheet = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     shape = BladeShape()
-    layers = [Layer([sheet], pose, 0.85), blade_layer(shape, pose, (0.08, 0.05), brushed=0.0)]
+    layers = [PaintLayer([sheet], pose, 0.85), blade_layer(shape, pose, (0.08, 0.05), brushed=0.0)]
     bright = linear(render(layers, LENS, SHARP, np.random.default_rng(0)))
     hole, body, below = (
         LENS.sees(np.array([[0.08, 0.05], [0.11, 0.05], [0.11, 0.05 + 0.009]]), pose)

@@ -30,16 +30,16 @@ from scissorcal.render.admission import rendered_tables
 from scissorcal.tracking.contacts import TipContacts
 from scissorcal.tracking.rotation import pose_error
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.rig_frame import SeenPlate
+from scissorcal.vision.geometry.rig_frame import PicturePose
 from scissorcal.vision.live import Frame
 from scissorcal.vision.sim.sim_camera import SIM_LENS
 from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.inputs import REST_RATE_RAD_PER_S
-from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
-from scissorcal.workday.tracking.pose_source import Due, TrackedPose
 from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import CAMERA_DRIFT, CAMERA_OFFSET_S, SimCamera, SimWorld
+from scissorcal.workday.tracking.track_pictures import PoseFinder, TrackPicture
 from scissorcal.workday.tracking.track_recorder import TrackAbout
+from scissorcal.workday.tracking.tracking_camera import Due, TrackedPose
 from tests.control.virtual import mechanics
 from tests.render.plate_motion import Move, true_torque
 from tests.workday.track_world import TEXT, an_eye
@@ -154,7 +154,7 @@ class StatedPictures:
     """Pictures that are not rendered: their poses err as one rendered picture says."""
 
     world: CarriedWorld
-    eye: PlateEye
+    eye: PoseFinder
     seed: int
     scale: float
 
@@ -168,19 +168,19 @@ class StatedPictures:
         self._root = np.linalg.cholesky(self.noise)
         self.world.image = lambda exposed: np.ones((1, 1, 3), dtype=np.uint8)  # type: ignore[method-assign]
 
-    def __call__(self, now_s: float) -> Iterator[PlatePicture]:
+    def __call__(self, now_s: float) -> Iterator[TrackPicture]:
         for frame in self.world.frames(now_s):
             times = (frame.number, frame.stamp_s, frame.arrived_s)
             if not frame.image.any():
-                yield PlatePicture(*times, "blank", 0)
+                yield TrackPicture(*times, "blank", 0)
                 continue
             exposed = (frame.stamp_s - CAMERA_OFFSET_S) / (1.0 + CAMERA_DRIFT)
             rotation, place = self.world.truth(exposed)
             error = self._off + self._root @ self._rng.standard_normal(6)
             turn = Pose.from_rotation_vector(error[:3], np.zeros(3)).matrix
             pose = Pose.from_matrix(turn @ rotation, place + error[3:], self.noise + self.shared)
-            yield PlatePicture(
-                *times, "seen", 60, seen=SeenPlate(pose, None, self.noise, self.shared)
+            yield TrackPicture(
+                *times, "seen", 60, seen=PicturePose(pose, None, self.noise, self.shared)
             )
 
 
@@ -295,8 +295,8 @@ def _session(case: Case, recipe: Recipe, world: CarriedWorld) -> TrackSession:
     return TrackSession(recipe, TrackFacts(Plane(), about, RigDrive(0.06), contacts))
 
 
-def _located(world: CarriedWorld, eye: PlateEye) -> Due:
-    def due(now_s: float) -> Iterator[PlatePicture]:
+def _located(world: CarriedWorld, eye: PoseFinder) -> Due:
+    def due(now_s: float) -> Iterator[TrackPicture]:
         return (eye.picture(located) for located in eye.locate(world.frames(now_s)))
 
     return due

@@ -9,9 +9,9 @@ import pytest
 from scissorcal.device.session import RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.workday.tracking.feeds import idle_rig
-from scissorcal.workday.tracking.pictures import PlatePicture
-from scissorcal.workday.tracking.pose_source import TrackedPose
 from scissorcal.workday.tracking.sim_world import SimWorld
+from scissorcal.workday.tracking.track_pictures import TrackPicture
+from scissorcal.workday.tracking.tracking_camera import TrackedPose
 from tests.workday.track_world import a_recipe, a_session, an_eye
 
 
@@ -21,7 +21,7 @@ def test_a_pose_is_predicted_for_the_time_that_it_is_asked_for() -> None:
     session = a_session(recipe, rig=True)
     seeing = True
 
-    def due(now_s: float) -> Iterator[PlatePicture]:
+    def due(now_s: float) -> Iterator[TrackPicture]:
         if seeing:
             for found in eye.locate(world.frames(now_s)):
                 yield eye.picture(found)
@@ -59,9 +59,9 @@ def test_a_camera_that_fails_is_a_lost_plate_although_the_tip_touches(
     recipe = a_recipe("speed_mm_per_s = 5", "turn_deg_per_s = 1")
     world, eye = SimWorld(recipe, 2, rig=True), an_eye(recipe, 2)
     session = a_session(recipe, rig=True)
-    kept: list[PlatePicture] = []
+    kept: list[TrackPicture] = []
 
-    def due(now_s: float) -> Iterator[PlatePicture]:
+    def due(now_s: float) -> Iterator[TrackPicture]:
         if len(kept) > 5 and fails == "camera":
             raise DeviceError("The camera was unplugged.")
         for found in eye.locate(world.frames(now_s)):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scissorcal.device.sim.plate import plate_pose
+from scissorcal.device.sim.plate_contact import plate_pose
 from scissorcal.device.sim.specimen import TouchedPlate
 from scissorcal.errors import InputError
 from scissorcal.tracking.plate_pose import level_plate

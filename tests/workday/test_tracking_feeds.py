@@ -12,7 +12,7 @@ import pytest
 
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.recording import SAMPLE_DTYPE
-from scissorcal.vision.live import Frame, Tracked, timed
+from scissorcal.vision.live import Frame, LocatedFrame, timed
 from scissorcal.workday.tracking import feeds
 from scissorcal.workday.tracking.camera_thread import CameraThread
 from scissorcal.workday.tracking.feeds import (
@@ -20,7 +20,7 @@ from scissorcal.workday.tracking.feeds import (
     refuse_strange_pairs,
     refuse_without_sledge,
 )
-from scissorcal.workday.tracking.pictures import PlatePicture
+from scissorcal.workday.tracking.track_pictures import TrackPicture
 from tests.guard import GUARD_S
 
 
@@ -28,13 +28,13 @@ def a_frame(number: int, rate_Hz: float = 30.0, stamp_s: float = float("nan")) -
     return Frame(number, number / 30.0, None, 100, stamp_s, rate_Hz=rate_Hz)
 
 
-def seen(frames: Iterable[Frame]) -> Iterator[Tracked]:
+def seen(frames: Iterable[Frame]) -> Iterator[LocatedFrame]:
     for frame in frames:
-        yield Tracked(frame, "no target", None, 0, None)
+        yield LocatedFrame(frame, "no target", None, 0, None)
 
 
-def wait_for(thread: CameraThread, wanted: int) -> list[Tracked]:
-    found: list[Tracked] = []
+def wait_for(thread: CameraThread, wanted: int) -> list[LocatedFrame]:
+    found: list[LocatedFrame] = []
     while len(found) < wanted and not thread.ended:
         found += thread.due(0.05)
     return found
@@ -51,7 +51,7 @@ def test_pictures_that_nobody_has_time_for_are_left_out() -> None:
             yield a_frame(number)
         go_on.set()
 
-    def slow(frames: Iterable[Frame]) -> Iterator[Tracked]:
+    def slow(frames: Iterable[Frame]) -> Iterator[LocatedFrame]:
         for found in seen(frames):
             if found.frame.number == 0:
                 first_in.set()
@@ -88,7 +88,7 @@ def test_a_feed_ends_with_what_ended_its_camera(monkeypatch: pytest.MonkeyPatch)
         failing.wait()
         raise DeviceError("The camera is gone.")
 
-    def slow(frames: Iterable[Frame]) -> Iterator[Tracked]:
+    def slow(frames: Iterable[Frame]) -> Iterator[LocatedFrame]:
         for found in seen(frames):
             failing.set()
             time.sleep(0.05)
@@ -98,8 +98,8 @@ def test_a_feed_ends_with_what_ended_its_camera(monkeypatch: pytest.MonkeyPatch)
         locate = staticmethod(slow)
 
         @staticmethod
-        def picture(found: Tracked) -> PlatePicture:
-            return PlatePicture(found.frame.number, 0.0, time.monotonic(), "no target", 0)
+        def picture(found: LocatedFrame) -> TrackPicture:
+            return TrackPicture(found.frame.number, 0.0, time.monotonic(), "no target", 0)
 
     with ExitStack() as stack, pytest.raises(DeviceError, match="is gone"):
         for _ in live_feed(stack, Eye(), camera(), None).events:  # type: ignore[arg-type]
@@ -122,8 +122,8 @@ def test_samples_and_pictures_of_a_running_rig_come_as_one_stream(
         locate = staticmethod(seen)
 
         @staticmethod
-        def picture(found: Tracked) -> PlatePicture:
-            return PlatePicture(found.frame.number, 0.0, 50.25 + found.frame.number, "no target", 0)
+        def picture(found: LocatedFrame) -> TrackPicture:
+            return TrackPicture(found.frame.number, 0.0, 50.25 + found.frame.number, "no target", 0)
 
     motion: Any = SimpleNamespace(step=lambda: np.zeros(50, SAMPLE_DTYPE))
     blocks, times = 0, []
@@ -131,7 +131,7 @@ def test_samples_and_pictures_of_a_running_rig_come_as_one_stream(
         feed = live_feed(stack, Eye(), camera(), motion)  # type: ignore[arg-type]
         assert feed.base_ns == 7
         for event in feed.events:
-            if not isinstance(event, PlatePicture):
+            if not isinstance(event, TrackPicture):
                 assert len(event) == 50
                 blocks += 1
                 continue

@@ -23,9 +23,9 @@ from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.sim.sim_camera import SIM_LENS, sim_plate_scene
 from scissorcal.workday.tracking.feeds import idle_rig, sim_feed, sim_rig_feed
-from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
 from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import SimCamera, SimWorld
+from scissorcal.workday.tracking.track_pictures import PoseFinder, TrackPicture
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder
 
 CAMERA_SDS = np.array([0.8, 0.8, 0.6, 0.6, 1e-3, 3e-3, 1e-4, 1e-4, 1e-3])
@@ -38,7 +38,7 @@ def a_recipe(*lines: str) -> Recipe:
     return parse_recipe("\n".join([TEXT, "[plate.tracking]", *lines]))
 
 
-def an_eye(recipe: Recipe, seed: int) -> PlateEye:
+def an_eye(recipe: Recipe, seed: int) -> PoseFinder:
     """A fitted camera and rig frame for the rendered scene, off by draws of their covariances."""
     rng = np.random.default_rng([seed, 77])
     lens = SIM_LENS
@@ -52,7 +52,7 @@ def an_eye(recipe: Recipe, seed: int) -> PlateEye:
     seen = Pose.from_matrix(turn @ scene.rotation, scene.shift_m + away[3:], np.diag(RIG_SDS**2))
     rig = RigPose(seen, seen, 0.1, (), np.zeros((6, 9)))
     priors = PlatePriors(print_scale_sd_percent=0.0)
-    return PlateEye(camera, plate_target(recipe).inverse(), rig, priors)
+    return PoseFinder(camera, plate_target(recipe).inverse(), rig, priors)
 
 
 def tip_of(recipe: Recipe) -> BladePoint:
@@ -81,7 +81,7 @@ def tracked(
     if not rig:
         last = 0.0
         for picture in sim_feed(world, eye).events:
-            assert isinstance(picture, PlatePicture)
+            assert isinstance(picture, TrackPicture)
             if picture.arrived_s > seconds:
                 break
             session.take_picture(picture)
@@ -93,10 +93,10 @@ def tracked(
 
 
 def run_rig(
-    session: TrackSession, world: SimWorld, motion: Motion, eye: PlateEye, seconds: float
+    session: TrackSession, world: SimWorld, motion: Motion, eye: PoseFinder, seconds: float
 ) -> None:
     for event in sim_rig_feed(world, motion, eye).events:
-        if isinstance(event, PlatePicture):
+        if isinstance(event, TrackPicture):
             session.take_picture(event)
         else:
             session.take_samples(event)

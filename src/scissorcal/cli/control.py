@@ -16,11 +16,10 @@ from scissorcal.cli.options import (
     positive,
 )
 from scissorcal.cli.output import Answer, command, table
-from scissorcal.cli.tracked import tracked_facts
 from scissorcal.workday.options import ControlOptions, RigOptions
 
 if TYPE_CHECKING:
-    from scissorcal.control.result import ControlResult
+    from scissorcal.control.control_result import ControlResult
     from scissorcal.workday.runs.at_rig import RigRun
 
 
@@ -79,7 +78,7 @@ def control(
     tracked = controlled.tracked
     if tracked:
         verdicts += tracked.verdicts
-    facts = {"rig": controlled.rig, "tracked": tracked_facts(tracked)}
+    facts = {"rig": controlled.rig, "tracked": tracked.facts if tracked else None}
     return Answer({**result, **facts}, _text(controlled), verdicts, files)
 
 

@@ -69,7 +69,7 @@ def export(
 
 
 def _export_lines(track: Path, table: Path, overwrite: bool) -> Answer:
-    from scissorcal.calibration.plate.track import export_track_lines
+    from scissorcal.calibration.plate.track_lines import export_track_lines
 
     rows = export_track_lines(track, table, overwrite=overwrite)
     return Answer({"table": table, "rows": rows}, f"{table}: {rows} rows", files=[table])

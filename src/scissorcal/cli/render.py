@@ -18,7 +18,6 @@ from scissorcal.cli.options import (
     positive,
 )
 from scissorcal.cli.output import Answer, command, note, table
-from scissorcal.cli.tracked import tracked_facts
 from scissorcal.workday.options import RenderOptions, RigOptions
 
 if TYPE_CHECKING:
@@ -90,7 +89,7 @@ def render(
         verdicts += rendered.tracked.verdicts
     del result["verdicts"]
     files = [rendered.recording] if rendered.recording else []
-    facts = {"rig": rendered.rig, "tracked": tracked_facts(rendered.tracked)}
+    facts = {"rig": rendered.rig, "tracked": rendered.tracked.facts if rendered.tracked else None}
     return Answer({**result, **facts}, _text(rendered), verdicts, files)
 
 

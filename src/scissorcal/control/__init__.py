@@ -3,9 +3,7 @@
 from scissorcal.control.contact_loop import (
     ContactGains,
     ContactLoop,
-    contact_decay,
     contact_decays,
-    contact_poles,
 )
 from scissorcal.control.gains import (
     HybridGains,
@@ -21,9 +19,7 @@ __all__ = [
     "HybridGains",
     "approach_speed",
     "choose_gains",
-    "contact_decay",
     "contact_decays",
     "contact_gains",
-    "contact_poles",
     "friction_rates",
 ]

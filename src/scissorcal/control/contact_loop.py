@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.device.control import rate_weight
@@ -88,33 +87,20 @@ class ContactGains:
     force_kp: float = 0.0
 
 
-def contact_poles(
-    loop: ContactLoop, gains: ContactGains, normal_kp: float = 0.0
-) -> NDArray[np.complex128]:
-    """Poles of the sampled loop at the stated stiffness and mass.
-
-    It settles where all are inside the unit circle. With ``force_ki = 0`` there is no integral;
-    with ``normal_kp`` (1/s^2) as well it is the loop of ``NormalLaw.POSITION`` while it presses.
-
-    >>> loop = ContactLoop(1e4, 0.05, 1.0, 0.0, 1.5e-3, 1e-3, rate_cutoff_Hz=400.0)
-    >>> float(np.abs(contact_poles(loop, ContactGains(200.0, 20.0))).max().round(4))
-    0.9791
-    """
-    return np.asarray(np.linalg.eigvals(_matrices(loop, loop.corners[0], [gains], normal_kp)[0]))
-
-
-def contact_decay(loop: ContactLoop, gains: ContactGains, normal_kp: float = 0.0) -> float:
-    """Slowest decay of the loop, 1/s, stiffness and mass wrong by their factors; unstable below 0.
-
-    Minus infinity where mass and material swing faster than half the ticks, which none can see.
-    """
-    return float(contact_decays(loop, [gains], normal_kp)[0])
-
-
 def contact_decays(
     loop: ContactLoop, gains: Sequence[ContactGains], normal_kp: float = 0.0
 ) -> Array:
-    """`contact_decay` (n,) with each of the gains, all with an integral or all without."""
+    """Slowest decay of the sampled loop, 1/s, with each of the gains (n,); unstable below 0.
+
+    Stiffness and mass are wrong by their factors. All of the gains have an integral, or none
+    (``force_ki = 0``); with ``normal_kp`` (1/s^2) as well it is the loop of ``NormalLaw.POSITION``
+    while it presses. Minus infinity where mass and material swing faster than half the ticks, which
+    none can see.
+
+    >>> loop = ContactLoop(1e4, 0.05, 1.0, 0.0, 1.5e-3, 1e-3, rate_cutoff_Hz=400.0)
+    >>> contact_decays(loop, [ContactGains(200.0, 20.0)]).round(1)
+    array([8.])
+    """
     worst = np.full(len(gains), math.inf)
     for corner in loop.corners:
         if math.sqrt(corner[0] / corner[1]) * loop.tick_s >= math.pi:

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.control.contours import Foot, contour_at, foot_of
-from scissorcal.control.mechanics import RigMechanics
-from scissorcal.control.path_file import SurfacePoints
-from scissorcal.control.plate_request import put_plate, refuse_nobody
-from scissorcal.control.result import (
+from scissorcal.control.control_result import (
     ControlResult,
     control_figures,
     control_verdicts,
 )
+from scissorcal.control.mechanics import RigMechanics
+from scissorcal.control.path_file import SurfacePoints
+from scissorcal.control.plate_request import put_plate, refuse_nobody
 from scissorcal.control.settings import LIFT_M, Material, Settings, control_settings
 from scissorcal.control.surface_path import (
     ContourMap,

@@ -21,7 +21,6 @@ from scissorcal.kernel.sources import c_sources
 from scissorcal.kernel.table16 import Row16
 from scissorcal.kernel.tables import TABLE_NAMES, ModelTables
 
-Real = Literal["float", "double"]
 Target = Literal["host", "cortex-m4f"]
 Rows = tuple[Row16, Row16, Row16]
 
@@ -74,7 +73,6 @@ def compiled_step(
     tables: ModelTables,
     states: Array,
     *,
-    real: Real = "float",
     target: Target = "host",
     arrays: Mapping[str, Array] | None = None,
     rows: Mapping[str, Rows] | None = None,
@@ -83,10 +81,10 @@ def compiled_step(
     """Compile the core with a model inside, run it, and count what its steps take.
 
     ``states`` (n, 4) are opening (rad), rate (rad/s), contact (m) and the fracture energy (J/m)
-    that the crack takes there on average; 10 to 50,000 of them. ``arrays`` replace tables by their
-    name in float64, for ``real="double"``; ``rows`` say which tables the program holds in 16-bit
-    numbers. The program is compiled once and run ``runs`` times. Raises RuntimeError where the
-    tools are missing or fail; see :func:`missing_tools`.
+    that the crack takes there on average; 10 to 50,000 of them. With ``arrays`` the program
+    computes in double, in float without; they replace tables by their name in float64. ``rows`` say
+    which tables the program holds in 16-bit numbers. The program is compiled once and run ``runs``
+    times. Raises RuntimeError where the tools are missing or fail; see :func:`missing_tools`.
     """
     if not FEWEST_STATES <= len(states) <= MOST_STATES:
         raise ValueError(f"10 to {MOST_STATES} states are measured at once, not {len(states)}")
@@ -100,7 +98,7 @@ def compiled_step(
         program = Path(build) / "step_cost"
         sources = [str(folder / "step_cost.c"), *core]
         places = [f"-I{build}", f"-I{c_sources()}", f"-I{folder}"]
-        if real == "double":
+        if arrays is not None:
             places += ["-include", str(folder / "real64.h")]
         if target == "host":
             _run([*_HOST, *places, "-o", str(program), *sources, "-lm"])

@@ -16,9 +16,9 @@ from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.identity import VERSION, bytes_digest
 from scissorcal.package.archive import member_of, write_archive
 from scissorcal.package.compile import scene_ranges
-from scissorcal.package.drawn_plate import piece_records
 from scissorcal.package.exact import FitDraws, central_model, pick_draws
 from scissorcal.package.friction_tables import cut_left_out, left_out
+from scissorcal.package.layer_pieces import piece_records
 from scissorcal.package.manifest import (
     CutRecord,
     CutStructure,
@@ -28,7 +28,7 @@ from scissorcal.package.manifest import (
     Limits,
     Manifest,
     Parameter,
-    PlateRecord,
+    PoseRecord,
     Provenance,
     RigRecord,
     canonical,
@@ -265,14 +265,14 @@ def _same(fitted: Any, wanted: Any) -> bool:
     return math.isclose(fitted, wanted) if isinstance(wanted, float) else bool(fitted == wanted)
 
 
-def _plate_record(plate: PlateFit) -> PlateRecord:
+def _plate_record(plate: PlateFit) -> PoseRecord:
     """The plate's pose in the rig's frame, or in the camera's if that is all that was fitted."""
     pose = plate.rig_plate or plate.camera_plate
     if pose.covariance is None:
         raise InputError(
             "The plate's fit has no covariance of its pose: run 'scissorcal fit plate --force'."
         )
-    return PlateRecord(
+    return PoseRecord(
         frame="rig" if plate.rig_plate else "camera",
         quaternion=pose.quaternion,
         euler_angles=pose.euler_angles,

@@ -19,10 +19,10 @@ from scissorcal.model.curvature import (
     response_breaks,
     response_curvature,
 )
-from scissorcal.package.drawn_plate import hardest_layer
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.friction_tables import friction_functions, friction_tables
 from scissorcal.package.grid import NOTHING_TOUCHED, Points, spread_points
+from scissorcal.package.layer_pieces import hardest_layer
 from scissorcal.package.manifest import Fracture, Friction, Mechanics, Ranges
 from scissorcal.package.tables import Fitted, Function, NumberFormat, Rows, TableLaw, fit_table
 from scissorcal.recipe.schema import Recipe

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, Strict, model_validator
 
 from scissorcal.identity import bytes_digest
-from scissorcal.package.drawn_plate import Pieces
+from scissorcal.package.layer_pieces import Pieces
 from scissorcal.package.review import Digest, KeySignature, Review
 from scissorcal.package.simplest.record import Simplification
 from scissorcal.package.table_record import (
@@ -253,7 +253,7 @@ class RigRecord(Section):
     force_limit_N: NonNegative
 
 
-class PlateRecord(Section):
+class PoseRecord(Section):
     """Where the plate stands, where the scene asks for it: T_rig_plate, or T_camera_plate.
 
     ``quaternion`` is (w, x, y, z), ``covariance`` (6, 6) over a rotation vector in the outer frame
@@ -272,7 +272,7 @@ class PlateRecord(Section):
     warnings: tuple[Text, ...] = ()
 
     @model_validator(mode="after")
-    def _is_a_pose(self) -> PlateRecord:
+    def _is_a_pose(self) -> PoseRecord:
         one_rotation(self.quaternion, self.euler_angles, "a plate's pose")
         if abs(sum(part**2 for part in self.quaternion) - 1.0) > 1e-6:
             raise ValueError("a plate's quaternion has length one")
@@ -310,7 +310,7 @@ class Manifest(Section):
     provenance: Provenance
     members: Annotated[tuple[Member, ...], Field(min_length=1, max_length=16)]
     plate_pose: Literal["known", "estimated"] = "known"
-    plate: PlateRecord | None = None
+    plate: PoseRecord | None = None
     pieces: Pieces | None = None
     simplification: Simplification | None = None
     rig: RigRecord | None = None

@@ -16,7 +16,6 @@ from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel
 from scissorcal.package.archive import REMEDY, read_archive
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.compile import kernel_tables
-from scissorcal.package.drawn_plate import kernel_pieces
 from scissorcal.package.exact import (
     ExactModel,
     FitDraws,
@@ -24,6 +23,7 @@ from scissorcal.package.exact import (
     exact_model,
     torque_quantiles,
 )
+from scissorcal.package.layer_pieces import kernel_pieces
 from scissorcal.package.manifest import CutRecord, FrictionRecord, Manifest
 from scissorcal.package.reach import reach_sentences
 from scissorcal.package.signature import against, signature_refusal

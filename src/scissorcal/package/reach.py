@@ -11,9 +11,9 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult
 from scissorcal.model import edge_height
 from scissorcal.model.cutting import torque_at, within_thickness
-from scissorcal.package.drawn_plate import hardest_layer
 from scissorcal.package.exact import ExactModel, FitDraws, central_model
 from scissorcal.package.grid import Points
+from scissorcal.package.layer_pieces import hardest_layer
 from scissorcal.package.manifest import DataReach
 from scissorcal.recipe.schema import Recipe
 

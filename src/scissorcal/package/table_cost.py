@@ -242,7 +242,6 @@ def _compiled(
     return compiled_step(
         tables,
         states,
-        real="double" if double else "float",
         target=target,
         runs=runs,
         arrays=arrays if double else None,

@@ -13,17 +13,18 @@ from scissorcal.kernel.web_module import web_numbers
 from scissorcal.package.average import energy_levels
 from scissorcal.package.compile import table_file
 from scissorcal.package.exact import exact_model, torque_quantiles
-from scissorcal.package.manifest import Manifest, Parameter, PlateRecord
+from scissorcal.package.layer_pieces import PieceRecord
+from scissorcal.package.manifest import Parameter, PoseRecord
 from scissorcal.package.model_package import ModelPackage, record_draws
 from scissorcal.package.variations import Variations, central_values, variations
-from scissorcal.prototype.arrays import Numbers, Part
-from scissorcal.prototype.drawn_plate import DrawnPlate
-from scissorcal.prototype.parts import (
+from scissorcal.prototype.page_parts import (
     Band,
     Draws,
     Hand,
-    PiecePart,
-    PlatePose,
+    LayersPart,
+    Numbers,
+    Part,
+    PosePart,
     Rows,
     Slider,
     Stroke,
@@ -89,10 +90,10 @@ class Scene(Part):
     bands: tuple[Band, ...]
     strokes: tuple[Stroke, ...] = ()
     hands: tuple[Hand, ...] = ()
-    pieces: tuple[PiecePart, ...] | None = None
+    pieces: tuple[PieceRecord, ...] | None = None
     recipe: str | None = None
-    drawn_plate: DrawnPlate | None = None
-    plate_pose: PlatePose | None = None
+    drawn_plate: LayersPart | None = None
+    plate_pose: PosePart | None = None
 
 
 def scene_of(
@@ -103,18 +104,16 @@ def scene_of(
     fits: Sequence[FitResult] = (),
     hands: Sequence[Hand] = (),
     warnings: Sequence[str] = (),
-    notes: Sequence[str] = (),
-    recipe: str | None = None,
-    drawn_plate: DrawnPlate | None = None,
 ) -> Scene:
     """What a page shows of a package; ``fits`` add measured strokes and meanings.
 
     A fit that the package was not built from adds nothing: its inputs hash is another.
-    ``warnings`` stand before those of the package.
+    ``warnings`` stand before those of the package. What a workspace adds to it, ``recipe`` and
+    ``drawn_plate``, is put in by ``model_copy``.
     """
     manifest = package.manifest
-    own = set(manifest.fit_hashes.values())
-    fits = [fit for fit in fits if fit.inputs_hash in own]
+    fit_hashes = set(manifest.fit_hashes.values())
+    fits = [fit for fit in fits if fit.inputs_hash in fit_hashes]
     meanings = {p.name: p.meaning for fit in fits for p in fit.parameters}
     mean = package.arrays.get(table_file("mean_energy"))
     ranges, mechanics = manifest.ranges, manifest.mechanics
@@ -123,7 +122,6 @@ def scene_of(
         made_utc=made_utc,
         version=version,
         warnings=(*warnings, *package.warnings),
-        notes=tuple(notes),
         bound_Nm=manifest.bound.stated_Nm,
         torque_limit_Nm=manifest.limits.torque_Nm,
         opening_rad=ranges.opening_rad,
@@ -137,17 +135,15 @@ def scene_of(
         tables={name: _table(package, name) for name in TABLE_NAMES},
         numbers=web_numbers(package.tables),
         mean_energy=None if mean is None else Numbers.of(mean),
-        levels=() if mean is None else tuple(float(one) for one in energy_levels(mean[1])),
+        levels=() if mean is None else tuple(float(level) for level in energy_levels(mean[1])),
         centre=_centre(package),
         sliders=tuple(_sliders(package, meanings)),
         draws=_draws(package),
         bands=tuple(_bands(package)),
         strokes=tuple(stroke for fit in fits if fit.what == "cut" for stroke in _strokes(fit)),
         hands=tuple(hands),
-        pieces=_pieces(manifest),
-        recipe=recipe,
-        drawn_plate=drawn_plate,
-        plate_pose=_plate_pose(manifest.plate),
+        pieces=manifest.pieces,
+        plate_pose=_pose_part(manifest.plate),
     )
 
 
@@ -188,22 +184,22 @@ def _centre(package: ModelPackage) -> Rows:
 def _sliders(package: ModelPackage, meanings: Mapping[str, str]) -> "list[Slider]":
     record = package.manifest.provenance
     cut, friction = central_values(package)
-    found = []
+    sliders = []
     for index, parameter in enumerate(record.cut.parameters):
         nodes = slider_nodes(parameter.name, parameter.value, parameter.sd)
         varied = np.tile(cut, (NODES, 1))
         varied[:, index] = nodes
         same = None if friction is None else np.tile(friction, (NODES, 1))
         law = variations(package, varied, same)
-        found.append(_slider(parameter, index, nodes, law, meanings))
+        sliders.append(_slider(parameter, index, nodes, law, meanings))
     for index, parameter in enumerate(record.friction.parameters if record.friction else ()):
         assert friction is not None
         nodes = slider_nodes(parameter.name, parameter.value, parameter.sd)
         varied = np.tile(friction, (NODES, 1))
         varied[:, index] = nodes
         law = variations(package, np.tile(cut, (NODES, 1)), varied)
-        found.append(_slider(parameter, len(cut) + index, nodes, law, meanings))
-    return [slider for slider in found if slider is not None]
+        sliders.append(_slider(parameter, len(cut) + index, nodes, law, meanings))
+    return [slider for slider in sliders if slider is not None]
 
 
 def _slider(
@@ -265,10 +261,10 @@ def _bands(package: ModelPackage) -> "list[Band]":
         record_draws(package.manifest.provenance.cut, package.arrays["draws/cut.npy"]), None
     )
     alone = np.clip(torque_quantiles(drawn, *place, (0.05, 0.95)), -limit, limit)
-    found = [(-rate, False, alone)]
+    bands = [(-rate, False, alone)]
     if manifest.provenance.friction:
         closing, opens = package.band(*place), package.band(place[0], rate, place[2])
-        found += [(-rate, True, np.stack(closing)), (rate, True, np.stack(opens))]
+        bands += [(-rate, True, np.stack(closing)), (rate, True, np.stack(opens))]
     return [
         Band(
             rate=signed,
@@ -278,17 +274,11 @@ def _bands(package: ModelPackage) -> "list[Band]":
             low=Numbers.of(low),
             high=Numbers.of(high),
         )
-        for signed, with_friction, (low, high) in found
+        for signed, with_friction, (low, high) in bands
     ]
 
 
-def _pieces(manifest: Manifest) -> tuple[PiecePart, ...] | None:
-    if manifest.pieces is None:
-        return None
-    return tuple(PiecePart.model_validate(piece.model_dump()) for piece in manifest.pieces)
-
-
-def _plate_pose(plate: PlateRecord | None) -> PlatePose | None:
+def _pose_part(plate: PoseRecord | None) -> PosePart | None:
     """None where the plate was seen from the camera alone: where the rig is, is not known then."""
     if plate is None or plate.frame != "rig":
         return None
@@ -296,29 +286,29 @@ def _plate_pose(plate: PlateRecord | None) -> PlatePose | None:
     sine = math.hypot(*axis)
     turn = 2.0 * math.atan2(sine, w) / sine if sine else 2.0
     x, y, z = (turn * part for part in axis)
-    return PlatePose(position_m=plate.translation_m, rotation_vector_rad=(x, y, z))
+    return PosePart(position_m=plate.translation_m, rotation_vector_rad=(x, y, z))
 
 
 def _strokes(fit: FitResult) -> "list[Stroke]":
-    series, found = fit.series, []
+    series, strokes = fit.series, []
     for number in np.unique(series.stroke)[:MOST_STROKES]:
-        own = np.flatnonzero(
+        points = np.flatnonzero(
             (series.stroke == number) & np.isfinite(series.measured) & np.isfinite(series.contact)
         )
-        own = own[:: max(1, -(-len(own) // MOST_POINTS))]
-        if len(own) < 2:
+        points = points[:: max(1, -(-len(points) // MOST_POINTS))]
+        if len(points) < 2:
             continue
-        closes = series.opening[own[-1]] < series.opening[own[0]]
-        found.append(
+        closes = series.opening[points[-1]] < series.opening[points[0]]
+        strokes.append(
             Stroke(
-                recording=_file_of(fit.sources[int(series.recording[own[0]])]),
+                recording=_file_of(fit.sources[int(series.recording[points[0]])]),
                 kind="closing" if closes else "opening",
-                opening=Numbers.of(series.opening[own]),
-                contact=Numbers.of(series.contact[own]),
-                torque=Numbers.of(series.measured[own]),
+                opening=Numbers.of(series.opening[points]),
+                contact=Numbers.of(series.contact[points]),
+                torque=Numbers.of(series.measured[points]),
             )
         )
-    return found
+    return strokes
 
 
 def _file_of(source: str) -> str:

@@ -2,7 +2,7 @@
 
 from scissorcal.render.admission import Admission, admit_package
 from scissorcal.render.engine import Rendering, VirtualStrokes, open_writer, render
-from scissorcal.render.plate_estimate import PlateReport
+from scissorcal.render.pose_placer import PoseReport
 from scissorcal.render.result import AppliedLimits, RenderResult, latency_of
 from scissorcal.render.rig_facts import RigFacts
 from scissorcal.tracking.plate_pose import PlatePose, PoseSource
@@ -11,7 +11,7 @@ __all__ = [
     "Admission",
     "AppliedLimits",
     "PlatePose",
-    "PlateReport",
+    "PoseReport",
     "PoseSource",
     "RenderResult",
     "Rendering",

@@ -15,7 +15,7 @@ from scissorcal.kernel import (
     StepOutput,
     Table,
 )
-from scissorcal.package.plate_slopes import PlateSlopes
+from scissorcal.package.layer_slopes import LayerSlopes
 from scissorcal.package.tangent import Tangent
 from scissorcal.render.drops import largest_drop
 from scissorcal.render.felt_cost import plate_strokes
@@ -146,7 +146,7 @@ class _Sheet:
 def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) -> Needs:
     """What a package with a drawn plate asks of the loop; without pieces as `needs_of`.
 
-    ``stiffness`` and ``damper`` are the proved bounds of `package.plate_slopes` over all pieces
+    ``stiffness`` and ``damper`` are the proved bounds of `package.layer_slopes` over all pieces
     that can be pressed at once, ``found`` the largest slope in the strokes that cut the plate
     (`felt_cost.plate_strokes`). Were that the larger, by float32 or where a piece is pressed before
     the scene's nearest contact, ``stiffness`` is it, too. ``drop_Nm`` is found at 48 openings:
@@ -157,7 +157,7 @@ def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) 
     if not pieces:
         return needs_of(tables, torque_limit)
     friction = _friction(tables)
-    slopes = PlateSlopes(tables, torque_limit + friction, pieces)
+    slopes = LayerSlopes(tables, torque_limit + friction, pieces)
     steepest = slopes.bound("opening")
     damper = slopes.bound("rate").value if tables.rate_damping > 0.0 else 0.0
     found = _found_on(tables, torque_limit, pieces)
@@ -176,7 +176,7 @@ def stiffness_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piec
     """The stiffness of `needs_on` alone."""
     if not pieces:
         return needs_of(tables, torque_limit).stiffness
-    slopes = PlateSlopes(tables, torque_limit + _friction(tables), pieces)
+    slopes = LayerSlopes(tables, torque_limit + _friction(tables), pieces)
     return max(slopes.bound("opening").value, _found_on(tables, torque_limit, pieces))
 
 

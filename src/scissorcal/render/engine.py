@@ -24,8 +24,7 @@ from scissorcal.render.admission import (
 )
 from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
 from scissorcal.render.mismatch import find_mismatch, refuse_other_rig
-from scissorcal.render.plate_pose import EVERY_S, PlatePlacer, plate_config
-from scissorcal.render.plate_source import plate_placer
+from scissorcal.render.pose_placer import EVERY_S, PosePlacer, plate_config, pose_placer
 from scissorcal.render.result import (
     AppliedLimits,
     RenderResult,
@@ -102,7 +101,7 @@ def render(
     Where the package's scene has ``plate_pose = "estimated"``, the torque is that of the plate
     where ``plate`` has it, or without one where the package's fitted pose has it. The force falls
     while the pose is lost or too uncertain for the scene's tolerance
-    (`plate_pose.PlatePlacer`), and the result's ``plate`` states it. Packages with a known pose
+    (`plate_pose.PosePlacer`), and the result's ``plate`` states it. Packages with a known pose
     take no heed of ``plate``.
 
     Before any force, `admission.admit_package` compares the package's stiffness with what the rig
@@ -120,7 +119,7 @@ def render(
     _refuse_impossible(session, how.seconds)
     start = _judged(session, package, how, rig)
     tables = rendered_tables(package.tables, start.admission)
-    follower = plate_placer(package, plate, tables, start.limits.torque_Nm, writer)
+    follower = pose_placer(package, plate, tables, start.limits.torque_Nm, writer)
     config = replace(
         _servo_config(start, identity, how.seconds, rig.rest if rig else UNKNOWN_REST),
         motor_sign=session.recipe.rig.motor_sign,
@@ -184,7 +183,7 @@ def _result(
     watch: Watch,
     package: ModelPackage,
     start: _Start,
-    follower: PlatePlacer | None,
+    follower: PosePlacer | None,
 ) -> RenderResult:
     """Figures of a rendering that has ended."""
     report, admission, accepted = motion.report(), start.admission, start.accepted

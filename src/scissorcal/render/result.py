@@ -11,7 +11,7 @@ from scissorcal.device.motion import MotionReport
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.kernel import EnergyLedger
 from scissorcal.render.admission import Admission
-from scissorcal.render.plate_estimate import PlateReport
+from scissorcal.render.pose_placer import PoseReport
 from scissorcal.verdicts import STATED, TORQUE, Check, Verdict
 
 ACCEPT = "--accept-derated"
@@ -94,7 +94,7 @@ class RenderResult:
     limits: AppliedLimits
     admission: Admission
     accepted_derated: bool
-    plate: PlateReport | None
+    plate: PoseReport | None
     package_hash: str
     verdicts: tuple[Verdict, ...]
     warnings: tuple[str, ...]
@@ -122,7 +122,7 @@ def render_verdicts(
     latency: Percentiles | None,
     tick_us: int,
     admission: Admission,
-    plate: PlateReport | None = None,
+    plate: PoseReport | None = None,
     *,
     accepted: bool = False,
 ) -> tuple[Verdict, ...]:
@@ -176,7 +176,7 @@ def felt_verdict(admission: Admission, *, accepted: bool = False) -> Verdict:
     return FELT_TORQUE.judge(share, why, remedy, threshold=tolerance)
 
 
-def _plate_pose(plate: PlateReport) -> Verdict:
+def _plate_pose(plate: PoseReport) -> Verdict:
     """Whether the force was there for most of the time, for want of the plate's pose or not."""
     share = plate.out_s / plate.seconds if plate.seconds > 0.0 else 1.0
     why = (

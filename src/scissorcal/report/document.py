@@ -21,7 +21,7 @@ from scissorcal.report.subjects.blade import blade_panels
 from scissorcal.report.subjects.camera import camera_panels
 from scissorcal.report.subjects.closing import Provenance
 from scissorcal.report.subjects.friction import friction_panel
-from scissorcal.report.subjects.plate import plate_panels
+from scissorcal.report.subjects.plate_pose import plate_panels
 from scissorcal.report.subjects.rig import rig_panels
 from scissorcal.report.subjects.scene import scene_panels
 from scissorcal.report.subjects.trust import trust_panels
@@ -134,9 +134,9 @@ def compose(
 
         scene = [*scene, stated_edge_panel(recipe)]
     if evidence.pieces:
-        from scissorcal.report.subjects.drawn_plate import drawn_plate_panel
+        from scissorcal.report.subjects.layers import layers_panel
 
-        scene = [*scene, drawn_plate_panel(recipe, evidence.pieces)]
+        scene = [*scene, layers_panel(recipe, evidence.pieces)]
     provenance = closing.trace(recipe, recipe_text, keyed, evidence.recordings, geometry, checks)
     photographed = _geometry_panels(geometry, evidence.geometry, missing)
     cells = decision.cells_of(

@@ -1,7 +1,7 @@
 """The plate's pose while rig and plate work: a filter over pictures and contacts.
 
 Arrays in, arrays out: no files, no ports, no clocks. `PoseTracker` is the filter;
-`PlateFollower` feeds it from a camera and a rig whose clocks it measures. 'scissorcal track' and
+`PoseFollower` feeds it from a camera and a rig whose clocks it measures. 'scissorcal track' and
 `scissorcal.workday.runs.track.track_plate` connect it to a workspace.
 """
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from scissorcal.tracking.clocks import ClockFit, ClockWatch, fit_clock
     from scissorcal.tracking.contacts import TipContact, TipContacts
     from scissorcal.tracking.delay import DelayFit, measure_delay
-    from scissorcal.tracking.follow import FollowedRow, PlateFollower, SeenPose
+    from scissorcal.tracking.follow import FollowedRow, PoseFollower
     from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
     from scissorcal.tracking.rotation import pose_error
     from scissorcal.tracking.rows import CameraPose
@@ -30,7 +30,7 @@ _HOMES = {
     "clocks": ("ClockFit", "ClockWatch", "fit_clock"),
     "contacts": ("TipContact", "TipContacts"),
     "delay": ("DelayFit", "measure_delay"),
-    "follow": ("FollowedRow", "PlateFollower", "SeenPose"),
+    "follow": ("FollowedRow", "PoseFollower"),
     "judge": ("TrackFigures", "track_figures", "track_verdicts"),
     "rotation": ("pose_error",),
     "rows": ("CameraPose",),
@@ -56,11 +56,10 @@ __all__ = [
     "FollowedRow",
     "ForceErrors",
     "Outcome",
-    "PlateFollower",
     "PlateMotion",
     "PoseEstimate",
+    "PoseFollower",
     "PoseTracker",
-    "SeenPose",
     "TipContact",
     "TipContacts",
     "TrackFigures",

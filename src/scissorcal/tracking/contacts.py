@@ -74,19 +74,19 @@ class TipContacts:
         as they come out, also negative ones: what is a contact is the caller's matter. After a gap
         in the times it begins anew.
         """
-        found = []
+        contacts = []
         rows = np.stack([time_s, opening, advance, drive], axis=1)
         slots = np.floor(rows[:, 0] / EVERY_S + 1e-6).astype(np.int64)
         for slot in np.unique(slots).tolist():
             if slot != self._slot:
                 contact = self._closed(normal)
                 if contact is not None:
-                    found.append(contact)
+                    contacts.append(contact)
                 if slot != self._slot + 1:
                     self._means.clear()
                 self._slot = slot
             self._part.append(rows[slots == slot])
-        return found
+        return contacts
 
     def _closed(self, normal: Array) -> TipContact | None:
         """Average the samples of a finished slot; the contact in the middle of the last five."""

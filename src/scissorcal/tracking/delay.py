@@ -55,7 +55,7 @@ def measure_delay(
 ) -> DelayFit:
     """Find the shift of the pictures' times at which pictures and contacts agree best.
 
-    ``pictures`` and ``contacts`` are those that a `PlateFollower` was given, at the times that it
+    ``pictures`` and ``contacts`` are those that a `PoseFollower` was given, at the times that it
     took them for. Costs some seventeen replays of the last `MOST_CONTACTS` contacts, and of the
     pictures from the first to the last of them.
     """
@@ -72,7 +72,7 @@ def measure_delay(
     middle, bend = float(steps[int(np.argmin(coarse))]), 0.0
     for _ in range(2):
         at = middle + _FINE_S * np.arange(-2.0, 3.0)
-        square, slope, _ = np.polyfit(at - middle, [cost(one) for one in at.tolist()], 2)
+        square, slope, _ = np.polyfit(at - middle, [cost(later) for later in at.tolist()], 2)
         bend = 2.0 * float(square)
         if not bend > 0.0:
             break
@@ -107,8 +107,8 @@ def replay_cost(
     tracker = PoseTracker(surface, settings)
     rows: list[tuple[float, CameraPose | TipContact]] = [
         *(
-            (seen.time_s + later_s, replace(seen, time_s=seen.time_s + later_s))
-            for seen in pictures
+            (picture.time_s + later_s, replace(picture, time_s=picture.time_s + later_s))
+            for picture in pictures
         ),
         *((contact.time_s, contact) for contact in contacts),
     ]
@@ -135,7 +135,7 @@ def _last(
         return pictures, contacts
     contacts = contacts[-MOST_CONTACTS:]
     since, until = contacts[0].time_s - _SETTLED_S, contacts[-1].time_s + REACH_S
-    return [seen for seen in pictures if since <= seen.time_s <= until], contacts
+    return [picture for picture in pictures if since <= picture.time_s <= until], contacts
 
 
 def _unknown(later_s: float, sd_s: float, why: str) -> DelayFit:

@@ -119,13 +119,13 @@ def _move(state: FilterState, plate: PlateMotion, elapsed: float, keep: float) -
     through.ravel()[_RATES_ON_RATES] = fades
     through[OFFSET, OFFSET] = keep
     spread = np.asarray(through @ state.covariance @ through.T)
-    own, both, place = _walk(elapsed / time)
+    rate, cross, place = _walk(elapsed / time)
     variance = np.array([plate.spin_rad_per_s**2] * 3 + [plate.speed_m_per_s**2] * 3)
     flat = spread.ravel()
     flat[_POSE_ON_POSE] += variance * (time * time * place)
-    flat[_RATES_ON_POSE] += variance * (time * both)
-    flat[_POSE_ON_RATES] += variance * (time * both)
-    flat[_RATES_ON_RATES] += variance * own
+    flat[_RATES_ON_POSE] += variance * (time * cross)
+    flat[_POSE_ON_RATES] += variance * (time * cross)
+    flat[_RATES_ON_RATES] += variance * rate
     return spread
 
 
@@ -180,10 +180,10 @@ def _walk(share: float) -> tuple[float, float, float]:
     series where its closed form would cancel.
     """
     fades = math.exp(-share)
-    own = -math.expm1(-2.0 * share)
-    both = math.expm1(-share) ** 2
+    rate = -math.expm1(-2.0 * share)
+    cross = math.expm1(-share) ** 2
     if share < _SERIES_BELOW:
         place = share**3 * (2.0 / 3.0 - share * (0.5 - share * (7.0 / 30.0 - share / 12.0)))
     else:
         place = 2.0 * share - 3.0 + 4.0 * fades - fades * fades
-    return own, both, place
+    return rate, cross, place

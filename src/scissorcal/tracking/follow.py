@@ -24,26 +24,10 @@ _MOST_ROWS = 30_000
 
 
 @dataclass(frozen=True, eq=False)
-class SeenPose:
-    """A picture's pose as it arrives: its stamp by the camera's clock, its arrival by the host's.
-
-    ``rotation``, ``place_m``, ``noise`` (6, 6) and ``certain`` as in `CameraPose`.
-    """
-
-    stamp_s: float
-    arrived_s: float
-    rotation: Array
-    place_m: Array
-    noise: Array
-    certain: bool = True
-
-
-@dataclass(frozen=True, eq=False)
 class FollowedRow:
     """One row that the filter was given, and what it knew after it.
 
-    ``source`` is "picture" or "contact". ``away_m`` is how far a refused contact was from where the
-    surface was expected, along its normal. ``estimate`` is None while there is no pose.
+    ``source`` is "picture" or "contact". ``estimate`` is None while there is no pose.
     """
 
     source: str
@@ -53,7 +37,6 @@ class FollowedRow:
     state: str
     estimate: PoseEstimate | None
     contact: TipContact | None = None
-    away_m: float = math.nan
 
 
 class ContactSource(Protocol):
@@ -66,7 +49,7 @@ class ContactSource(Protocol):
     ) -> list[TipContact]: ...
 
 
-class PlateFollower:
+class PoseFollower:
     """Feeds a `PoseTracker` from a camera and a rig whose clocks are measured while it runs.
 
     The filter's time is the rig's, where there is one, else the camera's. ``camera_delay_s`` passes
@@ -143,24 +126,26 @@ class PlateFollower:
         if self._tip is None or not self.touching:
             return []
         normal = self._normal(float(opening[-1]), float(advance[-1]))
-        found = self._tip.take(device_s, opening, advance, drive, normal)
-        return [self._contact(contact) for contact in found]
+        contacts = self._tip.take(device_s, opening, advance, drive, normal)
+        return [self._contact(contact) for contact in contacts]
 
-    def picture(self, seen: SeenPose) -> FollowedRow | None:
-        """Take a picture's pose; None while the rig has sent no time to put it at."""
+    def picture(self, pose: CameraPose, arrived_s: float) -> FollowedRow | None:
+        """Take a picture's pose; None while the rig has sent no time to put it at.
+
+        Its ``time_s`` is the camera's stamp, ``arrived_s`` the host's time of its arrival.
+        """
+        stamp_s = pose.time_s
         begun = self.camera.begun_anew
         before = self.camera.fit if self.tracker.started else None
-        self.camera.add([seen.stamp_s], [seen.arrived_s])
+        self.camera.add([stamp_s], [arrived_s])
         if self.rig is None and before is not None and self.camera.begun_anew > begun:
-            self._shift(self.camera.fit.own(seen.arrived_s) - before.own(seen.arrived_s))
-        time, sd = self.exposed(seen.stamp_s)
+            self._shift(self.camera.fit.own(arrived_s) - before.own(arrived_s))
+        time, sd = self.exposed(stamp_s)
         if math.isnan(time):
             return None
         plate = self._settings.plate
         moved = np.repeat([plate.spin_rad_per_s, plate.speed_m_per_s], 3) * sd
-        pose = CameraPose(
-            time, seen.rotation, seen.place_m, seen.noise + np.diag(moved**2), seen.certain
-        )
+        pose = replace(pose, time_s=time, covariance=pose.covariance + np.diag(moved**2))
         self.pictures.append(pose)
         outcome, nis = self.tracker.picture(pose)
         self._now_s = max(self._now_s, time)
@@ -237,7 +222,6 @@ class PlateFollower:
         if outcome is Outcome.REFUSED and row.estimate is not None:
             away = self._away(contact, row.estimate)
             self.away = away, abs(away) / math.sqrt(nis)
-            row = replace(row, away_m=away)
         return row
 
     def _row(
@@ -261,16 +245,16 @@ class PlateFollower:
         """The plate's normal under the tip, in the rig's frame; the rig's y without a pose."""
         if self._tip is None or not self.tracker.started:
             return np.array([0.0, 1.0, 0.0])
-        found = self.tracker.estimate()
-        local = (self._tip.place(opening, advance) - found.place_m) @ found.rotation
+        estimate = self.tracker.estimate()
+        local = (self._tip.place(opening, advance) - estimate.place_m) @ estimate.rotation
         gradient = self._surface.at(local).gradient
-        return np.asarray(found.rotation @ (gradient / np.linalg.norm(gradient)))
+        return np.asarray(estimate.rotation @ (gradient / np.linalg.norm(gradient)))
 
-    def _away(self, contact: TipContact, found: PoseEstimate) -> float:
+    def _away(self, contact: TipContact, estimate: PoseEstimate) -> float:
         """How far a contact is outside of where the pressed surface is expected, in m."""
-        here = self._surface.at((contact.point_m - found.place_m) @ found.rotation)
+        here = self._surface.at((contact.point_m - estimate.place_m) @ estimate.rotation)
         gap = here.level / float(np.linalg.norm(here.gradient))
-        return gap + found.compliance_m_per_N * contact.force_N - found.contact_offset_m
+        return gap + estimate.compliance_m_per_N * contact.force_N - estimate.contact_offset_m
 
 
 def _rig_clock() -> ClockWatch:

@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.tracking.clocks import DRIFT_LIMIT_PPM, ClockWatch
 from scissorcal.tracking.delay import DelayFit
-from scissorcal.tracking.follow import PlateFollower
+from scissorcal.tracking.follow import PoseFollower
 from scissorcal.tracking.tracker import Outcome
 from scissorcal.verdicts import Check, Verdict
 
@@ -80,7 +80,7 @@ class TrackFigures:
     away_sd_mm: float
 
 
-def track_figures(follower: PlateFollower, delay: DelayFit | None = None) -> TrackFigures:
+def track_figures(follower: PoseFollower, delay: DelayFit | None = None) -> TrackFigures:
     """Sum up what a follower was given and did."""
     away, sd = follower.away or (math.nan, math.nan)
     restarts = follower.tracker.estimate().counts.restarts if follower.tracker.started else 0
@@ -159,17 +159,17 @@ def _judge_nis(check: Check, counts: RowCounts, settings: str) -> Verdict:
     return check.judge(ratio, why, why + remedy)
 
 
-def _counts(follower: PlateFollower, source: str) -> RowCounts:
+def _counts(follower: PoseFollower, source: str) -> RowCounts:
     def count(*outcomes: Outcome) -> int:
         return sum(follower.outcomes[source, outcome] for outcome in outcomes)
 
-    found = follower.nis[source]
+    nis = follower.nis[source]
     return RowCounts(
         used=count(Outcome.USED, Outcome.RESTARTED),
         refused=count(Outcome.REFUSED),
         late=count(Outcome.TOO_LATE),
         waiting=count(Outcome.WAITING),
-        mean_nis=float(np.mean(found)) if found else math.nan,
+        mean_nis=float(np.mean(nis)) if nis else math.nan,
         freedom=_FREEDOM[source],
     )
 

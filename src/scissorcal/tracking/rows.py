@@ -82,16 +82,16 @@ class ForceDirection:
     samples: int
 
 
-def camera_row(state: FilterState, seen: CameraPose) -> tuple[Array, Array, Array]:
+def camera_row(state: FilterState, pose: CameraPose) -> tuple[Array, Array, Array]:
     """Residual (6,), slopes (6, 30), noise (6, 6) of a picture's pose.
 
     [Log(R_m R^T) - b_r; o_m - o - b_t]
     """
     residual = np.empty(6)
-    residual[:3] = rotation_vector(seen.rotation @ state.rotation.T)
-    residual[3:] = seen.place_m - state.mean[PLACE]
+    residual[:3] = rotation_vector(pose.rotation @ state.rotation.T)
+    residual[3:] = pose.place_m - state.mean[PLACE]
     residual -= state.mean[BIAS]
-    return residual, _CAMERA_SLOPES, seen.covariance
+    return residual, _CAMERA_SLOPES, pose.covariance
 
 
 def contact_row(
@@ -178,9 +178,9 @@ def force_row(
 def _second_order(covariance: Array, away: Array, normal: Array, bend: Array | None) -> float:
     """tr(P_phi) tr(P_o) across the normal, and the curvature's share tr((B P)^2)."""
     turns, places = covariance[TURN, TURN], covariance[PLACE, PLACE]
-    own: list[float] = covariance.diagonal()[POSE].tolist()
-    tilt: float = sum(own[:3]) - float(normal @ turns @ normal)
-    slid: float = sum(own[3:]) - float(normal @ places @ normal)
+    variances: list[float] = covariance.diagonal()[POSE].tolist()
+    tilt: float = sum(variances[:3]) - float(normal @ turns @ normal)
+    slid: float = sum(variances[3:]) - float(normal @ places @ normal)
     if bend is None:
         return tilt * slid
     by_pose = np.concatenate((-cross_matrix(away), _IDENTITY), axis=1)

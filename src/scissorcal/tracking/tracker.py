@@ -120,29 +120,29 @@ class PoseTracker:
         """Whether there is a pose."""
         return bool(self._states)
 
-    def picture(self, seen: CameraPose) -> tuple[Outcome, float]:
+    def picture(self, pose: CameraPose) -> tuple[Outcome, float]:
         """Take a picture's pose, at the time of its exposure; its outcome and its NIS.
 
         Raises InputError where it is no pose.
         """
         _check(
-            "The picture's pose", seen.time_s, seen.rotation, seen.place_m, np.diag(seen.covariance)
+            "The picture's pose", pose.time_s, pose.rotation, pose.place_m, np.diag(pose.covariance)
         )
         if self._restart or not self.started:
-            if not seen.certain:
+            if not pose.certain:
                 return Outcome.WAITING, math.nan
-            self._begin(seen)
+            self._begin(pose)
             return Outcome.RESTARTED, math.nan
-        if seen.time_s < self._times[0]:
+        if pose.time_s < self._times[0]:
             self._counts = replace(self._counts, late_pictures=self._counts.late_pictures + 1)
             return Outcome.TOO_LATE, math.nan
-        nis, used = self._insert(seen)
+        nis, used = self._insert(pose)
         if used:
             self._refused_pictures = 0
-            self._used_picture_s = max(self._used_picture_s, seen.time_s)
+            self._used_picture_s = max(self._used_picture_s, pose.time_s)
             self._counts = replace(self._counts, pictures=self._counts.pictures + 1)
             return Outcome.USED, nis
-        self._refused_pictures += int(seen.certain)
+        self._refused_pictures += int(pose.certain)
         refused = self._counts.refused_pictures + 1
         self._counts = replace(self._counts, refused_pictures=refused)
         self._restart = self._refused_pictures >= self._settings.camera.refused_until_restart
@@ -223,18 +223,18 @@ class PoseTracker:
         self._used_contact_s += by_s
         self._felt_since_s += by_s
 
-    def _begin(self, seen: CameraPose) -> None:
+    def _begin(self, pose: CameraPose) -> None:
         state = start_state(
-            self._settings, seen.time_s, seen.rotation, seen.place_m, seen.covariance
+            self._settings, pose.time_s, pose.rotation, pose.place_m, pose.covariance
         )
         again = self._counts.restarts + (1 if self.started else 0)
         self._counts = replace(self._counts, pictures=self._counts.pictures + 1, restarts=again)
-        later = [row for row in self._rows if row.time_s > seen.time_s]
-        self._times, self._rows, self._states = [seen.time_s], [seen], [state]
+        later = [row for row in self._rows if row.time_s > pose.time_s]
+        self._times, self._rows, self._states = [pose.time_s], [pose], [state]
         self._refused_pictures = self._refused_contacts = 0
         self._restart = False
         self._felt = []
-        self._used_picture_s, self._used_contact_s = seen.time_s, -math.inf
+        self._used_picture_s, self._used_contact_s = pose.time_s, -math.inf
         for row in later:
             if not isinstance(row, CameraPose):
                 self._insert(row)

@@ -70,22 +70,22 @@ STATES: dict[State, str] = {
 
 
 @dataclass(frozen=True)
-class Tracked:
+class LocatedFrame:
     """One picture and its state, and the target's pose if there is one."""
 
     frame: Frame
     state: State
     board: MarkedBoard | None
     corners: int
-    found: BoardPose | None
+    pose: BoardPose | None
 
 
-def track(
+def located_frames(
     frames: Iterable[Frame],
     boards: Sequence[MarkedBoard],
     camera: Camera,
     priors: PlatePriors = PlatePriors(),
-) -> Iterator[Tracked]:
+) -> Iterator[LocatedFrame]:
     """Locate a target in every picture independently; the first board that is seen is the target.
 
     Raises InputError where pictures are of another size than the camera was fitted at.
@@ -100,17 +100,17 @@ def track(
         detection = look(frame.image, boards, f"picture {frame.number}")
         if detection is None:
             state: State = "blank" if _is_blank(frame) else "no target"
-            yield Tracked(_without_image(frame), state, None, 0, None)
+            yield LocatedFrame(_without_image(frame), state, None, 0, None)
             continue
         boards = tuple(board for board in boards if board == detection.board)
         try:
             pose = locate_board(Corners.of(detection), camera, priors)
         except ValueError:
             count = len(detection.ids)
-            yield Tracked(_without_image(frame), "no pose", boards[0], count, None)
+            yield LocatedFrame(_without_image(frame), "no pose", boards[0], count, None)
             continue
         state = "seen" if pose.odds >= ODDS else "ambiguous"
-        yield Tracked(_without_image(frame), state, boards[0], len(detection.ids), pose)
+        yield LocatedFrame(_without_image(frame), state, boards[0], len(detection.ids), pose)
 
 
 def _without_image(frame: Frame) -> Frame:

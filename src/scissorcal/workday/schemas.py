@@ -28,7 +28,7 @@ SOURCES: Mapping[str, str] = {
     "scene-choice.schema.json": "scissorcal.package.simplest.choice:SceneChoice",
     "signature.schema.json": "scissorcal.package:Review",
     "specimen.schema.json": "scissorcal.device.sim.specimen:Specimen",
-    "track.schema.json": "scissorcal.calibration.plate.track:track_schema",
+    "track.schema.json": "scissorcal.calibration.plate.track_lines:track_schema",
     "trade.schema.json": "scissorcal.bench.trade.result:Trade",
     "verify.schema.json": "scissorcal.calibration.verify.result:VerifyResult",
 }

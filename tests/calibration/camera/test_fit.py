@@ -29,7 +29,7 @@ from scissorcal.calibration.fit_pictures import left_over, residual_chart, uncer
 from scissorcal.calibration.plate.checks import CAMERA
 from scissorcal.errors import MissingError, VerdictError
 from scissorcal.vision.geometry.camera import Camera, usual_camera
-from scissorcal.vision.sim import Lens, Pose
+from scissorcal.vision.sim import Lens, SimPose
 from scissorcal.vision.targets.boards import CAMERA_BOARD
 from scissorcal.vision.targets.detect import Detection
 
@@ -62,7 +62,7 @@ def photographs(
             0.5 * board.width_m + rng.uniform(-0.14, 0.14),
             0.5 * board.height_m + rng.uniform(-0.1, 0.1),
         )
-        pose = Pose.looking_at(
+        pose = SimPose.looking_at(
             target,
             rng.uniform(0.3, 0.7),
             tilt=rng.uniform(*tilt),
@@ -395,8 +395,8 @@ def parallel(rng: np.random.Generator, tilt: float) -> list[CameraPhoto]:
     """Photographs of one slanted plane, shifted alone."""
     found = []
     for number in range(8):
-        pose = Pose.looking_at((0.117, 0.091), rng.uniform(0.4, 0.7), tilt=tilt, azimuth=1.0)
-        pose = Pose(pose.rotation, pose.shift_m + rng.uniform(-0.05, 0.05, 3) * [1, 0, 0])
+        pose = SimPose.looking_at((0.117, 0.091), rng.uniform(0.4, 0.7), tilt=tilt, azimuth=1.0)
+        pose = SimPose(pose.rotation, pose.shift_m + rng.uniform(-0.05, 0.05, 3) * [1, 0, 0])
         pixels = LENS.sees(CAMERA_BOARD.points[:, :2], pose)
         pixels = pixels + 0.1 * rng.standard_normal(pixels.shape)
         detection = Detection(CAMERA_BOARD, np.arange(48), pixels, 60.0)

@@ -6,16 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate
+from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.vision.camera_files import read_camera_file
 from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose as Found
-from scissorcal.vision.geometry.pose import difference
+from scissorcal.vision.geometry.pose import Pose, difference
 from scissorcal.vision.geometry.rig_frame import locate_rig
 from scissorcal.vision.photo import read_photo
-from scissorcal.vision.sim import Lens, Looks, Pose, render, target_layers
+from scissorcal.vision.sim import Lens, Looks, SimPose, render, target_layers
 from scissorcal.vision.targets.boards import (
     BLADE_MAT,
     PLATE_BOARD,
@@ -37,19 +36,19 @@ REAL = Path(__file__).parents[4] / "shared" / "data" / "aruco"
 
 
 def shot(
-    board: MarkedBoard, pose: Pose, seed: int = 0, ids: list[int] | None = None, eye: Lens = LENS
-) -> PlatePhoto:
+    board: MarkedBoard, pose: SimPose, seed: int = 0, ids: list[int] | None = None, eye: Lens = LENS
+) -> PosePhoto:
     """Photograph a target and find it."""
     layers = target_layers(board, pose, ids=ids)
     looks = Looks(softness_px=0.7, noise=0.01, defocus_px=0.5)
     picture = render(layers, eye, looks, np.random.default_rng(seed))
     name = f"plate-{seed}.jpg"
-    return PlatePhoto(name, find_board(photo_of(picture, name), board))
+    return PosePhoto(name, find_board(photo_of(picture, name), board))
 
 
-def away(fit: PlateFit, truth: Pose) -> tuple[float, float, np.ndarray]:
+def away(fit: PlateFit, truth: SimPose) -> tuple[float, float, np.ndarray]:
     """Degrees and millimetres off, and both in standard deviations."""
-    known = Found.from_matrix(truth.rotation, truth.shift_m)
+    known = Pose.from_matrix(truth.rotation, truth.shift_m)
     off = difference(fit.camera_plate, known)
     assert fit.camera_plate.covariance is not None
     z = off / np.sqrt(np.diag(fit.camera_plate.covariance))
@@ -63,7 +62,7 @@ def verdict(fit: PlateFit, check: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def still() -> tuple[Pose, list[PlatePhoto]]:
+def still() -> tuple[SimPose, list[PosePhoto]]:
     pose = pose_before(PLATE_BOARD, 0.3, tilt=0.6, azimuth=1.0, turn=0.2)
     return pose, [shot(PLATE_BOARD, pose, seed) for seed in range(4)]
 
@@ -84,10 +83,10 @@ def test_the_pose_is_recovered(board: MarkedBoard, tilt: float) -> None:
 
 
 def test_the_targets_place_on_the_plate_is_removed(
-    still: tuple[Pose, list[PlatePhoto]],
+    still: tuple[SimPose, list[PosePhoto]],
 ) -> None:
     truth, photos = still
-    target = Found.from_rotation_vector([np.pi, 0.0, 0.0], [0.04, -0.02, 0.0])
+    target = Pose.from_rotation_vector([np.pi, 0.0, 0.0], [0.04, -0.02, 0.0])
     fit = fit_plate(photos, SURE, plate_target=target)
     seen = fit.camera_plate.after(target)
     assert np.allclose(seen.matrix, truth.rotation, atol=2e-3)
@@ -95,11 +94,11 @@ def test_the_targets_place_on_the_plate_is_removed(
     assert fit.camera_plate.matrix[2, 2] < 0, "the plate's upper face looks at the camera"
 
 
-def test_a_moved_plate_is_detected_and_named(still: tuple[Pose, list[PlatePhoto]]) -> None:
+def test_a_moved_plate_is_detected_and_named(still: tuple[SimPose, list[PosePhoto]]) -> None:
     """Moved a little (its corners still count), and far (they are left out)."""
     truth, photos = still
     for moved_m in (3e-4, 5e-3):
-        moved = Pose(truth.rotation, truth.shift_m + np.array([moved_m, 0.0, 0.0]))
+        moved = SimPose(truth.rotation, truth.shift_m + np.array([moved_m, 0.0, 0.0]))
         fit = fit_plate([*photos, shot(PLATE_BOARD, moved, 9)], SURE)
         (found,) = (v for v in fit.verdicts if v.check == "at rest")
         assert found.status == "fail"
@@ -110,7 +109,7 @@ def test_a_moved_plate_is_detected_and_named(still: tuple[Pose, list[PlatePhoto]
 
 
 def test_one_photograph_leaves_motion_not_evaluated(
-    still: tuple[Pose, list[PlatePhoto]],
+    still: tuple[SimPose, list[PosePhoto]],
 ) -> None:
     truth, photos = still
     fit = fit_plate(photos[:1], SURE)
@@ -129,7 +128,7 @@ def test_one_small_marker_square_on_is_ambiguous() -> None:
     assert verdict(fit, "size") == "fail"
 
 
-def test_a_wrong_camera_fails_the_checks(still: tuple[Pose, list[PlatePhoto]]) -> None:
+def test_a_wrong_camera_fails_the_checks(still: tuple[SimPose, list[PosePhoto]]) -> None:
     """Grossly: corners do not fit. Slightly: both sides of the target claim other poses."""
     _, photos = still
     fit = fit_plate(photos, SURE)
@@ -141,7 +140,7 @@ def test_a_wrong_camera_fails_the_checks(still: tuple[Pose, list[PlatePhoto]]) -
 
 
 def test_without_a_photograph_or_with_two_targets_there_is_no_fit(
-    still: tuple[Pose, list[PlatePhoto]],
+    still: tuple[SimPose, list[PosePhoto]],
 ) -> None:
     with pytest.raises(MissingError, match="capture plate"):
         fit_plate([], SURE)
@@ -150,12 +149,12 @@ def test_without_a_photograph_or_with_two_targets_there_is_no_fit(
         fit_plate([still[1][0], shot(PLATE_STRIP, pose)], SURE)
 
 
-def test_corners_along_one_line_are_refused_by_name(still: tuple[Pose, list[PlatePhoto]]) -> None:
+def test_corners_along_one_line_are_refused_by_name(still: tuple[SimPose, list[PosePhoto]]) -> None:
     seen = still[1][0].detection
     line = seen.points[:, 1] == seen.points[0, 1]
     thin = Detection(seen.board, seen.ids[line], seen.pixels[line], seen.square_px)
     with pytest.raises(VerdictError, match=r"thin\.jpg: .* along one line"):
-        fit_plate([still[1][1], PlatePhoto("thin.jpg", thin)], SURE)
+        fit_plate([still[1][1], PosePhoto("thin.jpg", thin)], SURE)
 
 
 def test_another_target_is_named() -> None:
@@ -194,7 +193,7 @@ def test_a_real_board_agrees_between_halves_of_its_corners(name: str) -> None:
     assert set(find_markers(photo.grey, REAL_BOARD.dictionary, REAL_BOARD).ids) == set(range(17))
     found = find_board(photo, REAL_BOARD)
     assert len(found.ids) == 24
-    fit = fit_plate([PlatePhoto(name, found)], camera)
+    fit = fit_plate([PosePhoto(name, found)], camera)
     assert fit.halves is not None
     assert fit.halves.rotation_deg < 0.3
     assert fit.halves.translation_mm < 1.0
@@ -212,7 +211,7 @@ def test_every_real_marker_is_found() -> None:
         find_board(photo, PLATE_BOARD)
 
 
-def test_stances_that_do_not_fit_the_card_fail(still: tuple[Pose, list[PlatePhoto]]) -> None:
+def test_stances_that_do_not_fit_the_card_fail(still: tuple[SimPose, list[PosePhoto]]) -> None:
     """The blade turned by half of what was said."""
     _, seen = card_views(
         [(a, b) for a in (0.0, 0.03) for b in (0.1, 0.3)], np.random.default_rng(1)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from scissorcal.device.sim.plate import PlateContact
+from scissorcal.device.sim.plate_contact import PlateContact
 from scissorcal.device.sim.rig import VirtualRig
 from scissorcal.device.sim.specimen import Specimen, TouchedPlate
 from tests.device.sim.build import NO_FRICTION, QUIET, specimen

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from scipy.interpolate import CubicSpline
 
 from scissorcal.device.sim.blade import APART, BladeOnSheet, WavyBladeOnSheet, blade_on
-from scissorcal.device.sim.plate import PlateContact
+from scissorcal.device.sim.plate_contact import PlateContact
 from scissorcal.device.sim.specimen import Blade, TouchedPlate
 from scissorcal.device.sim.truth import average_torque, tip_at_drive
 from scissorcal.device.sim.wave import Wave

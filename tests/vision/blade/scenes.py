@@ -12,7 +12,7 @@ from scissorcal.vision.sim import (
     BladeShape,
     Lens,
     Looks,
-    Pose,
+    SimPose,
     blade_layer,
     render,
     scissors_layers,
@@ -22,7 +22,7 @@ from scissorcal.vision.targets.boards import BLADE_MAT, MAT_PIVOT_M
 
 LENS = Lens(1250.0, (702.1, 521.4), 1400, 1050, (-0.06, 0.02, 3e-4, -2e-4, 0.0))
 CAMERA = Camera(1250.0, 1250.0, 702.1, 521.4, LENS.distortion, 1400, 1050)
-POSE = Pose.looking_at((0.126, 0.09), 0.275, tilt=0.12, azimuth=0.8, turn=0.04)
+POSE = SimPose.looking_at((0.126, 0.09), 0.275, tilt=0.12, azimuth=0.8, turn=0.04)
 LOOKS = Looks(exposure=0.85, softness_px=0.7, noise=0.008, vignetting=0.2)
 SHAPE = BladeShape(back_slope=-float(np.tan(0.035)))
 
@@ -35,7 +35,7 @@ def photo_of(picture: NDArray[np.uint8], name: str = "blade.jpg") -> Photo:
 def blade_photo(
     shape: BladeShape = SHAPE,
     *,
-    pose: Pose = POSE,
+    pose: SimPose = POSE,
     looks: Looks = LOOKS,
     turn: float = 0.05,
     where: tuple[float, float] = MAT_PIVOT_M,

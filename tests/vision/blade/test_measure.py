@@ -19,7 +19,7 @@ from scissorcal.vision.blade.photo import (
 from scissorcal.vision.blade.silhouette import lone_blade
 from scissorcal.vision.blade.view import CameraView
 from scissorcal.vision.photo import Photo
-from scissorcal.vision.sim import Nick, Pose, blade_layer, render, target_layers
+from scissorcal.vision.sim import Nick, SimPose, blade_layer, render, target_layers
 from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD, MAT_PIVOT_M
 from scissorcal.vision.targets.detect import linear_light
 from tests.vision.blade.scenes import (
@@ -180,7 +180,7 @@ def two_blades():
 
 
 def wrong_board():
-    pose = Pose.looking_at((0.117, 0.09), 0.3)
+    pose = SimPose.looking_at((0.117, 0.09), 0.3)
     layers = target_layers(CAMERA_BOARD, pose)
     return photo_of(render(layers, LENS, LOOKS, np.random.default_rng(0)))
 
@@ -224,7 +224,7 @@ def test_bad_photographs_are_refused_with_the_reason(name):
 
 
 def test_a_tip_outside_the_picture_is_refused():
-    pose = Pose.looking_at((0.06, 0.09), 0.16)
+    pose = SimPose.looking_at((0.06, 0.09), 0.16)
     with pytest.raises(InputError, match=r"extends beyond|markers"):
         photograph_blade(blade_photo(pose=pose), CAMERA)
 

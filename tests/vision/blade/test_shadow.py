@@ -13,12 +13,12 @@ from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.photo import by_blade, photograph_scissors
 from scissorcal.vision.blade.profile import outermost_sharp, steepest
 from scissorcal.vision.blade.view import PlainView
-from scissorcal.vision.sim import Layer, Lens, Looks, Pose, render
+from scissorcal.vision.sim import Lens, Looks, PaintLayer, SimPose, render
 from tests.vision.blade.scenes import photo_of
 
 SHARP = Looks(exposure=0.9, softness_px=0.5)
 LENS = Lens(1000.0, (199.5, 149.5), 400, 300)
-POSE = Pose.looking_at((0.0, 0.0), 0.25)
+POSE = SimPose.looking_at((0.0, 0.0), 0.25)
 
 
 def distinct(seed, count, **look):
@@ -45,8 +45,10 @@ def linear(picture):
 def strip_in_shadow(height_m, size):
     """Light of a strip along y, 10 mm wide, whose shadow falls towards +x."""
     strip = 5e-3 * np.array([[-1.0, -8.0], [1.0, -8.0], [1.0, 8.0], [-1.0, 8.0]])
-    sheet = Layer([0.2 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])], POSE, 0.8)
-    metal = Layer([strip], POSE, 0.2)
+    sheet = PaintLayer(
+        [0.2 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])], POSE, 0.8
+    )
+    metal = PaintLayer([strip], POSE, 0.2)
     lamp = Lamp((1.5, 0.0), size, 0.5)
     shadow = CastShadow.of([strip], lambda points: np.full(len(points), height_m), POSE, lamp)
     picture = render([sheet, shadow, metal], LENS, SHARP, np.random.default_rng(0))

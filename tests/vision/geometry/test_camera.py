@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.sim import Lens, Pose
+from scissorcal.vision.sim import Lens, SimPose
 from scissorcal.vision.targets.boards import CAMERA_BOARD
 from scissorcal.vision.targets.detect import Detection
 from scissorcal.vision.view_coverage import PLACES, SIZES, SLANTS, ViewCoverage, detection_words
@@ -55,7 +55,7 @@ def test_a_scaled_camera_sees_the_same_through_larger_pixels() -> None:
     assert np.diag(small.covariance)[:5].tolist() == [0.25, 0.5, 0.75, 1.0, 5.0]
 
 
-def seen(pose: Pose) -> Detection:
+def seen(pose: SimPose) -> Detection:
     pixels = lens().sees(CAMERA_BOARD.points[:, :2], pose)
     return Detection(CAMERA_BOARD, np.arange(len(pixels)), pixels, 60.0)
 

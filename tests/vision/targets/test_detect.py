@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.vision.sim import Looks, Pose
+from scissorcal.vision.sim import Looks, SimPose
 from scissorcal.vision.targets.boards import (
     BLADE_MAT,
     CAMERA_BOARD,
@@ -160,7 +160,7 @@ def test_a_photograph_without_enough_corners_is_refused() -> None:
     assert "no chessboard of 9 x 6 inner corners" in sentence(noise, CHESSBOARD)
     assert "too blurred" in sentence(np.full((720, 1280, 3), 90, np.uint8), CAMERA_BOARD)
     assert "160 x 120 pixels" in sentence(noise[:120, :160], CAMERA_BOARD)
-    aside = Pose.looking_at((-0.11, -0.03), 0.3)
+    aside = SimPose.looking_at((-0.11, -0.03), 0.3)
     assert "are needed" in sentence(picture(CAMERA_BOARD, aside, eye), CAMERA_BOARD)
 
 

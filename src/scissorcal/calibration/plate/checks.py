@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from scissorcal.calibration.camera.checks import MOST_SD_PX, CameraThere
-from scissorcal.calibration.plate.result import Halves, PlateView
+from scissorcal.calibration.plate.result import Halves, PoseView
 from scissorcal.verdicts import STATED, Check, Verdict
 from scissorcal.vision.geometry.board_pose import ODDS, BoardPose
 from scissorcal.vision.geometry.camera import Camera
@@ -39,7 +39,7 @@ RIG_FRAME = Check(
 
 def plate_verdicts(
     whole: BoardPose,
-    views: Sequence[PlateView],
+    views: Sequence[PoseView],
     halves: Halves | None,
     camera: Camera,
     there: CameraThere | None,
@@ -71,7 +71,7 @@ def _one_pose(whole: BoardPose) -> Verdict:
     return AMBIGUITY.judge(odds, good, bad)
 
 
-def _at_rest(views: Sequence[PlateView]) -> Verdict:
+def _at_rest(views: Sequence[PoseView]) -> Verdict:
     if len(views) < 2:
         why = "One photograph cannot show whether plate and camera were at rest: take several."
         return AT_REST.not_evaluated(why)
@@ -110,7 +110,7 @@ def _halves(halves: Halves | None) -> Verdict:
     return HALVES.judge(halves.square, why + ".", why + remedy, threshold=limit)
 
 
-def _size(views: Sequence[PlateView]) -> Verdict:
+def _size(views: Sequence[PoseView]) -> Verdict:
     least = min(view.side_px for view in views)
     why = f"The smallest squares or markers are {least:.0f} px wide (limit {SMALL_PX:g})."
     remedy = " Corners are found less accurately and less often: move closer, or print larger."

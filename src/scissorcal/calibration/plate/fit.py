@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.camera.checks import CameraThere
 from scissorcal.calibration.camera.result import PixelMap
 from scissorcal.calibration.plate.checks import plate_verdicts
-from scissorcal.calibration.plate.result import Halves, PlateFit, PlateView
+from scissorcal.calibration.plate.result import Halves, PlateFit, PoseView
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
@@ -28,7 +28,7 @@ _EXACT_PRINT = {"print_scale_sd_percent": 0.0}
 
 
 @dataclass(frozen=True)
-class PlatePhoto:
+class PosePhoto:
     """The plate's target as one photograph shows it."""
 
     name: str
@@ -36,7 +36,7 @@ class PlatePhoto:
 
 
 def fit_plate(
-    photos: Sequence[PlatePhoto],
+    photos: Sequence[PosePhoto],
     camera: Camera,
     *,
     priors: PlatePriors = PlatePriors(),
@@ -51,6 +51,7 @@ def fit_plate(
     photograph of another pose is detected by fitting it alone. Both poses that a plane allows
     are refined and kept. ``priors`` are the recipe's. ``rig`` takes the pose into the rig's frame.
     ``places`` is how well the camera is known over the picture, from its fit.
+    ``inputs_hash`` of the result is empty: who reads the photographs puts it in.
 
     Raises MissingError without a photograph, InputError where photographs show different targets,
     VerdictError where the corners determine no pose.
@@ -98,7 +99,7 @@ def fit_plate(
     )
 
 
-def _there(photos: Sequence[PlatePhoto], places: PixelMap | None) -> CameraThere | None:
+def _there(photos: Sequence[PosePhoto], places: PixelMap | None) -> CameraThere | None:
     if places is None:
         return None
     pixels = np.concatenate([photo.detection.pixels for photo in photos])
@@ -115,7 +116,7 @@ def plate_target(recipe: "Recipe") -> Pose:
 
 
 def _located(
-    corners: Corners, camera: Camera, priors: PlatePriors, *photos: PlatePhoto
+    corners: Corners, camera: Camera, priors: PlatePriors, *photos: PosePhoto
 ) -> BoardPose:
     try:
         return locate_board(corners, camera, priors)
@@ -137,8 +138,8 @@ def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> Halves | N
     """
     across = corners.points[:, 0]
     ways = ((corners.corner // 4) % 2 == 1, across < np.median(across))
-    pairs = [halves for way in ways if (halves := _half_and_half(corners, camera, priors, way))]
-    return max(pairs, key=lambda halves: halves.square, default=None)
+    splits = [halves for way in ways if (halves := _half_and_half(corners, camera, priors, way))]
+    return max(splits, key=lambda halves: halves.square, default=None)
 
 
 def _half_and_half(
@@ -166,23 +167,23 @@ def _half_and_half(
 
 
 def _view(
-    photo: PlatePhoto, located: BoardPose, whole: BoardPose, here: NDArray[np.bool_]
-) -> PlateView:
-    normal = located.pose.matrix[:, 2]
-    to_target = located.pose.apply([photo.detection.points.mean(axis=0)])[0]
-    away = difference(located.pose, whole.pose)
-    own = whole.residuals_px[here][located.used]
+    photo: PosePhoto, alone: BoardPose, whole: BoardPose, here: NDArray[np.bool_]
+) -> PoseView:
+    normal = alone.pose.matrix[:, 2]
+    to_target = alone.pose.apply([photo.detection.points.mean(axis=0)])[0]
+    away = difference(alone.pose, whole.pose)
+    residuals_px = whole.residuals_px[here][alone.used]
     slant = abs(normal @ to_target) / np.linalg.norm(to_target)
-    return PlateView(
+    return PoseView(
         name=photo.name,
         corners=len(photo.detection.ids),
         used=int(np.sum(whole.used[here])),
-        rms_px=float(np.sqrt(np.mean(np.sum(own**2, axis=1)))),
-        rms_alone_px=located.rms_px,
+        rms_px=float(np.sqrt(np.mean(np.sum(residuals_px**2, axis=1)))),
+        rms_alone_px=alone.rms_px,
         side_px=photo.detection.square_px,
         distance_m=float(np.linalg.norm(to_target)),
         tilt_deg=float(np.degrees(np.arccos(np.clip(slant, 0.0, 1.0)))),
-        ambiguity=located.ambiguity,
+        ambiguity=alone.ambiguity,
         away_deg=float(np.degrees(np.linalg.norm(away[:3]))),
         away_mm=float(1e3 * np.linalg.norm(away[3:])),
     )

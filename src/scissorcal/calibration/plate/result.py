@@ -8,7 +8,7 @@ from scissorcal.vision.geometry.pose import Pose
 
 
 @dataclass(frozen=True)
-class PlateView:
+class PoseView:
     """One photograph: corners seen and used, rms errors in pixels under the common pose and under
     its own, side of a square or marker in pixels, distance, angle between line of sight and the
     plate's normal, ambiguity of that pose, and how far that lies from the common one."""
@@ -56,7 +56,7 @@ class PlateFit(Result):
     odds: float
     ambiguity: float
     rig_plate: Pose | None
-    views: tuple[PlateView, ...]
+    views: tuple[PoseView, ...]
     halves: Halves | None
     rms_px: float
     noise_px: float

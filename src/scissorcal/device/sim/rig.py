@@ -21,7 +21,7 @@ from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.friction import DryFriction
 from scissorcal.device.sim.hand import VirtualHand
 from scissorcal.device.sim.material import Sheet
-from scissorcal.device.sim.plate import PlateContact
+from scissorcal.device.sim.plate_contact import PlateContact
 from scissorcal.device.sim.sensors import Measured, SensorSet
 from scissorcal.device.sim.specimen import Specimen
 

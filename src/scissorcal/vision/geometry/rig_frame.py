@@ -25,7 +25,7 @@ from scissorcal.vision.targets.detect import Detection
 
 
 @dataclass(frozen=True, eq=False)
-class SeenPlate:
+class PicturePose:
     """T_rig_plate, or T_camera_plate where the rig's frame is not known.
 
     The covariance of ``pose`` is the whole one. It is the sum of ``noise`` (6, 6), from the errors
@@ -298,7 +298,7 @@ def _card(poses: tuple[Pose, Pose], view: CardView) -> Array:
     return np.concatenate([in_camera.rotation_vector, in_camera.translation_m])
 
 
-def seen_plate(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | None) -> SeenPlate:
+def picture_pose(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | None) -> PicturePose:
     """The plate of a target that was found; ``back`` is T_target_plate.
 
     ``rig`` takes it into the rig's frame, with the errors of the camera that both share. A filter
@@ -315,7 +315,7 @@ def seen_plate(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | None
     assert pose.covariance is not None
     assert alone.covariance is not None
     shared = pose.covariance - alone.covariance
-    return SeenPlate(
+    return PicturePose(
         pose=pose,
         other=placed(board.other) if board.other else None,
         noise=alone.covariance,

@@ -3,8 +3,8 @@
 Nothing here is used by a fit, and nothing of a fit is used here except the printed targets' layout.
 """
 
-from scissorcal.vision.sim.optics import Lens, Looks, Pose, as_jpeg
-from scissorcal.vision.sim.photograph import Layer, render
+from scissorcal.vision.sim.optics import Lens, Looks, SimPose, as_jpeg
+from scissorcal.vision.sim.photograph import PaintLayer, render
 from scissorcal.vision.sim.scenes import (
     BladeShape,
     Nick,
@@ -18,12 +18,12 @@ from scissorcal.vision.sim.scenes import (
 
 __all__ = [
     "BladeShape",
-    "Layer",
     "Lens",
     "Looks",
     "Nick",
+    "PaintLayer",
     "PlateScene",
-    "Pose",
+    "SimPose",
     "as_jpeg",
     "blade_layer",
     "chained",

@@ -40,7 +40,7 @@ class Looks:
 
 
 @dataclass(frozen=True)
-class Pose:
+class SimPose:
     """Takes points of a plane's frame into the camera's: ``rotation`` (3, 3), ``shift_m`` (3,)."""
 
     rotation: Array
@@ -55,7 +55,7 @@ class Pose:
         tilt: float = 0.0,
         azimuth: float = 0.0,
         turn: float = 0.0,
-    ) -> "Pose":
+    ) -> "SimPose":
         """Look at a place of the plane from a distance.
 
         Square-on where ``tilt`` is 0; else leaned by it towards ``azimuth``, and turned by ``turn``
@@ -77,7 +77,7 @@ class Lens:
     height: int
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
 
-    def sees(self, points: ArrayLike, pose: Pose) -> Array:
+    def sees(self, points: ArrayLike, pose: SimPose) -> Array:
         """Pixels (n, 2) of points (n, 2) in the plane of ``pose``; NaN behind the camera.
 
         Pixels have their first centre at (0, 0).

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.vision.sim.optics import Bytes, Lens, Looks, Picture, Pose, coverage, develop
+from scissorcal.vision.sim.optics import Bytes, Lens, Looks, Picture, SimPose, coverage, develop
 
 FINEST_PX = 1.5
 """Projected polygons are subdivided to sides this short, which distortion leaves straight."""
@@ -27,7 +27,7 @@ class Laid(Protocol):
 
 
 @dataclass(frozen=True)
-class Layer:
+class PaintLayer:
     """Flat shapes of one material in one plane.
 
     ``outlines_m`` are closed polygons (n, 2) in the plane of ``pose``, those that run the other
@@ -38,7 +38,7 @@ class Layer:
     """
 
     outlines_m: Sequence[Array]
-    pose: Pose
+    pose: SimPose
     reflectance: float
     shading: tuple[float, float] = (0.0, 0.0)
     brushed: float = 0.0
@@ -103,7 +103,7 @@ def render(
     return develop(radiance, looks, rng)
 
 
-def _cast_shadow(radiance: Picture, layer: Layer, lens: Lens) -> None:
+def _cast_shadow(radiance: Picture, layer: PaintLayer, lens: Lens) -> None:
     moved = [np.asarray(outline) + layer.shadow_m for outline in layer.outlines_m]
     outlines = _seen(moved, layer, lens)
     soft = layer.shadow_soft_m * lens.focal_px / float(layer.pose.shift_m[2])
@@ -124,7 +124,7 @@ def _cast_shadow(radiance: Picture, layer: Layer, lens: Lens) -> None:
     radiance[top:bottom, left:right] *= 1.0 - layer.shadow * share
 
 
-def _on_plane(pixels: Array, lens: Lens, pose: Pose) -> Array:
+def _on_plane(pixels: Array, lens: Lens, pose: SimPose) -> Array:
     """Place in the plane that pixels show; a few fixed-point steps, good enough for shading."""
     target = (pixels - lens.centre_px) / lens.focal_px
     direction = target.copy()
@@ -138,7 +138,7 @@ def _on_plane(pixels: Array, lens: Lens, pose: Pose) -> Array:
     return np.asarray(np.nan_to_num(where))
 
 
-def _seen(outlines: Sequence[Array], layer: Layer, lens: Lens) -> list[Array]:
+def _seen(outlines: Sequence[Array], layer: PaintLayer, lens: Lens) -> list[Array]:
     """Pixels of each outline, every side cut so short that its projection is straight.
 
     All outlines at once: a target has hundreds of short ones.

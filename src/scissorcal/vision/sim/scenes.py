@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scissorcal.aliases import Array
-from scissorcal.vision.sim.optics import Pose, about
-from scissorcal.vision.sim.photograph import Layer
+from scissorcal.vision.sim.optics import SimPose, about
+from scissorcal.vision.sim.photograph import PaintLayer
 from scissorcal.vision.targets.boards import RIG_MARKERS, Board, Chessboard, MarkedBoard
 from scissorcal.vision.targets.sheet import board_ink
 
@@ -112,21 +112,21 @@ class PlateScene:
     """True poses. The card moves with a blade; ``rig_card`` is its pose at no advance and blade
     angle zero. The target is on the plate's upper face at ``plate_target``."""
 
-    camera_rig: Pose
-    rig_card: Pose
-    rig_plate: Pose
-    plate_target: Pose
+    camera_rig: SimPose
+    rig_card: SimPose
+    rig_plate: SimPose
+    plate_target: SimPose
 
     @property
-    def camera_plate(self) -> Pose:
+    def camera_plate(self) -> SimPose:
         """The plate as the camera has it."""
         return chained(self.camera_rig, self.rig_plate)
 
     def layers(
         self, target: MarkedBoard, advance_m: float = 0.0, blade_angle: float = 0.0
-    ) -> list[Layer]:
+    ) -> list[PaintLayer]:
         """The target on the plate, and the card at the rig's stance."""
-        stance = Pose(about(2, blade_angle), np.array([advance_m, 0.0, 0.0]))
+        stance = SimPose(about(2, blade_angle), np.array([advance_m, 0.0, 0.0]))
         card = chained(self.camera_rig, stance, self.rig_card)
         lying = chained(self.camera_plate, self.plate_target)
         return [*target_layers(RIG_MARKERS, card), *target_layers(target, lying)]
@@ -143,7 +143,7 @@ def plate_scene(
     eye = np.array([0.15, 0.7, 0.75]) + rng.normal(0.0, 0.05, 3)
     to_rig = _looking(eye / np.linalg.norm(eye))
     middle = np.array([0.09, 0.03, 0.04])
-    camera_rig = Pose(to_rig, np.array([0.0, 0.0, rng.uniform(0.4, 0.46)]) - to_rig @ middle)
+    camera_rig = SimPose(to_rig, np.array([0.0, 0.0, rng.uniform(0.4, 0.46)]) - to_rig @ middle)
     facing = np.diag([1.0, -1.0, -1.0]) @ _leaned(rng, 0.05)
     centre = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])
     card = np.array([0.03, 0.075, 0.0]) + np.append(rng.normal(0.0, 2e-3, 2), 0.0)
@@ -152,18 +152,18 @@ def plate_scene(
     pattern = about(2, turn) @ np.diag([1.0, -1.0, -1.0])
     return PlateScene(
         camera_rig,
-        Pose(facing, card - facing @ centre),
-        Pose(lying, near_edge),
-        Pose(pattern, np.array([*place_m, 0.0])),
+        SimPose(facing, card - facing @ centre),
+        SimPose(lying, near_edge),
+        SimPose(pattern, np.array([*place_m, 0.0])),
     )
 
 
-def chained(*poses: Pose) -> Pose:
+def chained(*poses: SimPose) -> SimPose:
     """One pose after the other, the outermost first."""
     rotation, shift = np.eye(3), np.zeros(3)
     for pose in reversed(poses):
         rotation, shift = pose.rotation @ rotation, pose.rotation @ shift + pose.shift_m
-    return Pose(rotation, shift)
+    return SimPose(rotation, shift)
 
 
 def _looking(towards_eye: Array) -> Array:
@@ -181,17 +181,17 @@ def _leaned(rng: np.random.Generator, size: float) -> Array:
 
 def target_layers(
     board: Board,
-    pose: Pose,
+    pose: SimPose,
     *,
     print_scale: tuple[float, float] = (1.0, 1.0),
     ids: Sequence[int] | None = None,
-) -> list[Layer]:
+) -> list[PaintLayer]:
     """The sheet and its ink. ``print_scale`` is the printer's scale error by axis; ``ids`` leaves
     out all other markers."""
     scale = np.asarray(print_scale)
     sheet = _rectangle(-MARGIN_M, -MARGIN_M, board.width_m + MARGIN_M, board.height_m + MARGIN_M)
     ink = [outline * scale for outline in _ink(board, ids)]
-    return [Layer([sheet], pose, PAPER), Layer(ink, pose, INK)]
+    return [PaintLayer([sheet], pose, PAPER), PaintLayer(ink, pose, INK)]
 
 
 def _ink(board: Board, ids: Sequence[int] | None) -> list[Array]:
@@ -215,30 +215,30 @@ def _rectangle(left: float, top: float, right: float, bottom: float) -> Array:
 
 def blade_layer(
     shape: BladeShape,
-    pose: Pose,
+    pose: SimPose,
     pivot_m: tuple[float, float],
     turn: float = 0.0,
     **look: Any,
-) -> Layer:
+) -> PaintLayer:
     """One blade on a sheet: its pivot at ``pivot_m`` of the sheet's frame, turned by ``turn``.
 
     Unturned, it points along the sheet's x axis with its edge towards +y, which is downward in
-    print. ``look`` are fields of `Layer`.
+    print. ``look`` are fields of `PaintLayer`.
     """
     look = {"reflectance": STEEL, "brushed": 0.04, "grain": turn, **look}
     outlines = [_on_sheet(outline, pivot_m, turn) for outline in shape.outlines()]
-    return Layer(outlines, pose, **look)
+    return PaintLayer(outlines, pose, **look)
 
 
 def scissors_layers(
     upper: BladeShape,
     lower: BladeShape,
     opening: float,
-    pose: Pose,
+    pose: SimPose,
     pivot_m: tuple[float, float],
     turn: float = 0.0,
     **look: Any,
-) -> list[Layer]:
+) -> list[PaintLayer]:
     """Both blades, open by ``opening`` about one pivot, with ring handles behind it.
 
     Each blade is turned away from the common axis by half the opening; its handle lies beyond the
@@ -253,9 +253,9 @@ def scissors_layers(
             mirrored = outline * (1.0, side)
             mirrored = mirrored if side > 0 else mirrored[::-1]
             placed.append(_on_sheet(mirrored, pivot_m, turn - 0.5 * side * opening))
-        layers.append(Layer(placed, pose, **{"grain": turn - 0.5 * side * opening, **look}))
+        layers.append(PaintLayer(placed, pose, **{"grain": turn - 0.5 * side * opening, **look}))
     screw = 0.9 * upper.hole_m * np.column_stack([np.cos(_ROUND), np.sin(_ROUND)])
-    layers.append(Layer([screw + np.asarray(pivot_m)], pose, _SCREW))
+    layers.append(PaintLayer([screw + np.asarray(pivot_m)], pose, _SCREW))
     return layers
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from scissorcal.recipe.library import specimen_path
 from scissorcal.recipe.schema import Recipe
-from scissorcal.vision.sim.optics import Lens, Looks, Pose, about, as_jpeg
-from scissorcal.vision.sim.photograph import Layer, render
+from scissorcal.vision.sim.optics import Lens, Looks, SimPose, about, as_jpeg
+from scissorcal.vision.sim.photograph import PaintLayer, render
 from scissorcal.vision.sim.scenes import (
     LEVEL,
     BladeShape,
@@ -87,7 +87,7 @@ def render_board_photographs(
     return tuple(paths)
 
 
-def sim_plate_scene(recipe: "Recipe", seed: int, rig_plate: Pose | None = None) -> PlateScene:
+def sim_plate_scene(recipe: "Recipe", seed: int, rig_plate: SimPose | None = None) -> PlateScene:
     """The scene that all rendered photographs of one seed show: the true poses.
 
     The plate stands at ``rig_plate``, such as `touched_plate`; without it, it is drawn.
@@ -104,7 +104,7 @@ def render_plate_photographs(
     seed: int,
     *,
     count: int = 5,
-    rig_plate: Pose | None = None,
+    rig_plate: SimPose | None = None,
 ) -> tuple[Path, ...]:
     """Render photographs of the plate at rest into a folder; returns the files.
 
@@ -118,7 +118,7 @@ def render_plate_photographs(
 
 
 def render_card_photographs(
-    recipe: "Recipe", folder: Path, seed: int, rig_plate: Pose | None = None
+    recipe: "Recipe", folder: Path, seed: int, rig_plate: SimPose | None = None
 ) -> dict[Path, tuple[float, float]]:
     """Render photographs of the rig's card.
 
@@ -143,7 +143,7 @@ def render_frame(
     return _plate_picture(scene, stance, recipe, np.random.default_rng([seed, 11, number]))
 
 
-def standing_plate(recipe: "Recipe") -> Pose | None:
+def standing_plate(recipe: "Recipe") -> SimPose | None:
     """Where the plate of a recipe's simulated day stands; None where it is drawn.
 
     A plate whose pose the scene estimates is cut, and is drawn between the blades; one that is not
@@ -154,7 +154,7 @@ def standing_plate(recipe: "Recipe") -> Pose | None:
     return touched_plate(recipe.specimen)
 
 
-def touched_plate(name: str) -> Pose | None:
+def touched_plate(name: str) -> SimPose | None:
     """Where a specimen's file has the plate that the blade's tip touches; None without one.
 
     By code that the virtual rig does not share.
@@ -165,7 +165,7 @@ def touched_plate(name: str) -> Pose | None:
         return None
     lean = [np.radians(plate.get(f"{angle}_deg", 0.0)) for angle in ("pitch", "yaw", "roll")]
     turned = about(2, lean[0]) @ about(1, lean[1]) @ about(0, lean[2])
-    return Pose(turned @ LEVEL, 1e-3 * np.array(plate["place_mm"]))
+    return SimPose(turned @ LEVEL, 1e-3 * np.array(plate["place_mm"]))
 
 
 def _view_of(
@@ -175,14 +175,14 @@ def _view_of(
     tilt: float = 0.15,
     nearness: float = 0.85,
     aside: tuple[float, float] = (0.0, 0.0),
-) -> Pose:
-    """Pose of a target before the camera; at ``nearness`` 1 it fills the picture.
+) -> SimPose:
+    """SimPose of a target before the camera; at ``nearness`` 1 it fills the picture.
 
     ``aside`` shifts the aim from the target's centre, in its widths and heights.
     """
     lens = SIM_LENS
     fills = max(board.width_m / lens.width, board.height_m / lens.height) * lens.focal_px
-    return Pose.looking_at(
+    return SimPose.looking_at(
         ((0.5 + aside[0]) * board.width_m, (0.5 + aside[1]) * board.height_m),
         1.12 * fills / nearness,
         tilt=float(rng.uniform(0.3, 1.0) * tilt),
@@ -191,7 +191,7 @@ def _view_of(
     )
 
 
-def _write(layers: Sequence[Layer], rng: np.random.Generator, path: Path) -> Path:
+def _write(layers: Sequence[PaintLayer], rng: np.random.Generator, path: Path) -> Path:
     looks = replace(_LOOKS, light_slope=0.1)
     path.write_bytes(as_jpeg(render(layers, SIM_LENS, looks, rng), _JPEG_QUALITY))
     return path

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from scissorcal.device.session import Operator, RigSession
     from scissorcal.recording import Kind, RecordingWriter
     from scissorcal.tracking.plate_pose import PoseSource
-    from scissorcal.workday.tracking.plate_camera import PlateCamera, TrackedRun
+    from scissorcal.workday.tracking.session import TrackedRun
+    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
 Result = TypeVar("Result")
 
@@ -42,7 +43,7 @@ class RigTask(ABC, Generic[Result]):
     """
 
     kind: ClassVar["Kind"]
-    camera: "PlateCamera | None" = None
+    camera: "TrackingCamera | None" = None
     source: "PoseSource | None" = None
     taps_s: float = 0.0
     held_N: float = 0.0

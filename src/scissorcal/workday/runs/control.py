@@ -20,15 +20,15 @@ from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from scissorcal.calibration.result import FitResult
+    from scissorcal.control.control_result import ControlResult
     from scissorcal.control.mechanics import RigMechanics
     from scissorcal.control.path_file import SurfacePoints
-    from scissorcal.control.result import ControlResult
     from scissorcal.device.session import Operator, RigSession
     from scissorcal.model.edge import Edge
     from scissorcal.model.friction import FrictionLaw
     from scissorcal.recording import RecordingWriter
     from scissorcal.tracking.plate_pose import PoseSource
-    from scissorcal.workday.tracking.plate_camera import PlateCamera
+    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
 LATE_TICKS = 2.0
 """Where no probe measured the delay: one tick for line and host, one for the motor."""
@@ -158,15 +158,15 @@ class _ControlTask(RigTask["ControlResult"]):
         return f"as it was stated, ({place}) mm, {turn}"
 
 
-def _camera(engine: Engine, rig: RigOptions, options: ControlOptions) -> "PlateCamera | None":
+def _camera(engine: Engine, rig: RigOptions, options: ControlOptions) -> "TrackingCamera | None":
     """The camera that follows the plate; None without one."""
-    from scissorcal.workday.tracking.plate_camera import PlateCamera
+    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
     if options.camera == NONE:
         return None
     if options.pose is not None:
         raise InputError("The plate stands where --pose or where --camera has it: give one.")
-    return PlateCamera(engine, options.camera, rig)
+    return TrackingCamera(engine, options.camera, rig)
 
 
 def _pose_source(engine: Engine, pose: str | None) -> "PoseSource":

@@ -70,7 +70,7 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     The plate may have been moved between captures, so that only the newest counts. With photographs
     of the rig's card the pose is in the rig's frame too.
     """
-    from scissorcal.calibration.plate.fit import PlatePhoto, fit_plate, plate_target
+    from scissorcal.calibration.plate.fit import PosePhoto, fit_plate, plate_target
     from scissorcal.workday.runs.fit import Made, load_result
 
     fitted: CameraFit = load_result(engine, "camera")
@@ -80,7 +80,7 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     for capture in newest:
         _refuse_other_camera(capture, camera)
         photos += [
-            PlatePhoto(photo.source, detection_of(capture, photo))
+            PosePhoto(photo.source, detection_of(capture, photo))
             for photo in capture.index.photographs
         ]
     result = fit_plate(

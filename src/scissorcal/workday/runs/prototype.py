@@ -19,8 +19,7 @@ from scissorcal.workday.runs.render import package_warnings
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.prototype.drawn_plate import DrawnPlate
-    from scissorcal.prototype.parts import Hand
+    from scissorcal.prototype.page_parts import Hand, LayersPart
     from scissorcal.prototype.rig_commands import RigCommand
     from scissorcal.prototype.scene import Scene
     from scissorcal.prototype.server import PrototypeServer
@@ -63,7 +62,7 @@ def workspace_scene(
     fits = [load_result(engine, what) for what in available(engine, ("cut", "friction"))]
     package = open_package(path, warn=False)
     said = package_warnings(workspace, package_path)
-    return scene_of(
+    scene = scene_of(
         package,
         made_utc=(now or datetime.now(UTC)).strftime("%Y-%m-%dT%H:%M:%SZ"),
         version=VERSION,
@@ -73,17 +72,19 @@ def workspace_scene(
             *(() if package_path else _origin(workspace)),
             *(sentence for sentence in said if sentence not in package.warnings),
         ],
-        recipe=None if package_path else read_text(workspace.recipe_path),
-        drawn_plate=None if package_path else workspace_plate(workspace),
     )
+    if package_path:
+        return scene
+    recipe = read_text(workspace.recipe_path)
+    return scene.model_copy(update={"recipe": recipe, "drawn_plate": workspace_plate(workspace)})
 
 
-def workspace_plate(workspace: Workspace) -> "DrawnPlate | None":
+def workspace_plate(workspace: Workspace) -> "LayersPart | None":
     """The plate whose outlines stand in files, which a page cannot read; None where there are none.
 
     None, too, where a file is gone or wrong: the page then says what it cannot draw.
     """
-    from scissorcal.prototype.drawn_plate import drawn_plate
+    from scissorcal.prototype.page_parts import layers_part
     from scissorcal.recipe.plate_layers import drawn_layers
 
     recipe = workspace.recipe()
@@ -93,7 +94,7 @@ def workspace_plate(workspace: Workspace) -> "DrawnPlate | None":
         layers = drawn_layers(recipe.plate, workspace.root)
     except InputError:
         return None
-    return drawn_plate(recipe.plate.cut_line_mm, layers)
+    return layers_part(recipe.plate.cut_line_mm, layers)
 
 
 def _origin(workspace: Workspace) -> tuple[str, ...]:
@@ -138,8 +139,7 @@ def workspace_hands(workspace: Workspace) -> "tuple[Hand, ...]":
 
 
 def _hand(recording: "Recording") -> "Hand | None":
-    from scissorcal.prototype.arrays import Numbers
-    from scissorcal.prototype.parts import Hand
+    from scissorcal.prototype.page_parts import Hand, Numbers
 
     samples = recording.samples
     numbers = [stroke.index for stroke in recording.strokes if stroke.sheet <= 0]

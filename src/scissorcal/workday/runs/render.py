@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
     from scissorcal.recording import RecordingWriter
     from scissorcal.render import PoseSource, RenderResult, RigFacts
-    from scissorcal.workday.tracking.plate_camera import PlateCamera
+    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
 
 def render_workspace(
@@ -147,9 +147,9 @@ def _refuse_other_blades(recipe: "Recipe", package: "ModelPackage") -> None:
 
 def _camera(
     workspace: Workspace, package: "ModelPackage", rig: RigOptions, options: RenderOptions
-) -> "PlateCamera | None":
+) -> "TrackingCamera | None":
     """The camera that follows the plate of an estimated scene; None without one."""
-    from scissorcal.workday.tracking.plate_camera import PlateCamera
+    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
     if options.camera == NONE:
         if options.taps_s:
@@ -164,7 +164,7 @@ def _camera(
     engine = Engine.of(workspace)
     if options.taps_s:
         _refuse_clamped(engine.recipe.plate.tracking)
-    return PlateCamera(engine, options.camera, rig, cut=True)
+    return TrackingCamera(engine, options.camera, rig, cut=True)
 
 
 def _refuse_clamped(tracking: "PlateTracking") -> None:

@@ -12,8 +12,6 @@ import numpy as np
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.recipe.plate_surface import LONGEST_DELAY_MS
-from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
-from scissorcal.verdicts import Verdict
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.live import STATES, State, camera_number, frames_of, timed
 from scissorcal.workday.engine import Engine
@@ -22,9 +20,9 @@ from scissorcal.workday.rigs import SIM, open_session
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.feeds import Feed
-from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
-from scissorcal.workday.tracking.session import Tell, TrackSession
+from scissorcal.workday.tracking.session import Tell, TrackedRun, TrackSession, tracked_run
 from scissorcal.workday.tracking.sim_world import SimWorld
+from scissorcal.workday.tracking.track_pictures import PoseFinder, TrackPicture
 from scissorcal.workday.tracking.track_recorder import TrackRecorder, read_track
 from scissorcal.workday.workspace import Workspace
 
@@ -39,7 +37,7 @@ SIM_CAMERA_S, SIM_RIG_S = 2.4, 6.0
 
 
 @dataclass(frozen=True)
-class TrackResult:
+class TrackResult(TrackedRun):
     """A finished track: its recording (None where one was followed again), its pose at the end, and
     what became of pictures and contacts.
 
@@ -49,23 +47,15 @@ class TrackResult:
     """
 
     path: Path | None
-    source: str
     frame: Literal["rig", "camera"]
     rig: str
     seconds: float
-    pictures: int
-    poses: int
     states: dict[State, int]
     longest_gap_s: float
     travel_mm: float
-    state: str
     quaternion: tuple[float, float, float, float]
     translation_m: tuple[float, float, float]
     covariance: tuple[tuple[float, ...], ...]
-    sd_mm: float
-    sd_deg: float
-    figures: TrackFigures
-    verdicts: tuple[Verdict, ...]
     notes: tuple[str, ...]
 
     @property
@@ -115,7 +105,7 @@ class _Opened:
 
     recipe: "Recipe"
     feed: Feed
-    eye: PlateEye | None
+    eye: PoseFinder | None
     link: "Link | None"
     default_s: float | None
 
@@ -128,7 +118,7 @@ def _opened(engine: Engine, recipe: "Recipe", options: TrackOptions) -> Iterator
     camera, device = options.camera, options.device
     eye = None
     if camera != NONE:
-        eye = inputs.plate_eye(engine, recipe, camera, needs_rig=device != NONE)
+        eye = inputs.pose_finder(engine, recipe, camera, needs_rig=device != NONE)
     with ExitStack() as stack:
         if SIM in (camera, device):
             world = SimWorld(recipe, options.seed, rig=device == SIM)
@@ -212,7 +202,7 @@ def _feed(
     first = math.nan
     with suppress(KeyboardInterrupt):
         for event in feed.events:
-            if isinstance(event, PlatePicture):
+            if isinstance(event, TrackPicture):
                 first = event.arrived_s if math.isnan(first) else first
                 if seconds is not None and event.arrived_s - first >= seconds:
                     break
@@ -228,34 +218,21 @@ def _feed(
 
 
 def _result(session: TrackSession, path: Path | None, rig: str) -> TrackResult:
-
-    follower = session.follower
-    delay = session.delay
-    figures = track_figures(follower, delay)
-    estimate = follower.now()
+    estimate = session.follower.now()
     assert estimate is not None
     pose = Pose.from_matrix(estimate.rotation, estimate.place_m)
-    sds = np.sqrt(np.diag(estimate.covariance))
-    pictures = sum(session.states.values())
     return TrackResult(
+        **vars(tracked_run(session, session.about.source)),
         path=path,
-        source=session.about.source,
         frame=session.about.frame,
         rig=rig,
         seconds=session.elapsed_s,
-        pictures=pictures,
-        poses=session.states["seen"] + session.states["ambiguous"],
         states={state: session.states[state] for state in STATES},
         longest_gap_s=max(session.gaps, default=0.0),
         travel_mm=1e3 * session.travel_m,
-        state=follower.state,
         quaternion=pose.quaternion,
         translation_m=pose.translation_m,
         covariance=tuple(tuple(row) for row in estimate.covariance.tolist()),
-        sd_mm=float(1e3 * sds[3:].max()),
-        sd_deg=float(np.degrees(sds[:3].max())),
-        figures=figures,
-        verdicts=track_verdicts(figures),
         notes=_notes(session),
     )
 

@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
-from scissorcal.vision.live import Frame, Tracked
+from scissorcal.vision.live import Frame, LocatedFrame
 
 CLOSE_S = 2.0
 
@@ -19,7 +19,7 @@ class CameraThread:
     """
 
     def __init__(
-        self, frames: Iterable[Frame], locate: Callable[[Iterable[Frame]], Iterator[Tracked]]
+        self, frames: Iterable[Frame], locate: Callable[[Iterable[Frame]], Iterator[LocatedFrame]]
     ) -> None:
         self.left_out = 0
         self._newest: Frame | None = None
@@ -27,7 +27,7 @@ class CameraThread:
         self._closing = False
         self._error: BaseException | None = None
         self._news = threading.Condition()
-        self._found: queue.SimpleQueue[Tracked] = queue.SimpleQueue()
+        self._found: queue.SimpleQueue[LocatedFrame] = queue.SimpleQueue()
         self._threads = [
             threading.Thread(target=self._run, args=(self._read, frames), daemon=True),
             threading.Thread(target=self._run, args=(self._locate, locate), daemon=True),
@@ -40,19 +40,19 @@ class CameraThread:
         """Whether no picture will come any more, and all were handed out."""
         return self._found.empty() and not self._threads[1].is_alive()
 
-    def due(self, wait_s: float = 0.0) -> list[Tracked]:
+    def due(self, wait_s: float = 0.0) -> list[LocatedFrame]:
         """Located pictures since the last call, oldest first; waits so long for the first one.
 
         Raises what ended the camera.
         """
-        found: list[Tracked] = []
+        located: list[LocatedFrame] = []
         with suppress(queue.Empty):
-            found.append(self._found.get(timeout=wait_s) if wait_s else self._found.get_nowait())
+            located.append(self._found.get(timeout=wait_s) if wait_s else self._found.get_nowait())
             while True:
-                found.append(self._found.get_nowait())
-        if not found and self._error is not None and self.ended:
+                located.append(self._found.get_nowait())
+        if not located and self._error is not None and self.ended:
             raise self._error
-        return found
+        return located
 
     def close(self) -> None:
         """Stop reading; a camera that hangs is left to end with the process."""
@@ -81,9 +81,9 @@ class CameraThread:
                 self._newest = frame
                 self._news.notify_all()
 
-    def _locate(self, locate: Callable[[Iterable[Frame]], Iterator[Tracked]]) -> None:
-        for found in locate(self._fresh()):
-            self._found.put(found)
+    def _locate(self, locate: Callable[[Iterable[Frame]], Iterator[LocatedFrame]]) -> None:
+        for located in locate(self._fresh()):
+            self._found.put(located)
 
     def _fresh(self) -> Iterator[Frame]:
         while True:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.workday.tracking.camera_thread import CameraThread
-from scissorcal.workday.tracking.pictures import PlateEye, PlatePicture
 from scissorcal.workday.tracking.sim_world import SimWorld
+from scissorcal.workday.tracking.track_pictures import PoseFinder, TrackPicture
 from scissorcal.workday.tracking.track_recorder import RecordedTrack
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from scissorcal.device.motion import Motion
     from scissorcal.device.session import RigSession
 
-Event = PlatePicture | NDArray[np.void]
+Event = TrackPicture | NDArray[np.void]
 """A picture, or a block of the rig's samples."""
 
 BLOCK_S = 0.05
@@ -41,25 +41,28 @@ def recorded_feed(track: RecordedTrack) -> Feed:
     return Feed(_recorded(track), track.base_ns)
 
 
-def video_feed(frames: Iterator[object], eye: PlateEye) -> Feed:
+def video_feed(frames: Iterator[object], eye: PoseFinder) -> Feed:
     """The pictures of a video, one after the other."""
-    found = (eye.picture(one) for one in eye.locate(frames))  # type: ignore[arg-type]
-    return Feed(found, time.time_ns())
+    pictures = (eye.picture(located) for located in eye.locate(frames))  # type: ignore[arg-type]
+    return Feed(pictures, time.time_ns())
 
 
-def sim_feed(world: SimWorld, eye: PlateEye) -> Feed:
+def sim_feed(world: SimWorld, eye: PoseFinder) -> Feed:
     """What the rendered camera of a simulated world sees, without a rig."""
-    found = (eye.picture(one) for one in eye.locate(world.frames()))
-    return Feed(found, time.time_ns())
+    pictures = (eye.picture(located) for located in eye.locate(world.frames()))
+    return Feed(pictures, time.time_ns())
 
 
-def sim_rig_feed(world: SimWorld, motion: "Motion", eye: PlateEye | None) -> Feed:
+def sim_rig_feed(world: SimWorld, motion: "Motion", eye: PoseFinder | None) -> Feed:
     """A virtual rig in virtual time, and what the camera of the same world sees."""
     return Feed(_sim_rig(world, motion, eye), 0)
 
 
 def live_feed(
-    stack: ExitStack, eye: PlateEye | None, frames: Iterator[object] | None, motion: "Motion | None"
+    stack: ExitStack,
+    eye: PoseFinder | None,
+    frames: Iterator[object] | None,
+    motion: "Motion | None",
 ) -> Feed:
     """A running camera, a rig on a port, or both, in real time. ``stack`` closes the camera."""
     base_ns, begun = time.time_ns(), time.monotonic()
@@ -123,17 +126,17 @@ def _recorded(track: RecordedTrack) -> Iterator[Event]:
     yield from pictures
 
 
-def _sim_rig(world: SimWorld, motion: "Motion", eye: PlateEye | None) -> Iterator[Event]:
+def _sim_rig(world: SimWorld, motion: "Motion", eye: PoseFinder | None) -> Iterator[Event]:
     world.begin(motion)
     while True:
         yield motion.step()
         if eye is not None:
-            for found in eye.locate(world.frames(world.link.virtual_time)):
-                yield eye.picture(found)
+            for located in eye.locate(world.frames(world.link.virtual_time)):
+                yield eye.picture(located)
 
 
 def _live(
-    camera: CameraThread | None, eye: PlateEye | None, motion: "Motion | None", begun: float
+    camera: CameraThread | None, eye: PoseFinder | None, motion: "Motion | None", begun: float
 ) -> Iterator[Event]:
     last = time.monotonic()
     while True:
@@ -141,12 +144,12 @@ def _live(
             yield motion.step()
         if camera is None or eye is None:
             continue
-        found = camera.due(0.0 if motion is not None else BLOCK_S)
-        last = time.monotonic() if found else last
-        for one in found:
-            picture = eye.picture(one)
+        due = camera.due(0.0 if motion is not None else BLOCK_S)
+        last = time.monotonic() if due else last
+        for located in due:
+            picture = eye.picture(located)
             yield replace(picture, arrived_s=picture.arrived_s - begun)
-        if not found and camera.ended and motion is None:
+        if not due and camera.ended and motion is None:
             return  # `due` has raised what ended the camera, if anything did
         if time.monotonic() - last > NO_PICTURE_S:
             raise DeviceError(

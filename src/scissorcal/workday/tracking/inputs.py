@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from scissorcal.device.link import Link
     from scissorcal.recipe.schema import Recipe
     from scissorcal.tracking.contacts import TipContacts
-    from scissorcal.workday.tracking.pictures import PlateEye
+    from scissorcal.workday.tracking.track_pictures import PoseFinder
 
 KnownPose = tuple[Array, Array, Array]
 """Rotation (3, 3), place (3,) in m and covariance (6, 6) in the rig's frame."""
@@ -27,14 +27,14 @@ REST_RATE_RAD_PER_S = 0.02
 """Below it blades are taken to stand, and dry friction to hold a share of its level."""
 
 
-def plate_eye(
+def pose_finder(
     engine: Engine,
     recipe: "Recipe",
     camera: str,
     *,
     needs_rig: bool,
     otherwise: str = "track with --device none",
-) -> "PlateEye":
+) -> "PoseFinder":
     """The fitted camera, and the rig's frame if its card tells all of it.
 
     MissingError where there is no camera's fit, or where contacts need a frame that is not known;
@@ -42,7 +42,7 @@ def plate_eye(
     """
     from scissorcal.calibration.plate.fit import plate_target
     from scissorcal.workday.runs.plate import locate_workspace_rig
-    from scissorcal.workday.tracking.pictures import PlateEye
+    from scissorcal.workday.tracking.track_pictures import PoseFinder
 
     fitted = load_result(engine, "camera")
     located = locate_workspace_rig(engine, fitted.camera)
@@ -60,11 +60,11 @@ def plate_eye(
             f"('scissorcal capture plate {photographs}'), or {otherwise}."
         )
     back = plate_target(recipe).inverse()
-    return PlateEye(fitted.camera, back, rig, recipe.fit.plate.priors)
+    return PoseFinder(fitted.camera, back, rig, recipe.fit.plate.priors)
 
 
 def track_about(
-    engine: Engine, recipe: "Recipe", camera: str, eye: "PlateEye | None"
+    engine: Engine, recipe: "Recipe", camera: str, eye: "PoseFinder | None"
 ) -> TrackAbout:
     return TrackAbout(
         source=Path(camera).name,

@@ -3,7 +3,8 @@
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +13,14 @@ from scissorcal.aliases import Array
 from scissorcal.model.surface import Surface
 from scissorcal.recipe.schema import Recipe
 from scissorcal.tracking.delay import DelayFit, measure_delay
-from scissorcal.tracking.follow import ContactSource, FollowedRow, PlateFollower, SeenPose
+from scissorcal.tracking.follow import ContactSource, FollowedRow, PoseFollower
+from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
+from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import CameraErrors, TrackingSettings, settings_of
 from scissorcal.tracking.tracker import Outcome, PoseEstimate
+from scissorcal.verdicts import Verdict
 from scissorcal.vision.live import STATES, State
-from scissorcal.workday.tracking.pictures import PlatePicture
+from scissorcal.workday.tracking.track_pictures import TrackPicture
 from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackChannels
 
 UNKNOWN_FRICTION_N = 1.0
@@ -73,8 +77,42 @@ class TrackFacts:
     least_N: float = 0.0
 
 
+@dataclass(frozen=True)
+class TrackedRun:
+    """What became of pictures and contacts in a run, with the pose's state at its end.
+
+    ``poses`` of ``pictures`` had one; ``sd_mm`` and ``sd_deg`` are those of the pose's worst axis,
+    NaN without a pose.
+    """
+
+    source: str
+    state: str
+    pictures: int
+    poses: int
+    sd_mm: float
+    sd_deg: float
+    figures: TrackFigures
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Its figures for an answer in JSON."""
+        return {name: value for name, value in asdict(self).items() if name != "verdicts"}
+
+    @property
+    def sentence(self) -> str:
+        """The pictures and contacts in one line."""
+        counts = self.figures.contacts
+        return (
+            f"tracked by {self.source}: {self.poses} poses in {self.pictures} pictures, "
+            f"{self.figures.pictures.refused} refused; {counts.used} contacts used, "
+            f"{counts.refused} refused; {self.figures.restarts} restarts; the plate is known to "
+            f"{self.sd_mm:.2g} mm and {self.sd_deg:.2g} deg"
+        )
+
+
 class TrackSession:
-    """Feeds a `PlateFollower` with pictures and samples, and keeps books of what came of them.
+    """Feeds a `PoseFollower` with pictures and samples, and keeps books of what came of them.
 
     ``about`` is completed by the first picture with a pose: what all pictures share is known from
     then on. ``base_ns`` is the computer's clock at 0 s of the times of pictures.
@@ -110,7 +148,7 @@ class TrackSession:
         self._first: Array | None = None
         self._surface = facts.surface
         self._used = self._settings(None)
-        self.follower = PlateFollower(
+        self.follower = PoseFollower(
             facts.surface,
             self._used,
             camera_delay_s=1e-3 * about.camera_delay_ms,
@@ -142,7 +180,7 @@ class TrackSession:
             self._keep(row, float(host[-1]))
         self._say(math.nan)
 
-    def take_picture(self, picture: PlatePicture) -> None:
+    def take_picture(self, picture: TrackPicture) -> None:
         """Record a picture, and follow the pose in it."""
         self._pass(picture.arrived_s)
         self.states[picture.state] += 1
@@ -153,17 +191,15 @@ class TrackSession:
         row = None
         if picture.seen is not None:
             self._look(picture)
-            pose = picture.seen.pose
-            row = self.follower.picture(
-                SeenPose(
-                    stamp,
-                    picture.arrived_s,
-                    pose.matrix,
-                    np.array(pose.translation_m),
-                    picture.seen.noise,
-                    certain=picture.state == "seen",
-                )
+            sighting = picture.seen.pose
+            pose = CameraPose(
+                stamp,
+                sighting.matrix,
+                np.array(sighting.translation_m),
+                picture.seen.noise,
+                certain=picture.state == "seen",
             )
+            row = self.follower.picture(pose, picture.arrived_s)
             self._gap(picture.arrived_s)
         else:
             self.follower.blank(stamp)
@@ -208,7 +244,7 @@ class TrackSession:
             f"None of {count} pictures gave a pose of the plate's target to start from ({causes})."
         )
 
-    def _look(self, picture: PlatePicture) -> None:
+    def _look(self, picture: TrackPicture) -> None:
         """Take from the first picture with a pose what all pictures share."""
         sighting = picture.seen
         if sighting is None or self.started or self.about.shared is not None:
@@ -263,3 +299,23 @@ class TrackSession:
                 follower.outcomes,
             )
         )
+
+
+def tracked_run(track: TrackSession, source: str) -> TrackedRun:
+    """Sum up a session whose pictures came from ``source``."""
+    figures = track_figures(track.follower, track.delay)
+    estimate = track.follower.now()
+    sd_mm = sd_deg = math.nan
+    if estimate is not None:
+        sds = np.sqrt(np.diag(estimate.covariance))
+        sd_mm, sd_deg = 1e3 * float(sds[3:].max()), math.degrees(float(sds[:3].max()))
+    return TrackedRun(
+        source=source,
+        state=track.follower.state,
+        pictures=track.states.total(),
+        poses=track.states["seen"] + track.states["ambiguous"],
+        sd_mm=sd_mm,
+        sd_deg=sd_deg,
+        figures=figures,
+        verdicts=track_verdicts(figures),
+    )

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.sim.hand import minimum_jerk
-from scissorcal.device.sim.plate import plate_pose
+from scissorcal.device.sim.plate_contact import plate_pose
 from scissorcal.device.sim.specimen import Specimen, TouchedPlate, load_specimen
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey
 from scissorcal.tracking.rotation import rotation_of, rotation_vector
 from scissorcal.vision.live import Frame
-from scissorcal.vision.sim.optics import Pose
+from scissorcal.vision.sim.optics import SimPose
 from scissorcal.vision.sim.scenes import LEVEL
 from scissorcal.vision.sim.sim_camera import render_frame, sim_plate_scene
 
@@ -162,7 +162,7 @@ class SimWorld:
     def image(self, exposed: float) -> NDArray[np.uint8]:
         """What the camera shows at a time of the host's clock, (height, width, 3)."""
         rotation, place = self.truth(exposed)
-        scene = sim_plate_scene(self._recipe, self._seed, Pose(rotation, place))
+        scene = sim_plate_scene(self._recipe, self._seed, SimPose(rotation, place))
         stance = STANCE
         if self._link is not None:
             rig = self._link.rig

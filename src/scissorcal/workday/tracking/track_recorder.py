@@ -32,8 +32,8 @@ from scissorcal.recording.telemetry import (
 )
 from scissorcal.tracking.follow import FollowedRow
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.rig_frame import SeenPlate
-from scissorcal.workday.tracking.pictures import TARGETS, PlatePicture
+from scissorcal.vision.geometry.rig_frame import PicturePose
+from scissorcal.workday.tracking.track_pictures import TARGETS, TrackPicture
 
 TRACK_MARK = "track"
 
@@ -75,7 +75,7 @@ class TrackChannels:
     def samples(self, samples: NDArray[np.void]) -> None:
         """Samples of the rig are recorded by the run itself."""
 
-    def picture(self, picture: PlatePicture, time_s: float) -> None:
+    def picture(self, picture: TrackPicture, time_s: float) -> None:
         """Add a picture, exposed at ``time_s`` of the filter's clock."""
         row = np.zeros(1, dtype=PICTURE.dtype)
         row["sequence"], row["corners"] = picture.number, picture.corners
@@ -86,31 +86,31 @@ class TrackChannels:
         for name in ("quaternion", "translation", "noise", "other_quaternion", "other_translation"):
             row[name] = np.nan
         if picture.seen is not None:
-            seen = picture.seen
-            row["quaternion"], row["translation"] = seen.pose.quaternion, seen.pose.translation_m
-            row["noise"] = seen.noise.ravel()
-            if seen.other is not None:
-                row["other_quaternion"] = seen.other.quaternion
-                row["other_translation"] = seen.other.translation_m
+            pose = picture.seen
+            row["quaternion"], row["translation"] = pose.pose.quaternion, pose.pose.translation_m
+            row["noise"] = pose.noise.ravel()
+            if pose.other is not None:
+                row["other_quaternion"] = pose.other.quaternion
+                row["other_translation"] = pose.other.translation_m
         self._writer.append_telemetry(PICTURE, row, self._times(picture.arrived_s))
 
     def estimate(self, followed: FollowedRow, host_s: float) -> None:
         """Add what the filter knows after a row that came at ``host_s``; nothing without a pose."""
-        found = followed.estimate
-        if found is None:
+        estimate = followed.estimate
+        if estimate is None:
             return
         row = np.zeros(1, dtype=POSE.dtype)
         row["sequence"] = self._rows
         row["source"] = SOURCES.index(followed.source)
         row["outcome"] = OUTCOMES.index(followed.outcome.name.lower().replace("_", " "))
         row["state"] = STATES.index(followed.state)
-        row["time_s"], row["row_time_s"] = found.time_s, followed.time_s
-        pose = Pose.from_matrix(found.rotation, found.place_m)
+        row["time_s"], row["row_time_s"] = estimate.time_s, followed.time_s
+        pose = Pose.from_matrix(estimate.rotation, estimate.place_m)
         row["quaternion"], row["translation"] = pose.quaternion, pose.translation_m
-        row["covariance"], row["rates"] = found.covariance.ravel(), found.rates
-        row["nis"], row["contact_offset"] = followed.nis, found.contact_offset_m
-        row["compliance"] = found.compliance_m_per_N
-        row["compliance_sd"] = found.compliance_sd_m_per_N
+        row["covariance"], row["rates"] = estimate.covariance.ravel(), estimate.rates
+        row["nis"], row["contact_offset"] = followed.nis, estimate.contact_offset_m
+        row["compliance"] = estimate.compliance_m_per_N
+        row["compliance_sd"] = estimate.compliance_sd_m_per_N
         row["contact_point"], row["contact_force"] = np.nan, np.nan
         if followed.contact is not None:
             row["contact_point"] = followed.contact.point_m
@@ -169,7 +169,7 @@ class RecordedTrack:
     """What a track was given: its pictures, the rig's samples (none without a rig), and facts."""
 
     about: TrackAbout
-    pictures: tuple[PlatePicture, ...]
+    pictures: tuple[TrackPicture, ...]
     samples: NDArray[np.void]
     device: Mapping[str, Any]
     handle_radius_m: float
@@ -210,8 +210,8 @@ def read_track(path: Path) -> RecordedTrack:
     )
 
 
-def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> PlatePicture:
-    seen = None
+def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> TrackPicture:
+    in_picture = None
     if np.isfinite(row["quaternion"]).all():
         noise = row["noise"].reshape(6, 6)
         pose = Pose(tuple(row["quaternion"].tolist()), tuple(row["translation"].tolist()))
@@ -219,11 +219,11 @@ def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> PlatePict
         if np.isfinite(row["other_quaternion"]).all():
             turned = tuple(row["other_quaternion"].tolist())
             other = Pose(turned, tuple(row["other_translation"].tolist()))
-        seen = SeenPlate(
+        in_picture = PicturePose(
             Pose(pose.quaternion, pose.translation_m, noise + shared), other, noise, shared
         )
     number = int(row["sequence"])
-    return PlatePicture(
+    return TrackPicture(
         number=number,
         stamp_s=float(row["camera_time_s"]),
         arrived_s=1e-9 * (int(row["host_time_ns"]) - base_ns),
@@ -232,6 +232,6 @@ def _picture(row: np.void, base_ns: int, shared: Array, count: int) -> PlatePict
         target=TARGETS[int(row["target"])],
         odds=float(row["odds"]),
         rms_px=float(row["rms_px"]),
-        seen=seen,
+        seen=in_picture,
         done=number / max(count, 1),
     )

@@ -14,15 +14,20 @@ from numpy.typing import NDArray
 from scissorcal.errors import MissingError
 from scissorcal.kernel import SAMPLE_DTYPE, ModelTables, Section
 from scissorcal.package import ModelPackage
-from scissorcal.package.manifest import PlateRecord
+from scissorcal.package.manifest import PoseRecord
 from scissorcal.recording import RecordingWriter, read_attachments
 from scissorcal.render import PlatePose
-from scissorcal.render.plate_pose import BACK_SHARE, PlatePlacer, plate_config
-from scissorcal.render.plate_record import ROW_NAMES, ROWS_A_TABLE
-from scissorcal.render.plate_record import PlateRecord as Record
-from scissorcal.render.plate_section import plate_section
-from scissorcal.render.plate_source import plate_placer
-from scissorcal.render.plate_torque import PoseTorque
+from scissorcal.render.pose_placer import (
+    BACK_SHARE,
+    ROW_NAMES,
+    ROWS_A_TABLE,
+    PoseLog,
+    PosePlacer,
+    plate_config,
+    pose_placer,
+)
+from scissorcal.render.pose_section import pose_section
+from scissorcal.render.pose_torque import PoseTorque
 from tests.kernel.zoo import make_tables
 from tests.render.plate_motion import FLAT, turned
 
@@ -39,7 +44,7 @@ class Bench:
         self.placed: list[tuple[Section, bool, float]] = []
         self.next: PlatePose | None = None
         given = {"tolerance": 0.07, "confidence": 0.95, "torque_limit_Nm": 1.0} | options
-        self.follower = PlatePlacer(lambda now, samples: self.next, tables, **given)
+        self.follower = PosePlacer(lambda now, samples: self.next, tables, **given)
 
     def place(self, section: Section, usable: bool, age_s: float) -> None:
         self.placed.append((section, usable, age_s))
@@ -197,7 +202,7 @@ def test_the_spread_of_torque_is_that_of_drawn_poses(cuts: bool) -> None:
     place = np.array([-0.006, 1e-4, 0.003])
 
     def section(step: NDArray[np.float64]) -> Any:
-        found = plate_section(turned(step[:3]) @ rotation, place + step[3:], 1e-4, 1)
+        found = pose_section(turned(step[:3]) @ rotation, place + step[3:], 1e-4, 1)
         assert found is not None
         return found
 
@@ -236,10 +241,10 @@ def test_faces_over_which_the_release_falls_are_found() -> None:
 
 def test_estimates_are_attached_to_the_recording_a_minute_each(tmp_path: Path) -> None:
     path = tmp_path / "r.mcap"
-    found = plate_section(FLAT, [0.012, 1e-4, 0.0], 1e-4, 1)
+    found = pose_section(FLAT, [0.012, 1e-4, 0.0], 1e-4, 1)
     assert found is not None
     with RecordingWriter(path, "render") as writer:
-        record = Record(writer)
+        record = PoseLog(writer)
         for k in range(ROWS_A_TABLE + 10):
             record.add(0.01 * k, found, k % 2 == 0)
         record.flush()
@@ -256,13 +261,13 @@ def test_estimates_are_attached_to_the_recording_a_minute_each(tmp_path: Path) -
 
 def test_a_package_with_a_known_pose_follows_nothing(paper: ModelPackage) -> None:
     assert paper.manifest.plate_pose == "known"
-    assert plate_placer(paper, lambda now, samples: None, paper.tables, 1.0) is None
+    assert pose_placer(paper, lambda now, samples: None, paper.tables, 1.0) is None
 
 
 def posed(package: ModelPackage, frame: Any) -> ModelPackage:
     """The package with a fitted pose in a frame."""
     rows = tuple(tuple(row) for row in np.diag(SD**2).tolist())
-    record = PlateRecord(
+    record = PoseRecord(
         frame=frame,
         quaternion=(math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0),
         translation_m=(0.004, 1e-4, 0.012),
@@ -275,7 +280,7 @@ def posed(package: ModelPackage, frame: Any) -> ModelPackage:
 
 def test_without_a_tracker_the_fitted_pose_is_followed(upper_paper: ModelPackage) -> None:
     assert upper_paper.manifest.plate_pose == "estimated"
-    follower = plate_placer(posed(upper_paper, "rig"), None, upper_paper.tables, 1.0)
+    follower = pose_placer(posed(upper_paper, "rig"), None, upper_paper.tables, 1.0)
     assert follower is not None
     bench = Bench()
     follower.follow(bench, NO_SAMPLES)
@@ -291,4 +296,4 @@ def test_an_estimated_plate_without_any_pose_is_missing(
 ) -> None:
     package = posed(upper_paper, frame) if frame else upper_paper
     with pytest.raises(MissingError, match="scissorcal capture plate"):
-        plate_placer(package, None, upper_paper.tables, 1.0)
+        pose_placer(package, None, upper_paper.tables, 1.0)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel, StepFlag, Strip, Table
-from scissorcal.package.plate_slopes import PlateSlopes
+from scissorcal.package.layer_slopes import LayerSlopes
 from scissorcal.render import derating
 from tests.kernel.zoo import arc_edge, line_edge, make_tables, power_response
 from tests.package.random_plates import Steepest, random_case, steepest
@@ -30,7 +30,7 @@ def compare(seed: int) -> Steepest:
     """Each slope that is found on a random plate is within its bound."""
     rng = np.random.default_rng(seed)
     case = random_case(rng)
-    slopes, found = PlateSlopes(case.tables, case.limit, case.pieces), steepest(case, rng)
+    slopes, found = LayerSlopes(case.tables, case.limit, case.pieces), steepest(case, rng)
     assert found.opening <= ROUNDED * slopes.bound("opening").value
     assert found.closing <= ROUNDED * slopes.bound("opening").value
     assert found.cross <= ROUNDED * slopes.bound("cross").value
@@ -82,7 +82,7 @@ def largest_in_the_core(tables: ModelTables) -> float:
 def test_the_bound_is_little_above_what_a_sheet_reaches(changes: dict[str, object]) -> None:
     tables = make_tables(**changes)
     found = largest_in_the_core(tables)
-    bound = PlateSlopes(tables, LIMIT, [whole(tables)]).bound("opening")
+    bound = LayerSlopes(tables, LIMIT, [whole(tables)]).bound("opening")
     assert found <= ROUNDED * bound.value
     assert bound.value <= 1.06 * found
     assert tables.opening_min <= bound.opening <= tables.opening_max
@@ -109,13 +109,13 @@ def test_a_straight_pad_has_its_closed_form() -> None:
         lever = places / math.cos(opening) ** 2
         slope = stiff * lever**2 - stiff * depth * (lever * t + places * t * (1.0 + t * t))
         best = max(best, float(np.max(np.where(depth > 0.0, slope, 0.0))))
-    bound = PlateSlopes(tables, 1e3, [whole(tables)])
+    bound = LayerSlopes(tables, 1e3, [whole(tables)])
     assert best <= bound.bound("opening").value <= 1.02 * best
     assert bound.bound("advance").value == pytest.approx(
         stiff * _steepest_touch(face) ** 2, rel=0.05
     )
     damped = replace(tables, rate_damping=2.0)
-    rate = PlateSlopes(damped, 1e3, [whole(damped)]).bound("rate").value
+    rate = LayerSlopes(damped, 1e3, [whole(damped)]).bound("rate").value
     t = math.tan(0.02)
     damping = 2.0 * stiff * (face - places * t) * (places * (1.0 + t * t)) ** 2
     assert np.max(damping) <= rate <= 1.06 * np.max(damping)
@@ -128,16 +128,16 @@ def _steepest_touch(face: float) -> float:
 
 def test_pieces_that_overlap_add_up_and_others_do_not() -> None:
     tables = make_tables()
-    one = PlateSlopes(tables, LIMIT, [whole(tables)]).bound("opening").value
-    twice = PlateSlopes(tables, LIMIT, [whole(tables), whole(tables)]).bound("opening").value
+    one = LayerSlopes(tables, LIMIT, [whole(tables)]).bound("opening").value
+    twice = LayerSlopes(tables, LIMIT, [whole(tables), whole(tables)]).bound("opening").value
     assert twice == pytest.approx(2.0 * one, rel=1e-9)
-    double = PlateSlopes(tables, LIMIT, [whole(tables, 2.0)]).bound("opening").value
+    double = LayerSlopes(tables, LIMIT, [whole(tables, 2.0)]).bound("opening").value
     assert double == pytest.approx(twice, rel=0.01)
     begun = Piece(0.0, FACE, 1.0, (Strip(0.02, 0.6),))
     near = Piece(0.0201, FACE, 1.0, (Strip(0.03, 0.6),))
     far = Piece(0.04, FACE, 1.0, (Strip(0.05, 0.6),))
-    apart = PlateSlopes(tables, LIMIT, [begun, far]).bound("opening").value
-    together = PlateSlopes(tables, LIMIT, [begun, near]).bound("opening").value
+    apart = LayerSlopes(tables, LIMIT, [begun, far]).bound("opening").value
+    together = LayerSlopes(tables, LIMIT, [begun, near]).bound("opening").value
     assert apart == pytest.approx(one, rel=1e-9)
     assert one < together <= 2.0 * one + 1e-9
 
@@ -147,16 +147,16 @@ def test_only_the_strips_at_one_place_add_up() -> None:
     tables = make_tables()
     band = Piece(0.0, FACE, 1.0, (Strip(0.03, 0.6), Strip(0.04, 6.0), Strip(0.1, 0.6)))
     layer = Piece(0.08, FACE, 0.3, (Strip(0.1, 0.18),))
-    alone = PlateSlopes(tables, LIMIT, [band]).bound("opening").value
-    assert PlateSlopes(tables, LIMIT, [band, layer]).bound("opening").value == alone
+    alone = LayerSlopes(tables, LIMIT, [band]).bound("opening").value
+    assert LayerSlopes(tables, LIMIT, [band, layer]).bound("opening").value == alone
     over = replace(layer, begin_m=0.035)
-    assert PlateSlopes(tables, LIMIT, [band, over]).bound("opening").value > 1.15 * alone
+    assert LayerSlopes(tables, LIMIT, [band, over]).bound("opening").value > 1.15 * alone
 
 
 def test_places_beyond_the_limit_do_not_count() -> None:
     tables = make_tables(fracture_energy=0.0)
     bounds = [
-        PlateSlopes(tables, at, [whole(tables)]).bound("opening").value for at in (0.1, 1, 10)
+        LayerSlopes(tables, at, [whole(tables)]).bound("opening").value for at in (0.1, 1, 10)
     ]
     assert bounds[0] < bounds[1] < bounds[2]
 
@@ -165,7 +165,7 @@ def test_nothing_that_touches_has_no_slope() -> None:
     tables = make_tables(upper_face=1e-6, opening_min=0.8)
     low = Piece(0.0, 1e-6, 1.0, (Strip(0.1, 0.6),))
     above = replace(tables, edge=line_edge(0.01, 0.0))
-    assert PlateSlopes(above, LIMIT, [low]).bound("opening").value == 0.0
+    assert LayerSlopes(above, LIMIT, [low]).bound("opening").value == 0.0
 
 
 def largest_in_a_stroke(tables: ModelTables, pieces: list[Piece], place: float) -> float:
@@ -210,7 +210,7 @@ def test_strokes_that_end_beyond_the_scene_are_within_the_bound(
     if layer is not None:
         pieces.append(Piece(0.026, 2.0 * FACE, 1.0, (layer,)))
     found = max(largest_in_a_stroke(tables, pieces, -at) for at in np.linspace(0.016, 0.039, 8))
-    assert found <= ROUNDED * PlateSlopes(tables, 20.0, pieces).bound("opening").value
+    assert found <= ROUNDED * LayerSlopes(tables, 20.0, pieces).bound("opening").value
 
 
 def test_what_is_needed_is_never_below_what_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ ID, PART, TITLE = "scene-plate", "scene", "The plate as drawn"
 LOOKS: tuple[Look, ...] = ("blue", "vermillion", "green", "purple", "orange", "ink")
 
 
-def drawn_plate_panel(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> Panel:
+def layers_panel(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> Panel:
     """Piece by piece, in a table and in a picture of the line of the cut."""
     return Panel(
         ID,
@@ -34,7 +34,7 @@ def drawn_plate_panel(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> Panel:
 
 def _row(index: int, piece: LayerPiece) -> Row:
     stretches = [
-        f"{one.toughness_ratio:g} (up to {one.end_m * 1e3:.4g} mm)" for one in piece.strips
+        f"{strip.toughness_ratio:g} (up to {strip.end_m * 1e3:.4g} mm)" for strip in piece.strips
     ]
     return Row(
         f"piece {index}",

@@ -44,7 +44,7 @@ Pieces = Annotated[
 
 
 def piece_records(
-    recipe: "Recipe", found: Sequence["LayerPiece"], fracture_energy: float
+    recipe: "Recipe", pieces: Sequence["LayerPiece"], fracture_energy: float
 ) -> tuple[PieceRecord, ...] | None:
     """The pieces of a drawn plate, None for the uniform sheet.
 
@@ -54,7 +54,7 @@ def piece_records(
     does. Response and energy are proportional to a layer's thickness: an assumption, as is each
     declared toughness ratio.
     """
-    if not found:
+    if not pieces:
         return None
     thickness = recipe.material.thickness_mm * 1e-3
     return tuple(
@@ -73,7 +73,7 @@ def piece_records(
                 for strip in piece.strips
             ),
         )
-        for piece in found
+        for piece in pieces
     )
 
 

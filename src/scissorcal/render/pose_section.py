@@ -13,7 +13,7 @@ STEEPEST_RAD = np.radians(45.0)
 
 
 @dataclass(frozen=True, eq=False)
-class PlateSection:
+class PoseSection:
     """What of a plate's pose reaches the torque.
 
     ``section`` is what the kernel takes. ``slopes`` (5, 6) are its numbers' derivatives by a
@@ -28,9 +28,9 @@ class PlateSection:
     height_m: float
 
 
-def plate_section(
+def pose_section(
     rotation: ArrayLike, translation_m: ArrayLike, upper_face_m: float, moving_blades: int
-) -> PlateSection | None:
+) -> PoseSection | None:
     """Cut a plate at T_rig_plate (rotation (3, 3), translation (3,)) with the rig's plane z = 0.
 
     The plate's frame lies in its upper face, x along the cut from the near edge and z out of the
@@ -46,7 +46,7 @@ def plate_section(
     degrees to where it can be cut.
 
     >>> upright = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
-    >>> plate_section(upright, [0.03, 0.002, 0.01], 0.002, 1).section
+    >>> pose_section(upright, [0.03, 0.002, 0.01], 0.002, 1).section
     Section(edge_x=0.03, edge_y=0.002, pitch=0.0, stretch=1.0, thickening=1.0)
     """
     axes, t = np.asarray(rotation, dtype=np.float64), np.asarray(translation_m, dtype=np.float64)
@@ -76,7 +76,7 @@ def plate_section(
         )
     below = upper_face_m if moving_blades == 1 else upper_face_m * out[1] / (out[:2] @ out[:2])
     section = Section(*(float(number) for number in numbers))
-    return PlateSection(section, slopes, pitch, float(place[1] - below))
+    return PoseSection(section, slopes, pitch, float(place[1] - below))
 
 
 def _between_blades(

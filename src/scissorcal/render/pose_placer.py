@@ -1,4 +1,4 @@
-"""Follow a plate whose pose is estimated while a package renders: judge it, and place it."""
+"""Follow a plate whose pose is estimated while a package renders: judge, place, record, report."""
 
 import math
 from collections import Counter
@@ -9,13 +9,15 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.device.motion import Samples
+from scissorcal.errors import MissingError
 from scissorcal.kernel import ModelTables, PlateConfig, Section
-from scissorcal.render import plate_sentences as sentences
-from scissorcal.render.plate_estimate import PlateReport
-from scissorcal.render.plate_record import PlateRecord
-from scissorcal.render.plate_section import PlateSection, plate_section
-from scissorcal.render.plate_torque import PoseTorque, TorqueSpread
-from scissorcal.tracking.plate_pose import PlatePose, PoseSource
+from scissorcal.package import ModelPackage
+from scissorcal.package.manifest import PoseRecord
+from scissorcal.recording import RecordingWriter
+from scissorcal.render import pose_sentences as sentences
+from scissorcal.render.pose_section import PoseSection, pose_section
+from scissorcal.render.pose_torque import PoseTorque, TorqueSpread
+from scissorcal.tracking.plate_pose import PlatePose, PoseSource, fixed_pose
 
 EVERY_S = 0.01
 """Between two looks at the source: its rate is about 100 Hz."""
@@ -37,6 +39,57 @@ FACES = 9
 FACE_REACH_M = 0.02
 """Heights about the model's at which it is checked that the release falls along the blade."""
 
+ROW_NAMES = (
+    "time_s",
+    "edge_x_m",
+    "edge_y_m",
+    "pitch_rad",
+    "stretch",
+    "thickening",
+    "height_m",
+    "usable",
+)
+"""Columns of what is kept of each estimate; ``time_s`` is of the source's clock, ``pitch_rad`` and
+``height_m`` are the plate's, also where they are not rendered."""
+ROWS_A_TABLE = 6000
+"""A minute at 100 Hz: a killed rendering loses no more, and memory does not grow."""
+
+
+def pose_placer(
+    package: ModelPackage,
+    source: PoseSource | None,
+    tables: ModelTables,
+    torque_limit_Nm: float,
+    writer: RecordingWriter | None = None,
+) -> "PosePlacer | None":
+    """What follows the plate of a package; None where its scene has a known pose.
+
+    Without a ``source`` the pose is the one that was fitted to photographs, which the package
+    carries, as long as the rendering lasts. ``writer`` gets what is placed. Raises MissingError
+    where there is none in the rig's frame.
+    """
+    manifest = package.manifest
+    if manifest.plate_pose == "known":
+        return None
+    if source is None:
+        if manifest.plate is None or manifest.plate.frame != "rig":
+            raise MissingError(
+                f'The scene of {manifest.name} has plate_pose = "estimated", and its package has '
+                "no pose of the plate in the rig's frame. Photograph the plate's target and the "
+                "rig card ('scissorcal capture plate --image ... --stances ...'), run 'scissorcal "
+                "fit plate' and 'scissorcal package build', or give the pose of a tracker."
+            )
+        source = _fitted_pose(manifest.plate)
+    scene = package.recipe.scene
+    return PosePlacer(
+        source,
+        tables,
+        tolerance=scene.tolerance_percent / 100.0,
+        confidence=scene.confidence_percent / 100.0,
+        torque_limit_Nm=torque_limit_Nm,
+        record=PoseLog(writer) if writer else None,
+    )
+
 
 class Placing(Protocol):
     """What a plate is placed on: a Motion."""
@@ -48,15 +101,49 @@ class Placing(Protocol):
 
 
 @dataclass(frozen=True)
+class PoseReport:
+    """How an estimated plate was rendered.
+
+    ``estimates`` came, of which ``lost`` (the source had lost the plate), ``late``, ``uncertain``
+    (too uncertain for the scene's tolerance), ``leapt`` and ``unreachable`` (stands where it cannot
+    be rendered) were not used. ``falls`` counts how often the force fell, ``out_s`` is for how long
+    of the ``seconds`` of rendering it was below its own for it. ``widest`` is the largest half
+    width of the torque's interval by the pose among estimates that were used, as a share.
+    ``sentences`` tell of each kind once.
+    """
+
+    estimates: int
+    lost: int
+    late: int
+    uncertain: int
+    leapt: int
+    unreachable: int
+    falls: int
+    seconds: float
+    out_s: float
+    widest: float
+    sentences: tuple[str, ...]
+
+    @property
+    def summary(self) -> str:
+        """How the plate was followed, in a line."""
+        refused = self.lost + self.late + self.uncertain + self.leapt + self.unreachable
+        return (
+            f"plate: {self.estimates} estimates of its pose, {refused} not used; it leaves the "
+            f"torque uncertain by up to {self.widest:.1%}; without its force for {self.out_s:.1f} s"
+        )
+
+
+@dataclass(frozen=True)
 class _Judged:
     """A section and, where it is not used, the kind of reason and a sentence."""
 
-    placed: PlateSection | None
+    placed: PoseSection | None
     kind: str = ""
     sentence: str = ""
 
 
-class PlatePlacer:
+class PosePlacer:
     """Asks a source for the plate's pose and places it; the servo moves it there.
 
     ``tolerance`` and ``confidence`` are the scene's, as shares: where half of the interval that the
@@ -73,7 +160,7 @@ class PlatePlacer:
         tolerance: float,
         confidence: float,
         torque_limit_Nm: float,
-        record: PlateRecord | None = None,
+        record: "PoseLog | None" = None,
     ) -> None:
         self._source = source
         self._record = record
@@ -106,19 +193,19 @@ class PlatePlacer:
         self._time = estimate.time
         self._estimates += 1
         age = now - estimate.time
-        found = self._judge(estimate)
-        if not found.kind and age > STALE_S:
-            found = replace(found, kind="late", sentence=sentences.late(age))
-        section = found.placed.section if found.placed else Section(0.0, 0.0)
-        motion.place(section, not found.kind, age)
-        if found.placed and self._record:
-            self._record.add(estimate.time, found.placed, not found.kind)
-        self._refused[found.kind] += 1
-        self._become(found.kind, found.sentence, now)
+        judged = self._judge(estimate)
+        if not judged.kind and age > STALE_S:
+            judged = replace(judged, kind="late", sentence=sentences.late(age))
+        section = judged.placed.section if judged.placed else Section(0.0, 0.0)
+        motion.place(section, not judged.kind, age)
+        if judged.placed and self._record:
+            self._record.add(estimate.time, judged.placed, not judged.kind)
+        self._refused[judged.kind] += 1
+        self._become(judged.kind, judged.sentence, now)
 
-    def report(self, seconds: float, out_s: float) -> PlateReport:
+    def report(self, seconds: float, out_s: float) -> PoseReport:
         """What came and what was done in a rendering; ``out_s`` of it were below the force."""
-        return PlateReport(
+        return PoseReport(
             estimates=self._estimates,
             lost=self._refused["lost"],
             late=self._refused["late"],
@@ -143,7 +230,7 @@ class PlatePlacer:
         if not estimate.tracked:
             return _Judged(None, "lost", sentences.lost(estimate.why))
         upper, blades = self._tables.upper_face, self._tables.moving_blades
-        placed = plate_section(estimate.rotation, estimate.translation, upper, blades)
+        placed = pose_section(estimate.rotation, estimate.translation, upper, blades)
         if placed is None or not placed.section.is_sound(blades):
             return _Judged(None, "unreachable", sentences.ACROSS)
         height = self._height(placed)
@@ -162,7 +249,7 @@ class PlatePlacer:
         self._widest = max(self._widest, spread.half_width)
         return _Judged(placed)
 
-    def _uncertain(self, placed: PlateSection, covariance: Array, spread: TorqueSpread) -> str:
+    def _uncertain(self, placed: PoseSection, covariance: Array, spread: TorqueSpread) -> str:
         if "uncertain" in self._told:
             return self._told["uncertain"]
         worst = self._torque.largest_share(placed.section, covariance, *self._state)
@@ -173,7 +260,7 @@ class PlatePlacer:
     def _most_pitch(self) -> float:
         return MOST_PITCH_RAD if self._tables.moving_blades == 2 else math.inf
 
-    def _height(self, placed: PlateSection) -> float:
+    def _height(self, placed: PoseSection) -> float:
         """How far from their middle two moving blades would have to hold the plate, at most."""
         if self._tables.moving_blades == 1:
             return 0.0
@@ -195,6 +282,36 @@ class PlatePlacer:
         if kind and kind not in self._told:
             after = now - self._begun_s
             self._told[kind] = f"After {after:.1f} s there was no force. {sentence}"
+
+
+class PoseLog:
+    """Attaches estimates to a recording as ``plate-0001.csv`` and so on, a minute each.
+
+    One row an estimate that had a place; ``usable`` is 0 where it was not used. Samples with the
+    flag PLATE_OUT were rendered with less than their force.
+    """
+
+    def __init__(self, writer: RecordingWriter) -> None:
+        self._writer = writer
+        self._rows: list[str] = []
+        self._tables = 0
+
+    def add(self, time_s: float, placed: PoseSection, usable: bool) -> None:
+        """Keep one estimate."""
+        section = placed.section
+        place = (time_s, section.edge_x, section.edge_y, placed.pitch_rad)
+        shape = (section.stretch, section.thickening, placed.height_m, float(usable))
+        self._rows.append(",".join(f"{value:.9g}" for value in (*place, *shape)))
+        if len(self._rows) >= ROWS_A_TABLE:
+            self.flush()
+
+    def flush(self) -> None:
+        """Attach what is not attached yet."""
+        if self._rows:
+            self._tables += 1
+            text = "\n".join([",".join(ROW_NAMES), *self._rows]) + "\n"
+            self._writer.attach(f"plate-{self._tables:04d}.csv", text.encode(), "text/csv")
+        self._rows = []
 
 
 class _Leaps:
@@ -234,3 +351,12 @@ def plate_config(tables: ModelTables) -> PlateConfig:
         face_low=low if falls else 0.0,
         face_high=high if falls else 0.0,
     )
+
+
+def _fitted_pose(record: PoseRecord) -> PoseSource:
+    """A source that always gives a fitted pose, which must be in the rig's frame."""
+    from scipy.spatial.transform import Rotation
+
+    w, x, y, z = record.quaternion
+    rotation = np.asarray(Rotation.from_quat([x, y, z, w]).as_matrix(), dtype=np.float64)
+    return fixed_pose(rotation, np.array(record.translation_m), np.array(record.covariance))

@@ -1,14 +1,14 @@
 """Pictures of a plate as a track takes them: located, with their times, of any origin."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.rig_frame import RigPose, SeenPlate, seen_plate
-from scissorcal.vision.live import Frame, State, Tracked, track
+from scissorcal.vision.geometry.rig_frame import PicturePose, RigPose, picture_pose
+from scissorcal.vision.live import Frame, LocatedFrame, State, located_frames
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 
 TARGETS = ("", PLATE_BOARD.name, PLATE_STRIP.name)
@@ -16,7 +16,7 @@ TARGETS = ("", PLATE_BOARD.name, PLATE_STRIP.name)
 
 
 @dataclass(frozen=True, eq=False)
-class PlatePicture:
+class TrackPicture:
     """One picture: its number, times and state, and the plate's pose in it, if there is one.
 
     ``stamp_s`` is by the camera's clock, NaN where it states none; ``arrived_s`` by the host's;
@@ -31,12 +31,12 @@ class PlatePicture:
     target: str = ""
     odds: float = math.nan
     rms_px: float = math.nan
-    seen: SeenPlate | None = None
+    seen: PicturePose | None = None
     done: float = math.nan
 
 
 @dataclass(frozen=True, eq=False)
-class PlateEye:
+class PoseFinder:
     """What turns a camera's pictures into poses of the plate.
 
     ``back`` is T_target_plate; ``rig`` takes poses into the rig's frame, None where that is not
@@ -48,26 +48,23 @@ class PlateEye:
     rig: RigPose | None
     priors: PlatePriors
 
-    def locate(self, frames: Iterable[Frame]) -> Iterator[Tracked]:
+    def locate(self, frames: Iterable[Frame]) -> Iterator[LocatedFrame]:
         """Find the plate's target in every picture."""
-        return track(frames, (PLATE_BOARD, PLATE_STRIP), self.camera, self.priors)
+        return located_frames(frames, (PLATE_BOARD, PLATE_STRIP), self.camera, self.priors)
 
-    def picture(self, found: Tracked) -> PlatePicture:
+    def picture(self, located: LocatedFrame) -> TrackPicture:
         """The picture as a track takes it; a video's arrives when it is stamped."""
-        frame, board = found.frame, found.found
+        frame, pose = located.frame, located.pose
         live = not math.isnan(frame.arrived_s)
-        return PlatePicture(
+        return TrackPicture(
             number=frame.number,
             stamp_s=frame.stamp_s if live else frame.time_s,
             arrived_s=frame.arrived_s if live else frame.time_s,
-            state=found.state,
-            corners=found.corners,
-            target=found.board.name if found.board else "",
-            odds=min(board.odds, 1e12) if board and board.other else math.nan,
-            rms_px=board.rms_px if board else math.nan,
-            seen=seen_plate(board, self.camera, self.back, self.rig) if board else None,
+            state=located.state,
+            corners=located.corners,
+            target=located.board.name if located.board else "",
+            odds=min(pose.odds, 1e12) if pose and pose.other else math.nan,
+            rms_px=pose.rms_px if pose else math.nan,
+            seen=picture_pose(pose, self.camera, self.back, self.rig) if pose else None,
             done=frame.number / frame.count if frame.count else math.nan,
         )
-
-
-Locate = Callable[[Iterable[Frame]], Iterator[Tracked]]

@@ -81,7 +81,7 @@ class _Sheet:
     far: Array
 
 
-class PlateSlopes:
+class LayerSlopes:
     """Bounds of the slopes of a model on a plate of pieces.
 
     Over the openings of the tables, for cracks at any contact from ``contact_min`` to the blade's

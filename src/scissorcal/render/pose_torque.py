@@ -67,9 +67,9 @@ class PoseTorque:
     ) -> int:
         """Which of the section's numbers would spread the torque most by its own uncertainty."""
         theta = float(np.clip(opening, self._tables.opening_min, self._tables.opening_max))
-        own = np.diag(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-        alone = np.abs(self._changes(_numbers(section), own, theta, advance))
-        return int(np.argmax(np.where(np.isfinite(alone), alone, np.inf)))
+        alone = np.diag(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+        changes = np.abs(self._changes(_numbers(section), alone, theta, advance))
+        return int(np.argmax(np.where(np.isfinite(changes), changes, np.inf)))
 
     def _changes(self, middle: Array, ways: Array, opening: float, advance: float) -> Array:
         """Half of the torque's change from one side of the middle to the other, (n,)."""

@@ -1,25 +1,25 @@
-"""A camera that follows the plate while the rig controls or renders."""
+"""A camera that follows the plate while the rig controls or renders, as a source of poses."""
 
-import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
-from scissorcal.verdicts import Verdict
+from scissorcal.tracking.plate_pose import PlatePose, SteadyPose
 from scissorcal.vision.live import frames_of
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import RigOptions
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.camera_thread import CameraThread
-from scissorcal.workday.tracking.pictures import PlatePicture
-from scissorcal.workday.tracking.pose_source import Due, TrackedPose
-from scissorcal.workday.tracking.session import TrackSession
+from scissorcal.workday.tracking.session import TrackedRun, TrackSession, tracked_run
 from scissorcal.workday.tracking.sim_world import CARRY_S, SimWorld
+from scissorcal.workday.tracking.track_pictures import TrackPicture
 from scissorcal.workday.tracking.track_recorder import TrackChannels
 
 if TYPE_CHECKING:
@@ -40,37 +40,11 @@ TAP = (
     "where it is cut."
 )
 
-
-@dataclass(frozen=True)
-class TrackedRun:
-    """What became of pictures and contacts in a run, with the pose's state at its end.
-
-    ``poses`` of ``pictures`` had one; ``sd_mm`` and ``sd_deg`` are those of the pose's worst axis,
-    NaN without a pose.
-    """
-
-    source: str
-    state: str
-    pictures: int
-    poses: int
-    sd_mm: float
-    sd_deg: float
-    figures: TrackFigures
-    verdicts: tuple[Verdict, ...]
-
-    @property
-    def sentence(self) -> str:
-        """The pictures and contacts in one line."""
-        counts = self.figures.contacts
-        return (
-            f"tracked by {self.source}: {self.poses} poses in {self.pictures} pictures, "
-            f"{self.figures.pictures.refused} refused; {counts.used} contacts used, "
-            f"{counts.refused} refused; {self.figures.restarts} restarts; the plate is known to "
-            f"{self.sd_mm:.2g} mm and {self.sd_deg:.2g} deg"
-        )
+Due = Callable[[float], Iterable[TrackPicture]]
+"""Pictures that have come until a time of the clock that the source is asked with."""
 
 
-class PlateCamera:
+class TrackingCamera:
     """The camera that a run names, with the simulated world that it shows where that is "sim".
 
     ``cut`` says that the run renders: nothing real is between the blades then, so contacts are
@@ -97,7 +71,7 @@ class PlateCamera:
         without = "state the pose with --pose"
         if cut:
             without = 'set plate_pose = "known" in [scene], and build the package again'
-        self._eye = inputs.plate_eye(engine, recipe, camera, needs_rig=True, otherwise=without)
+        self._eye = inputs.pose_finder(engine, recipe, camera, needs_rig=True, otherwise=without)
         self._about = inputs.track_about(engine, recipe, camera, self._eye)
         world = camera == SIM
         self._world = SimWorld(recipe, rig.seed, rig=True, cut=cut) if world else None
@@ -116,7 +90,7 @@ class PlateCamera:
         *,
         taps_s: float = 0.0,
         held_N: float = 0.0,
-    ) -> Iterator[TrackedPose]:
+    ) -> "Iterator[TrackedPose]":
         """Start the camera, look until there is a pose, and yield the source of poses.
 
         The motors are off meanwhile. For ``taps_s`` a person taps the plate with the blade's tip
@@ -148,24 +122,8 @@ class PlateCamera:
 
     def tracked(self) -> TrackedRun:
         """What became of it; after `follow`."""
-        track = self._track
-        assert track is not None
-        figures = track_figures(track.follower, track.delay)
-        sd_mm = sd_deg = math.nan
-        if track.started:
-            variances = track.follower.tracker.estimate().covariance.diagonal()
-            sd_mm = 1e3 * math.sqrt(float(variances[3:].max()))
-            sd_deg = math.degrees(math.sqrt(float(variances[:3].max())))
-        return TrackedRun(
-            source=f"camera {self._about.source}",
-            state=track.follower.state,
-            pictures=track.states.total(),
-            poses=track.states["seen"] + track.states["ambiguous"],
-            sd_mm=sd_mm,
-            sd_deg=sd_deg,
-            figures=figures,
-            verdicts=track_verdicts(figures),
-        )
+        assert self._track is not None
+        return tracked_run(self._track, f"camera {self._about.source}")
 
     def _pictures(self, stack: ExitStack, begun_s: float) -> Due:
         eye, world = self._eye, self._world
@@ -174,7 +132,7 @@ class PlateCamera:
         thread = CameraThread(frames_of(self._camera), eye.locate)
         stack.enter_context(closing(thread))
 
-        def due(now_s: float) -> Iterable[PlatePicture]:
+        def due(now_s: float) -> Iterable[TrackPicture]:
             for located in thread.due()[-MOST_AT_ONCE:]:
                 picture = eye.picture(located)
                 yield replace(picture, arrived_s=picture.arrived_s - begun_s)
@@ -182,7 +140,7 @@ class PlateCamera:
         return due
 
     def _look(
-        self, motion: "Motion", source: TrackedPose, track: TrackSession, taps_s: float
+        self, motion: "Motion", source: "TrackedPose", track: TrackSession, taps_s: float
     ) -> None:
         """Feed the source with the motors off: through the taps, and until there is a pose."""
         world = self._world
@@ -205,6 +163,63 @@ class PlateCamera:
                 f"{track.why_waiting()} Check that the camera sees the plate's target."
             )
         _feed(motion, source, motion.now_s + SETTLE_S)
+
+
+class TrackedPose:
+    """A `scissorcal.tracking.plate_pose.PoseSource`: call it with the time (s) and new samples.
+
+    It feeds the session with both samples and pictures, and answers with the pose predicted for
+    that time, None while there is none. ``failed`` is the sentence of what ended the camera, empty
+    while it runs. ``begun_s`` is that clock's time at 0 s of the session's.
+    A pose that rests on neither pictures nor contacts any more is not ``tracked``, and says why;
+    so is one whose camera or camera's clock has failed, whatever contacts still come. With
+    ``steady`` the pose rests while only the noise of pictures moves it (`SteadyPose`), as a
+    rendering needs it.
+    """
+
+    def __init__(
+        self, session: TrackSession, due: Due, begun_s: float = 0.0, *, steady: bool = False
+    ) -> None:
+        self._session = session
+        self._due = due
+        self._begun_s = begun_s
+        self._steady = SteadyPose() if steady else None
+        self.failed = ""
+
+    def __call__(self, now_s: float, samples: NDArray[np.void]) -> PlatePose | None:
+        """The plate's pose at ``now_s``. Raises DeviceError where the rig's clock fails."""
+        session = self._session
+        session.take_samples(samples)
+        self._look(now_s)
+        estimate = session.follower.estimate(now_s - self._begun_s)
+        if estimate is None:
+            return None
+        old = min(estimate.picture_age_s, estimate.contact_age_s)
+        tracked = not self.failed and session.follower.state != "coasting"
+        why = self.failed or f"neither pictures nor contacts came for {old:.1f} s"
+        pose = PlatePose(
+            time=now_s,
+            rotation=estimate.rotation,
+            translation=estimate.place_m,
+            covariance=estimate.covariance,
+            velocity=estimate.rates[3:],
+            turn_rate=estimate.rates[:3],
+            tracked=tracked,
+            why="" if tracked else why,
+        )
+        if self._steady is not None and session.follower.pictures:
+            return self._steady.held(pose, session.follower.picture_noise)
+        return pose
+
+    def _look(self, now_s: float) -> None:
+        """Take what is due; a camera that fails is a plate that is lost, not a rig that fails."""
+        if self.failed:
+            return
+        try:
+            for picture in self._due(now_s):
+                self._session.take_picture(picture)
+        except DeviceError as error:
+            self.failed = str(error)
 
 
 def _feed(motion: "Motion", source: TrackedPose, until_s: float) -> None:

@@ -23,7 +23,7 @@ from scissorcal.recipe.euler_angles import (
 from scissorcal.vision.live import State
 
 
-class PoseRecord(BaseModel):
+class TrackPose(BaseModel):
     """A pose T_a_b; ``covariance`` over a rotation vector in a's axes (rad), then metres."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -34,7 +34,7 @@ class PoseRecord(BaseModel):
     covariance: tuple[tuple[float, ...], ...] | None = None
 
     @model_validator(mode="after")
-    def _is_one_rotation(self) -> "PoseRecord":
+    def _is_one_rotation(self) -> "TrackPose":
         one_rotation(self.quaternion, self.euler_angles, "the pose")
         return self
 
@@ -64,8 +64,8 @@ class TrackRow(BaseModel):
     corners: int = 0
     rms_px: float | None = None
     odds: float | None = None
-    pose: PoseRecord | None = None
-    other: PoseRecord | None = None
+    pose: TrackPose | None = None
+    other: TrackPose | None = None
 
 
 def track_schema() -> dict[str, Any]:

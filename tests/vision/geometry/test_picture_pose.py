@@ -8,7 +8,7 @@ from scipy.stats import chi2
 from scissorcal.vision.geometry.board_pose import Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference
-from scissorcal.vision.geometry.rig_frame import RigPose, seen_plate
+from scissorcal.vision.geometry.rig_frame import RigPose, picture_pose
 from scissorcal.vision.targets.boards import PLATE_BOARD
 
 LENS = (0.05, -0.1, 0.0, 0.0, 0.0)
@@ -60,7 +60,7 @@ def scores() -> tuple[float, float, float]:
         camera, scale = an_offset(rng)
         truth = a_view(rng)
         seen = [
-            seen_plate(
+            picture_pose(
                 locate_board(corners_by(camera, truth, scale, rng), CAMERA), CAMERA, BACK, None
             )
             for _ in range(PICTURES)
@@ -97,7 +97,7 @@ def test_taking_the_whole_covariance_for_noise_is_overconfident() -> None:
         camera, scale = an_offset(rng)
         truth = a_view(rng)
         corners = (corners_by(camera, truth, scale, rng) for _ in range(PICTURES))
-        seen = [seen_plate(locate_board(one, CAMERA), CAMERA, BACK, None) for one in corners]
+        seen = [picture_pose(locate_board(one, CAMERA), CAMERA, BACK, None) for one in corners]
         mean = np.mean([difference(one.pose, truth.after(BACK)) for one in seen], axis=0)
         naive.append(mean @ np.linalg.solve(seen[0].pose.covariance / PICTURES, mean))
     assert np.mean(naive) > 4.0 * 6.0
@@ -110,7 +110,7 @@ def test_both_parts_make_up_the_whole_in_the_rigs_frame() -> None:
     by_camera = 1e-5 * rng.standard_normal((6, 9))
     rig = RigPose(camera_rig, camera_rig, 0.1, (), by_camera)
     found = locate_board(corners_by(CAMERA, a_view(rng), np.ones(2), rng), CAMERA)
-    seen = seen_plate(found, CAMERA, BACK, rig)
+    seen = picture_pose(found, CAMERA, BACK, rig)
     np.testing.assert_allclose(seen.noise + seen.shared, seen.pose.covariance, atol=1e-18)
     turned = camera_rig.matrix.T @ found.noise[:3, :3] @ camera_rig.matrix
     np.testing.assert_allclose(seen.noise[:3, :3], turned, atol=1e-15)
