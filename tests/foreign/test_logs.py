@@ -315,6 +315,18 @@ def test_quoted_thousands_between_commas_are_refused(tmp_path: Path) -> None:
     force = [f'"{1e6 * value:,.1f}"' for value in FORCE]
     with pytest.raises(InputError, match="thousands separators are not read"):
         read(tmp_path, (texts(TIME), texts(ANGLE), force))
+    whole = [f'"{1000 + index:,}"' for index in range(COUNT)]  # all of them of 1,000 and more
+    times = [str(index) for index in range(COUNT)]
+    with pytest.raises(InputError, match="'1,000' stands where digits are in groups"):
+        read(tmp_path, (times, times, whole))
+
+
+@pytest.mark.parametrize("line", ["s,deg", "-----,-----", "Rig number,two"])
+def test_a_line_below_the_headings_may_be_narrower(tmp_path: Path, line: str) -> None:
+    """The unit of a channel without one is left out, or a title stands between."""
+    head = [*HEAD[:-1], f"{HEAD[-1]}\n{line}"]
+    recording = read(tmp_path, (texts(TIME), texts(ANGLE), texts(FORCE)), head, **BY_NAME)
+    assert recording.samples["handle_force"] == pytest.approx(FORCE, abs=1e-4)
 
 
 @pytest.mark.parametrize("names", ["{}", '"{}"', '"row {}"'])

@@ -50,7 +50,7 @@ def test_a_specimens_angles_are_those_of_the_conventions_table() -> None:
         ("x=1,y=2,yaw=0.05,pitch=0,roll=-1.5708", r"88 deg away.* radians .* by 3 deg"),
         ("x=0.02,y=0.01,z=0,yaw=0,pitch=0,roll=-90", r"in m\? 0\.02 m = 20 mm"),
         ("0.15,0.05,4", r"in m\? 0\.15 m = 150 mm"),
-        ("20000,10000,4", "20000 mm from the pivot"),
+        ("20000,10000,4", "is 20000 mm"),
         ("x=1,y=2,qw=1,qx=1,qy=0,qz=0", r"length 1\.41421"),
         ("x=1,y=2,qw=1,qx=0,qy=0,qz=0,yaw=0,pitch=0,roll=-90", r"differ by 90\.00 deg"),
     ],
@@ -60,6 +60,6 @@ def test_what_is_no_pose_is_refused_with_the_reason(text: str, words: str) -> No
         stated_pose(text)
 
 
-@pytest.mark.parametrize("text", ["0,0,4", "0.3,0,4", "2000,0,4", "-5,-150,0"])
+@pytest.mark.parametrize("text", ["0,0,4", "0.3,0,4", "2000,0,4", "-5,-150,0", "1e-12,0,0"])
 def test_a_place_that_is_uncommon_is_kept(text: str) -> None:
     assert stated_pose(text).translation_m[0] == pytest.approx(1e-3 * float(text.split(",")[0]))

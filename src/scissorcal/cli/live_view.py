@@ -73,6 +73,7 @@ class LiveView:
             place, effort = last[self._axis.channel], last[self._axis.effort]
             self._trace.append((self._axis.places * place, self._axis.efforts * effort))
         interval_s = _LINE_EVERY_S if self._live is None else _DRAW_EVERY_S
+        self._finished = self._finished and done >= 1.0  # a capture follows its probe
         finished = done >= 1.0 and not self._finished
         if now - self._drawn_s < interval_s and not finished:
             return

@@ -51,8 +51,6 @@ CLUSTER = typer.Option(
     "run programs as you (docs/cluster.md).",
 )
 _WORKERS = typer.Option(min=1, help="Processes to fit in; one for each core if not given.")
-Cluster = Annotated[str | None, CLUSTER]
-Workers = Annotated[int | None, _WORKERS]
 
 
 @command

@@ -10,7 +10,7 @@ from scissorcal.recording import Stroke
 
 LEAST_SHARE = 0.1
 """Of the friction of the return stroke, or of the largest load so far: less cuts nothing. The fit
-judges a stroke by the same share (calibration.cut.stale)."""
+judges a stroke by the same share (calibration.cut.checks)."""
 CUTTING = 0.5
 """Share of a closing stroke, from its end, in which the blades are in the material."""
 

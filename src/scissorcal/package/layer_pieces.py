@@ -48,7 +48,7 @@ def piece_records(
 ) -> tuple[PieceRecord, ...] | None:
     """The pieces of a drawn plate, None for the uniform sheet.
 
-    ``found`` are those of the recipe's layers (`recipe.plate_layers.plate_pieces`),
+    ``pieces`` are those of the recipe's layers (`recipe.plate_layers.plate_pieces`),
     ``fracture_energy`` (J/m) the calibrated sheet's, 0 where nothing is cut. The upper face of a
     layer is half the height of the stack up to its top where both blades move, the whole where one
     does. Response and energy are proportional to a layer's thickness: an assumption, as is each

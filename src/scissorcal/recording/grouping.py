@@ -78,6 +78,25 @@ def _has_mark(cell: str) -> bool:
     return "." in cell or "," in cell
 
 
+def thousands(cells: Sequence[Sequence[str]]) -> tuple[int, int] | None:
+    """Row and column of a cell whose comma may part thousands, where no comma is a decimal one.
+
+    ``cells`` are rows of the chosen columns, without dots for decimals.
+
+    >>> thousands([["0", "1,800"], ["1", "1,805"]]), thousands([["0,001", "1,800"]])
+    ((0, 1), None)
+    """
+    suspect = None
+    for column in range(len(cells[0])):
+        marked = [row for row, line in enumerate(cells) if "," in line[column]]
+        if not marked:
+            continue
+        if not all(ONE_GROUP.fullmatch(cells[row][column].strip()) for row in marked):
+            return None
+        suspect = suspect or (marked[0], column)
+    return suspect
+
+
 def two_marks(cells: Sequence[Sequence[str]]) -> tuple[int, int] | None:
     """Row and column of a cell whose mark parts thousands, because decimals have the other mark.
 

@@ -221,9 +221,9 @@ def _not_a_clock(table: Table, seconds: NDArray[np.float64], row: int) -> str:
     before, here = seconds[row - 1], seconds[row]
     if 0.0 < here * len(seconds) < LONGEST_S and np.all(seconds == here):
         return (
-            f"{table.place(row, 'time')}: {here:.9g} s stands in every row, so the column has the "
-            "time from one row to the next. Leave the column out and give the rate: "
-            f"--rate-hz {1.0 / here:.6g}."
+            f"{table.place(row, 'time')}: {here:.9g} s stands in every row: the clock stands, or "
+            "the column has the time from one row to the next. If rows are that far apart, leave "
+            f"the column out and give the rate: --rate-hz {1.0 / here:.6g}."
         )
     if here < before:
         return (

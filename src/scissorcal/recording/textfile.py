@@ -16,6 +16,7 @@ from scissorcal.recording.grouping import (
     MOST_LOOKED_AT,
     grouped_column,
     is_grouped,
+    thousands,
     two_marks,
 )
 from scissorcal.recording.table import Column, Table, Wanted, find_column, shortened
@@ -65,9 +66,12 @@ def read_text(
     if drop_last_line and why and len(rows) > 1:
         rows, notes = rows[:-1], (_dropped(rows[-1], why),)
     _check_width(path, rows, delimiter, width)
-    _refuse_other_headings(path, lines[:start], rows, delimiter, wanted)
     commented = [line for line in comments if line.number < rows[0].number]
     first = _cells(rows[0].text, delimiter)
+    if not any(
+        len(_cells(line.text, delimiter)) == len(first) for line in lines[:start] + commented
+    ):
+        _refuse_other_headings(path, lines[:start], rows, delimiter, wanted)
     headings = _headings(lines[:start], commented, delimiter, first)
     chosen = {c: find_column(path, headings, column, c) for c, column in wanted.items()}
     values = _numbers(path, rows, delimiter, chosen, headings)
@@ -256,7 +260,10 @@ def _numbers(
     headings: list[str],
 ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """Return the chosen columns, shape (N, len(chosen)), by NumPy's parser."""
-    rows, delimiter = _without_quotes(rows, delimiter)
+    unquoted, delimiter = _without_quotes(rows, delimiter)
+    if unquoted is not rows:
+        rows = unquoted
+        _refuse_thousands(path, rows, delimiter, chosen, headings)
     texts = [line.text for line in rows]
     if delimiter != "," and any("," in text for text in texts):
         _refuse_two_marks(path, rows, delimiter, chosen, headings)
@@ -293,6 +300,22 @@ def _without_quotes(rows: list[Line], delimiter: str | None) -> tuple[list[Line]
     marks = str.maketrans(';"', "  ")
     plain = [Line(number, ";".join(cell.translate(marks) for cell in row)) for number, row in split]
     return plain, ";"
+
+
+def _refuse_thousands(
+    path: Path,
+    rows: list[Line],
+    delimiter: str | None,
+    chosen: dict[str, int],
+    headings: list[str],
+) -> None:
+    """Refuse columns in which each comma may part thousands, unless another has decimal commas."""
+    split = [_cells(line.text, delimiter) for line in rows]
+    found = thousands([[cells[number] for number in chosen.values()] for cells in split])
+    if found:
+        row, place = found
+        number = list(chosen.values())[place]
+        raise InputError(_grouped(path, rows[row], headings[number], split[row][number]))
 
 
 def _refuse_two_marks(

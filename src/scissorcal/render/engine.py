@@ -101,7 +101,7 @@ def render(
     Where the package's scene has ``plate_pose = "estimated"``, the torque is that of the plate
     where ``plate`` has it, or without one where the package's fitted pose has it. The force falls
     while the pose is lost or too uncertain for the scene's tolerance
-    (`plate_pose.PosePlacer`), and the result's ``plate`` states it. Packages with a known pose
+    (`pose_placer.PosePlacer`), and the result's ``plate`` states it. Packages with a known pose
     take no heed of ``plate``.
 
     Before any force, `admission.admit_package` compares the package's stiffness with what the rig

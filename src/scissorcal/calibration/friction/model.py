@@ -40,7 +40,7 @@ SHORT = 0.03
 
 @dataclass(frozen=True)
 class FrictionExperiment:
-    """One friction law over one set of motions (see :class:`~.experiment.Experiment`).
+    """One friction law over one set of motions, as :mod:`scissorcal.calibration.fit_model` asks.
 
     ``windows`` are those that count, ``strokes`` (n,) their labels. ``key`` holds the law's
     discrete choices: ``law``, ``symmetric``, ``angle_center``, ``adopt``, the names of adopted

@@ -35,6 +35,7 @@ REFITS = Check(
     "verify refits", f"{INTERVALS}: share of simulated fits that are unreliable", at_most=0.05
 )
 """Limit of the share of simulated fits that fail or do not pass their diagnostics."""
+MOVED = "Check that nothing moved or warmed up during the capture, and repeat some strokes."
 HALVES = Check(
     "verify halves", f"{INTERVALS}: p-value of two halves' difference", at_least=HALVES_SHARE
 )
@@ -177,7 +178,7 @@ def _halves(found: Halves | None, because: str) -> list[Verdict]:
     bad = (
         f"Two halves of the data differ by more than their uncertainty (p = {p:.2g}, limit "
         f"{HALVES_SHARE:.2g}; {size}): law or rig change between {units}. Look at the "
-        "residuals by stroke, and repeat some strokes."
+        f"residuals by stroke. {MOVED}"
     )
     what = (
         f"The halves' predictions differ by {found.effort_difference:.2%} of the effort's rms; "
@@ -185,7 +186,7 @@ def _halves(found: Halves | None, because: str) -> list[Verdict]:
     )
     return [
         HALVES.judge(p, good, bad),
-        HALVES_EFFORT.judge(effort_p, what),
+        HALVES_EFFORT.judge(effort_p, what, f"{what} {MOVED}"),
     ]
 
 

@@ -315,7 +315,8 @@ def _style_properties(style: str, *, is_root: bool = False) -> dict[str, str]:
             if key in properties:
                 raise ValueError(f"it has {key} twice in a style: keep one")
             properties[key] = value
-        if key == "transform" and is_root:  # it turns about the middle of the page
+        if is_root and key == "transform" and value.lower() != "none":
+            # it turns about the middle of the page
             raise ValueError(f"it has transform in a style of its root: {_APPLY}")
         if key != "transform":
             _refuse_property(key, value, "in a style")

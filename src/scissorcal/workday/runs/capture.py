@@ -107,6 +107,8 @@ def capture_into(
 
 def _refuse_at_odds(kind: CaptureKind, options: CaptureOptions) -> None:
     """Raise InputError where options of a capture contradict each other or its kind."""
+    if options.hand and kind != "cut":
+        raise InputError("Only cuts are captured by hand: leave out --hand.")
     bounded = options.at_least or options.max_minutes is not None
     if kind == ADVANCE:
         if options.designed is not None or options.until_tolerance or bounded:

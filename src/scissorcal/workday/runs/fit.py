@@ -137,10 +137,8 @@ def for_step(
     """The options of one fit: it is forced, and its critic asked, only where it is wanted."""
     if options is None:
         return None
-    named = step.what in wanted
-    return replace(
-        options, force=options.force and (named or not wanted), critic=options.critic and named
-    )
+    is_wanted = step.what in wanted or not wanted
+    return replace(options, force=options.force and is_wanted, critic=options.critic and is_wanted)
 
 
 def fit_step(

@@ -4,7 +4,7 @@ import math
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.euler_angles import EulerAngles, one_rotation
-from scissorcal.recipe.unlikely import EVERYDAY, bounds
+from scissorcal.recipe.unlikely import EVERYDAY, MARGIN, bounds
 from scissorcal.tracking.plate_pose import level_plate
 from scissorcal.vision.geometry.pose import Pose
 
@@ -71,17 +71,17 @@ def _by_keys(text: str) -> Pose:
 
 
 def _refuse_other_unit(pose: Pose, text: str) -> None:
-    """Refuse a place that no plate has in mm, as a recipe's place_mm is refused; 0 is one."""
+    """Refuse a place that would be everyday in m, or that no plate has, as recipes refuse it."""
     size = 1e3 * max(map(abs, pose.translation_m))
-    least, most = bounds("plate.place_mm")
-    if size == 0.0 or least <= size <= most:
+    place, most = EVERYDAY["plate_place"], bounds("plate.place_mm")[1]
+    near, far = place.ends
+    is_in_m = near / MARGIN <= size <= far * MARGIN
+    if size <= most and not is_in_m:
         return
-    place = EVERYDAY["plate_place"]
-    near, far = (f"{1e3 * value:g}" for value in place.ends)
-    slip = f" Was it in m? {size:g} m = {1e3 * size:g} mm." if size < least else ""
+    slip = f" Was it in m? {size:g} m = {1e3 * size:g} mm." if is_in_m else ""
     raise InputError(
-        f"The pose '{text[:100]}' is {size:g} mm from the pivot, far from the everyday {near} to "
-        f"{far} mm ({place.why}).{slip} Give x, y and z in mm."
+        f"The largest coordinate of the pose '{text[:100]}' is {size:g} mm, far from the everyday "
+        f"{1e3 * near:g} to {1e3 * far:g} mm ({place.why}).{slip} Give x, y and z in mm."
     )
 
 

@@ -52,7 +52,7 @@ function visit(element: Element, outer: DOMMatrix, around: string, isOuterShown:
     if (isShown && !isUnseen) {
       if (!has(SHAPES, tag) && !CONTAINERS.has(tag)) throw new Error(`it has <${tag.slice(0, 40)}>, which is not read: remove it`);
       refuseAttributes(tag, own, isRoot);
-      if (isRoot && style.has("transform")) throw new Error("it has transform in a style of its root: apply the transforms to the shapes");
+      if (isRoot && (style.get("transform") ?? "none").toLowerCase() !== "none") throw new Error("it has transform in a style of its root: apply the transforms to the shapes");
       matrix = outer.multiply(transformOf(element as SVGGraphicsElement, style.get("transform")));
       if (has(SHAPES, tag)) found.push({ element: element as SVGGeometryElement, matrix });
     }
