@@ -154,7 +154,7 @@ def refusals_panel(answers: Answers) -> Panel:
                 spans[state.swept[0]].append(state.values[state.swept[0]])
         begins = [f"{_plain(n)} {short(min(v))} to {short(max(v))}" for n, v in spans.items()]
         where = "; ".join(sorted(begins)) or "only where several quantities are extreme"
-        if any(state.band == "scene" for state in groups[key]):
+        if any(state.band == "scene" and not state.swept for state in groups[key]):
             where = "within the scene"
         cells = (count("states", len(groups[key])), words("where it begins", where))
         name = f"{place + 1}, {key[0]}, {key[1]}"

@@ -167,6 +167,9 @@ def test_a_wrong_answer_fails_the_run_and_stands_first_with_its_numbers(packages
     assert [row.marked for row in refusals.rows] == [True, False]
     assert refusals.rows[0].note == "Why. (contact 0.03)"
     assert str(refusals.rows[1].value("where it begins")) == "contact 0.02 to 0.02"
+    plain = [(replace(state, swept=()), answer) for state, answer in tried]
+    first = extremes_panels(plain, run)[2].rows[0]
+    assert str(first.value("where it begins")) == "within the scene"
     good = extremes_panels(made(packages, [(0.01, "right")]), run)
     assert good[0].verdicts[0].status == "pass"
 
