@@ -131,7 +131,7 @@ POSE = TelemetryChannel(
 
 PICTURE = TelemetryChannel(
     "/scissorcal/plate/picture",
-    "scissorcal/msg/TrackPicture",
+    "scissorcal/msg/PlatePicture",
     (
         ("sequence", "<u4", "", "number of the picture"),
         ("state", "<u4", "", "STATE_..."),

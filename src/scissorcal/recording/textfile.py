@@ -3,7 +3,7 @@
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -263,10 +263,12 @@ def _numbers(
     unquoted, delimiter = _without_quotes(rows, delimiter)
     if unquoted is not rows:
         rows = unquoted
-        _refuse_thousands(path, rows, delimiter, chosen, headings)
+        _refuse_groups(path, rows, delimiter, chosen, headings, thousands)
     texts = [line.text for line in rows]
     if delimiter != "," and any("," in text for text in texts):
-        _refuse_two_marks(path, rows, delimiter, chosen, headings)
+        looked_at = [*rows[:MOST_LOOKED_AT], *rows[MOST_LOOKED_AT:][-MOST_LOOKED_AT:]]
+        if any("." in line.text for line in looked_at):
+            _refuse_groups(path, looked_at, delimiter, chosen, headings, two_marks)
         texts = [text.replace(",", ".") for text in texts]
     try:
         values: np.ndarray[tuple[int, int], np.dtype[np.float64]] = np.loadtxt(
@@ -302,39 +304,21 @@ def _without_quotes(rows: list[Line], delimiter: str | None) -> tuple[list[Line]
     return plain, ";"
 
 
-def _refuse_thousands(
+def _refuse_groups(
     path: Path,
     rows: list[Line],
     delimiter: str | None,
     chosen: dict[str, int],
     headings: list[str],
+    find: Callable[[list[list[str]]], tuple[int, int] | None],
 ) -> None:
-    """Refuse columns in which each comma may part thousands, unless another has decimal commas."""
+    """Refuse the cell of the chosen columns that ``find`` names as digits in groups, if any."""
     split = [_cells(line.text, delimiter) for line in rows]
-    found = thousands([[cells[number] for number in chosen.values()] for cells in split])
-    if found:
-        row, place = found
-        number = list(chosen.values())[place]
+    place = find([[cells[number] for number in chosen.values()] for cells in split])
+    if place:
+        row, column = place
+        number = list(chosen.values())[column]
         raise InputError(_grouped(path, rows[row], headings[number], split[row][number]))
-
-
-def _refuse_two_marks(
-    path: Path,
-    rows: list[Line],
-    delimiter: str | None,
-    chosen: dict[str, int],
-    headings: list[str],
-) -> None:
-    """Refuse rows that have both dots and commas in their numbers, of which one parts thousands."""
-    looked_at = [*rows[:MOST_LOOKED_AT], *rows[MOST_LOOKED_AT:][-MOST_LOOKED_AT:]]
-    if not any("." in line.text for line in looked_at):
-        return
-    split = [_cells(line.text, delimiter) for line in looked_at]
-    found = two_marks([[cells[number] for number in chosen.values()] for cells in split])
-    if found:
-        row, place = found
-        number = list(chosen.values())[place]
-        raise InputError(_grouped(path, looked_at[row], headings[number], split[row][number]))
 
 
 def _grouped(path: Path, line: Line, heading: str, cell: str) -> str:
