@@ -189,3 +189,12 @@ def test_a_channel_that_is_not_there_is_named_with_those_that_are(tmp_path: Path
 def test_names_of_frames_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ValueError, match="24 bytes"):
         frame_rows("somewhere-else", made_rows(POSE, 1), np.zeros(1, dtype=np.int64))
+
+
+def test_channels_keep_the_names_that_recorded_files_have() -> None:
+    assert [(topic, CHANNELS[topic].schema_name) for topic in CHANNELS] == [
+        ("/scissorcal/control", "scissorcal/msg/Control"),
+        ("/scissorcal/plate/pose", "scissorcal/msg/PlatePose"),
+        ("/scissorcal/plate/picture", "scissorcal/msg/PlatePicture"),
+        ("/scissorcal/plate/frame", "foxglove_msgs/msg/FrameTransform"),
+    ]
