@@ -22,7 +22,7 @@ from scissorcal.control.surface_path import map_contour
 from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import Specimen
 from scissorcal.kernel import ControlFlag
-from scissorcal.model.mechanism import AxisLaw
+from scissorcal.model.friction import AxisLaw
 from scissorcal.model.surface import Plane
 from scissorcal.recipe.schema import Recipe
 from scissorcal.tracking.contacts import TipContacts

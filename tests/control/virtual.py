@@ -20,8 +20,7 @@ from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.device.sim.truth import true_parameters
 from scissorcal.kernel import ControlFlag, HybridFlag
 from scissorcal.model.blade_point import BladePoint
-from scissorcal.model.friction import FrictionLaw
-from scissorcal.model.mechanism import AxisLaw
+from scissorcal.model.friction import AxisLaw, FrictionLaw
 from scissorcal.model.surface import Plane, Surface
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recording.probe import Estimate, ProbeResult

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from scissorcal.model.blade_point import BladePoint
-from scissorcal.model.friction import FrictionLaw
-from scissorcal.model.mechanism import AxisLaw
+from scissorcal.model.friction import AxisLaw, FrictionLaw
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import EVERY_S, TipContact, TipContacts
 from scissorcal.tracking.rows import CameraPose

@@ -12,7 +12,7 @@ from scissorcal.device.motion import Samples
 from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.kernel import ConfigKey, SampleFlag
-from scissorcal.model.mechanism import AxisLaw
+from scissorcal.model.friction import AxisLaw
 from scissorcal.model.surface import Plane
 from scissorcal.package import ModelPackage
 from scissorcal.recipe.load import parse_recipe

@@ -8,6 +8,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from scissorcal.model.blade_point import BladePoint
     from scissorcal.model.cutting import (
         Cutting,
         cut_torque_along,
@@ -16,10 +17,17 @@ if TYPE_CHECKING:
         settled_contact,
     )
     from scissorcal.model.edge import Edge, EdgeBelief, EdgeView, draw_edges, edge_height
-    from scissorcal.model.friction import FrictionLaw, friction_torque, presliding_state
+    from scissorcal.model.friction import (
+        AxisLaw,
+        FrictionLaw,
+        friction_torque,
+        presliding_state,
+    )
     from scissorcal.model.response import Response
 
 __all__ = [
+    "AxisLaw",
+    "BladePoint",
     "Cutting",
     "Edge",
     "EdgeBelief",
@@ -38,7 +46,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    for home in ("cutting", "edge", "friction", "response"):
+    for home in ("blade_point", "cutting", "edge", "friction", "response"):
         module = importlib.import_module(f"scissorcal.model.{home}")
         if name in __all__ and hasattr(module, name):
             return getattr(module, name)

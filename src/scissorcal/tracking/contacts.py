@@ -9,7 +9,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.model.blade_point import BladePoint
-from scissorcal.model.mechanism import AxisLaw
+from scissorcal.model.friction import AxisLaw
 
 EVERY_S = 0.01
 """Contacts at 100 Hz know as much as at 1 kHz: their errors repeat from sample to sample."""

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from scissorcal.calibration.result import FitResult
-    from scissorcal.model.mechanism import AxisLaw
+    from scissorcal.model.friction import AxisLaw
     from scissorcal.recipe.requirements import CaptureKind
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.runs.fit import Made, Request
@@ -74,7 +74,7 @@ def finished(result: "FitResult", request: "Request") -> "FitResult":
 
 def axis_of_fit(fit: "FitResult", unit: str) -> "AxisLaw":
     """One axis from its fit of friction, at the medians of the posterior; ``unit`` of inertia."""
-    from scissorcal.model.mechanism import AxisLaw
+    from scissorcal.model.friction import AxisLaw
 
     values = {p.name: p.q50 for p in (*fit.parameters, *fit.nuisance)}
     if not values.get("inertia", 0.0) > 0.0:
