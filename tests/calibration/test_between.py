@@ -14,7 +14,7 @@ from scissorcal.calibration.verify.check import StudySettings, assess, make_stud
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.calibration.verify.simulator import friction_simulator
 from scissorcal.calibration.verify.study import run
-from scissorcal.model.transforms import LOG
+from scissorcal.model.terms import LOG
 from scissorcal.package.exact import pick_draws
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording

@@ -15,7 +15,7 @@ from scissorcal.calibration.result import StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.cli.fit_law import text
 from scissorcal.inference import Posterior, SearchStatus, infer
-from scissorcal.inference.status import SamplingStatus
+from scissorcal.inference.problem import SamplingStatus
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.workday.runs.fit import FitOutcome

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.calibration.signals.steadiness import steadiness
+from scissorcal.calibration.signals.soundness import steadiness
 from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.capture_gains import Probed, capture_gains
 from scissorcal.device.control import Axis, Gains, greatest_fall

@@ -12,7 +12,8 @@ import jsonschema
 import numpy as np
 import pytest
 
-from scissorcal.calibration.result import FitSeries, FittedParameter
+from scissorcal.calibration.parameters import FittedParameter
+from scissorcal.calibration.result import FitSeries
 from scissorcal.errors import InputError, MissingError
 from scissorcal.package import Review
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN

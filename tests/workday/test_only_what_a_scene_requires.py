@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult
-from scissorcal.calibration.cut.laws import allowed_laws
+from scissorcal.calibration.cut.structure import allowed_laws
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.package import ModelPackage, build_package, open_package

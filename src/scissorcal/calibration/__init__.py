@@ -8,8 +8,9 @@ if TYPE_CHECKING:
     from scissorcal.calibration.fit_model import CutRun, Experiment, FrictionRun
     from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
     from scissorcal.calibration.friction.model import FrictionExperiment
-    from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
-    from scissorcal.calibration.store import load, load_any_fit, load_fit, read_header, save
+    from scissorcal.calibration.parameters import FittedParameter
+    from scissorcal.calibration.result import FitResult, FitSeries, StrokeError
+    from scissorcal.calibration.store import load, load_fit, read_header, save
 
 __all__ = [
     "CutExperiment",
@@ -27,7 +28,6 @@ __all__ = [
     "fit_friction",
     "friction_experiment",
     "load",
-    "load_any_fit",
     "load_fit",
     "read_header",
     "save",
@@ -40,8 +40,9 @@ _HOMES = {
     "fit_model": ("CutRun", "Experiment", "FrictionRun"),
     "friction.fit": ("fit_friction", "friction_experiment"),
     "friction.model": ("FrictionExperiment",),
-    "result": ("FitResult", "FitSeries", "FittedParameter", "StrokeError"),
-    "store": ("load", "load_any_fit", "load_fit", "read_header", "save"),
+    "parameters": ("FittedParameter",),
+    "result": ("FitResult", "FitSeries", "StrokeError"),
+    "store": ("load", "load_fit", "read_header", "save"),
 }
 
 

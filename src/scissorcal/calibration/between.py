@@ -18,7 +18,7 @@ from scissorcal.calibration.friction.search import search, search_from
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference import Posterior, infer
 from scissorcal.inference.between import BROAD, between_groups, one_normal
-from scissorcal.model.transforms import LOG
+from scissorcal.model.terms import LOG
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import TORQUE, Check, Verdict
 

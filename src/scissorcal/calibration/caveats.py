@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from scissorcal.calibration.result import FitResult, FittedParameter
+from scissorcal.calibration.parameters import FittedParameter
+from scissorcal.calibration.result import FitResult
 
 FEW_COUNTS = 1.0
 """Encoder counts per sample of a closing stroke (median) below which an encoder is coarse."""

@@ -7,8 +7,14 @@ from scissorcal.inference.infer import infer
 from scissorcal.inference.noise import ArNoise, fit_ar, log_density, tails_of
 from scissorcal.inference.optimise import Cluster, Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, InferOptions, Posterior
-from scissorcal.inference.problem import Counter, Problem, Stop
-from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus
+from scissorcal.inference.problem import (
+    Counter,
+    NotFiniteError,
+    Problem,
+    SamplingStatus,
+    SearchStatus,
+    Stop,
+)
 
 __all__ = [
     "ArNoise",

@@ -21,8 +21,16 @@ from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.nested import nested_mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, InferOptions, Posterior
-from scissorcal.inference.problem import Counter, Problem, TimeUsedUpError
-from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus, about, picked
+from scissorcal.inference.problem import (
+    Counter,
+    NotFiniteError,
+    Problem,
+    SamplingStatus,
+    SearchStatus,
+    TimeUsedUpError,
+    about,
+    picked,
+)
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 
 BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}

@@ -7,9 +7,16 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.inference.ascent import ascend
-from scissorcal.inference.problem import Counter, Problem, Stop
+from scissorcal.inference.problem import (
+    Counter,
+    NotFiniteError,
+    Problem,
+    SearchStatus,
+    Stop,
+    about,
+    picked,
+)
 from scissorcal.inference.squares import descend, has_squares
-from scissorcal.inference.status import NotFiniteError, SearchStatus, about, picked
 
 WORST = 1e300
 """Stands for a log-posterior of -inf: finite, because BOBYQA calls a NaN or an infinity solved."""

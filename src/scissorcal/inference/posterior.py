@@ -7,8 +7,7 @@ from typing import Literal
 
 from scissorcal.aliases import Array, Progress
 from scissorcal.inference.optimise import Cluster, Optimum
-from scissorcal.inference.problem import Stop
-from scissorcal.inference.status import SamplingStatus
+from scissorcal.inference.problem import SamplingStatus, Stop
 
 Effort = Literal["draft", "standard", "thorough"]
 

@@ -10,8 +10,7 @@ from scissorcal.aliases import Array
 from scissorcal.inference.checkpoint import RandomState, Walk, load_walks, save_walks
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.posterior import InferOptions
-from scissorcal.inference.problem import TimeUsedUpError
-from scissorcal.inference.status import NotFiniteError, SamplingStatus
+from scissorcal.inference.problem import NotFiniteError, SamplingStatus, TimeUsedUpError
 
 ENSEMBLES = 4
 LONG = 100.0

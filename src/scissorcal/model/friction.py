@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 from scissorcal.aliases import Array
 from scissorcal.model.checks import SMALLEST, check_name, check_numbers
 from scissorcal.model.friction_terms import PARAMETERS, TERMS, side_of
-from scissorcal.model.terms import Motion, Role, Term
-from scissorcal.model.transforms import LOG, LOGIT
+from scissorcal.model.terms import LOG, LOGIT, Motion, Role, Term
 
 COMPLEX_STEP = 1e-30
 """Imaginary step by which a term is differentiated: exact to rounding, as nothing is subtracted

@@ -11,8 +11,7 @@ import itertools
 from collections.abc import Container
 from typing import TYPE_CHECKING, Any
 
-from scissorcal.model.terms import Motion, Prior, Role, Term
-from scissorcal.model.transforms import LOG, LOGIT
+from scissorcal.model.terms import LOG, LOGIT, Motion, Prior, Role, Term
 
 if TYPE_CHECKING:
     import numpy as np

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.laws import CutLaw
+from scissorcal.calibration.cut.structure import CutLaw
 from scissorcal.calibration.cut.widening import (
     AveragedLaw,
     Inferred,
@@ -17,7 +17,7 @@ from scissorcal.calibration.cut.widening import (
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.inference import find_optimum, infer
 from scissorcal.inference.problem import Problem
-from scissorcal.model.transforms import IDENTITY
+from scissorcal.model.terms import IDENTITY
 
 DATA_SD = 0.3
 NO_LAYOUT = Layout(())

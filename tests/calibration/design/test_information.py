@@ -28,7 +28,7 @@ from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.trajectory import Plan, friction_plan
 from scissorcal.inference.curvature import likelihood_information
-from scissorcal.model.transforms import IDENTITY, LOG
+from scissorcal.model.terms import IDENTITY, LOG
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.workday.stock import nominal_identity
 

@@ -9,7 +9,7 @@ from scissorcal.calibration.friction.layout import LawChoice, friction_layout, f
 from scissorcal.calibration.friction.model import design
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.model.friction_terms import law_names
-from scissorcal.model.transforms import LOG, LOGIT
+from scissorcal.model.terms import LOG, LOGIT
 from scissorcal.recipe.priors import JointPriors, LogNormalPrior
 from scissorcal.recording.recording import Joint
 from tests.calibration.truth import Truth, friction_recording

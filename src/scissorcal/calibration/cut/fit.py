@@ -10,15 +10,17 @@ from scissorcal.calibration.assemble import CriticRequest, Particulars, assemble
 from scissorcal.calibration.between import BetweenRecordings, widened
 from scissorcal.calibration.comparison import choose
 from scissorcal.calibration.cut.checks import (
+    counted,
     cut_diagnostics,
     cut_verdicts,
     line_notes,
     scatter_verdict,
+    usage_of_segments,
+    usage_sentence,
 )
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import CoarseEncoderError, NoUnloadingError
 from scissorcal.calibration.cut.known import CutBasis, KnownFriction
-from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws, usual_law
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.path_motion import PathMotion, path_motion
 from scissorcal.calibration.cut.scout import (
@@ -27,8 +29,8 @@ from scissorcal.calibration.cut.scout import (
     make_experiment,
     scout,
 )
+from scissorcal.calibration.cut.structure import NUISANCE, CutLaw, allowed_laws, usual_law
 from scissorcal.calibration.cut.unknowns import with_toughness, with_unknowns
-from scissorcal.calibration.cut.usage import counted, usage_of_segments, usage_sentence
 from scissorcal.calibration.cut.widening import (
     AveragedLaw,
     Inferred,

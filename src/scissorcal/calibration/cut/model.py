@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.calibration.cut.laws import NUISANCE, CutLaw
 from scissorcal.calibration.cut.likelihood import CutLikelihood, Evaluation
 from scissorcal.calibration.cut.path_work import mean_advance
-from scissorcal.calibration.cut.structure import response_from
+from scissorcal.calibration.cut.structure import NUISANCE, CutLaw, response_from
 from scissorcal.calibration.fit_candidate import (
     SEARCH_REACH,
     Candidate,

@@ -12,7 +12,16 @@ import numpy as np
 
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.guess import Guess
+from scissorcal.calibration.cut.guess import (
+    ELASTIC_SEGMENTS,
+    LEAST_RANGE_RAD,
+    Guess,
+    Rest,
+    left_for_good,
+    place_at_turn,
+    placed_by_loading,
+    shortest_segment,
+)
 from scissorcal.calibration.cut.known import MaterialData
 from scissorcal.calibration.cut.path_motion import (
     FEWEST_SEGMENTS,
@@ -26,15 +35,6 @@ from scissorcal.calibration.cut.path_work import (
     mean_torque,
     sums_between,
     torque_covariance,
-)
-from scissorcal.calibration.cut.rests import (
-    ELASTIC_SEGMENTS,
-    LEAST_RANGE_RAD,
-    Rest,
-    left_for_good,
-    place_at_turn,
-    placed_by_loading,
-    shortest_segment,
 )
 
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0

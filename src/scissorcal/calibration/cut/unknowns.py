@@ -5,14 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.cut.laws import LOADED
-from scissorcal.calibration.cut.structure import cutting_from
+from scissorcal.calibration.cut.structure import LOADED, cutting_from
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.zeros import DriveZero, idle_zero
 from scissorcal.model import Cutting, edge_height, settled_contact
 from scissorcal.model.cutting import torque_at, within_thickness
-from scissorcal.model.transforms import LOG
+from scissorcal.model.terms import LOG
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import STATED, TORQUE, Check, Verdict

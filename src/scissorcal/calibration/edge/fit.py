@@ -23,7 +23,7 @@ from scissorcal.calibration.edge.result import Band, BladeFit, FoundNick, Photog
 from scissorcal.errors import InputError
 from scissorcal.inference import Effort, InferOptions
 from scissorcal.inference.infer import infer
-from scissorcal.inference.status import SamplingStatus
+from scissorcal.inference.problem import SamplingStatus
 from scissorcal.model import Edge, EdgeBelief, draw_edges, edge_height
 from scissorcal.recipe.priors import BladePriors
 from scissorcal.recipe.schema import Recipe

@@ -8,7 +8,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.edge.cells import EdgeCells
 from scissorcal.inference import Cluster, Effort, Optimum, Problem
-from scissorcal.inference.status import SearchStatus
+from scissorcal.inference.problem import SearchStatus
 from scissorcal.model.bspline import spline_design
 from scissorcal.recipe.priors import BladePriors
 

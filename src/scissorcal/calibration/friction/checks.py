@@ -11,7 +11,7 @@ from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.parameters import Layout
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, side_of
-from scissorcal.model.transforms import LOG
+from scissorcal.model.terms import LOG
 from scissorcal.verdicts import INTERVALS, Check, Verdict
 
 MOST_STEPS = 30

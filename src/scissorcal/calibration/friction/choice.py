@@ -13,7 +13,7 @@ from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.search import scan_nodes
 from scissorcal.inference import Posterior, Stop, gradient, tails_of
 from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, parts_of, side_of
-from scissorcal.model.transforms import LOG, LOGIT
+from scissorcal.model.terms import LOG, LOGIT
 
 USUAL_LAWS = {"rotary": "stribeck+angle", "linear": "coulomb+viscous"}
 """The law that evidence takes on most days, by the kind of joint: the pivot's on 12 of 12 days of

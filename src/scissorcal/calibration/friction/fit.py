@@ -45,15 +45,18 @@ from scissorcal.calibration.friction.probed import (
     with_pushed_inertia,
 )
 from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
-from scissorcal.calibration.parameters import StatedPrior
-from scissorcal.calibration.result import Effort, FitResult, FittedParameter, in_words
-from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.parameters import FittedParameter, StatedPrior, in_words
+from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.signals.filtering import HALF_AT, Bins
 from scissorcal.calibration.signals.sensors import inspect_sensors
-from scissorcal.calibration.signals.soundness import interruptions, refuse_unsound
-from scissorcal.calibration.signals.steadiness import Steadiness, steadiness
+from scissorcal.calibration.signals.soundness import (
+    Steadiness,
+    interruptions,
+    refuse_unsound,
+    steadiness,
+)
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
-from scissorcal.calibration.signals.window_length import HALF_AT
 from scissorcal.calibration.signals.zeros import DriveZero, idle_noise, without_zeros, zero_verdicts
 from scissorcal.inference import InferOptions, Posterior, infer
 from scissorcal.model.friction_terms import NUISANCE, needs_load

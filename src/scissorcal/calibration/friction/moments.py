@@ -17,7 +17,7 @@ from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.friction.columns import SCALES, Cell, FrictionBasis, coupled_nodes
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference.noise import runs
-from scissorcal.model.transforms import IDENTITY, Transform
+from scissorcal.model.terms import IDENTITY, Transform
 
 Block = tuple[str, int, int]
 

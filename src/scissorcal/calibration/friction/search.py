@@ -11,8 +11,7 @@ from scissorcal.calibration.friction.columns import Cell
 from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.inference.ascent import least_squares
 from scissorcal.inference.optimise import Cluster, Optimum, is_rounded
-from scissorcal.inference.problem import Problem
-from scissorcal.inference.status import SearchStatus, about, picked
+from scissorcal.inference.problem import Problem, SearchStatus, about, picked
 
 MOST_ROUNDS = 20
 TINY = 1e-300

@@ -9,23 +9,21 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.filtering import (
     BIN_S,
+    HALF_AT,
+    SMOOTH,
     Bins,
+    Motion,
     PositionError,
+    knot_samples,
+    longer_knot,
     low_pass,
     position_error,
     rate_floor,
-)
-from scissorcal.calibration.signals.segments import bridge, no_piece, sheets_of, usual_tick
-from scissorcal.calibration.signals.window_length import (
-    HALF_AT,
-    SMOOTH,
-    Motion,
-    knot_samples,
-    longer_knot,
     second_derivative,
     spline,
     widened,
 )
+from scissorcal.calibration.signals.segments import bridge, no_piece, sheets_of, usual_tick
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 
@@ -129,7 +127,7 @@ def weigh(
     547; Messenger and Bortz 2021, doi:10.1137/20M1343166). So nothing is smeared that is not
     smeared on both sides, and a window knows nothing of what lies outside it. Windows are longer
     than the cutoff asks for where the encoder's steps would else be a part of psi''
-    (:func:`~.window_length.longer_knot`); ``window_Hz`` is where they pass half, if that is to be
+    (:func:`~.filtering.longer_knot`); ``window_Hz`` is where they pass half, if that is to be
     prescribed. The rate within F keeps the band of ``cutoff_Hz`` all the same. Short gaps are
     bridged (:func:`~.segments.bridge`): ``first`` and the samples are then those of the bridged
     recordings, and windows that touch a gap are left out of ``moving``.

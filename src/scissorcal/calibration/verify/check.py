@@ -10,13 +10,6 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.verify.halves import (
-    HalfFit,
-    StrokeFacts,
-    compare,
-    effort_difference,
-    split_strokes,
-)
 from scissorcal.calibration.verify.result import (
     FORMAT,
     Calibration,
@@ -33,11 +26,16 @@ from scissorcal.calibration.verify.result import (
 from scissorcal.calibration.verify.simulator import Simulator
 from scissorcal.calibration.verify.statistics import (
     SENSITIVE,
+    HalfFit,
+    StrokeFacts,
     acceptance,
     chi_square_p_value,
+    compare,
     diagnose,
     ecdf_band,
     ecdf_p_value,
+    effort_difference,
+    split_strokes,
 )
 from scissorcal.calibration.verify.study import (
     LEVELS,

@@ -13,10 +13,9 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.calibration.verify.halves import Split
 from scissorcal.calibration.verify.result import PriorKind
 from scissorcal.calibration.verify.simulator import Simulator
-from scissorcal.calibration.verify.statistics import power_sensitivity, rank_among
+from scissorcal.calibration.verify.statistics import Split, power_sensitivity, rank_among
 from scissorcal.errors import MissingError, ScissorcalError
 from scissorcal.inference import Posterior, infer, ljung_box
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from scissorcal.calibration.verify.halves import BY_RECORDING
 from scissorcal.calibration.verify.result import (
     Calibration,
     CheckKind,
@@ -10,6 +9,7 @@ from scissorcal.calibration.verify.result import (
     RankedQuantity,
     Sensitivity,
 )
+from scissorcal.calibration.verify.statistics import BY_RECORDING
 from scissorcal.calibration.verify.study import EFFORT
 from scissorcal.verdicts import INTERVALS, STATED, TORQUE, Check, Status, Verdict
 

@@ -8,7 +8,7 @@ from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.fits import PROCESSOR
 from scissorcal.bench.trade.knobs.fit_knob import FitKnob
 from scissorcal.bench.trade.point import Setting
-from scissorcal.calibration.signals.window_length import knot_samples
+from scissorcal.calibration.signals.filtering import knot_samples
 
 FACTORS = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 """The cutoff over the present one: windows from eight times as long to a quarter as long."""
