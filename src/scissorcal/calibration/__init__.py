@@ -4,7 +4,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.cut import CutExperiment, cut_experiment, cutting_from, fit_cut
+    from scissorcal.calibration.cut.fit import cut_experiment, fit_cut
+    from scissorcal.calibration.cut.model import CutExperiment
+    from scissorcal.calibration.cut.structure import cutting_from
     from scissorcal.calibration.fit_model import CutRun, Experiment, FrictionRun
     from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
     from scissorcal.calibration.friction.model import FrictionExperiment

@@ -56,7 +56,7 @@ def best_of(fitted: Sequence[FittedCandidate]) -> FittedCandidate:
 
 
 def contenders(fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
-    """The candidates that come near the best (:func:`is_near`), the best among them.
+    """The candidates that come near the best (:func:`_is_near`), the best among them.
 
     PSIS-LOO could speak for these alone.
     """
@@ -66,7 +66,7 @@ def contenders(fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
     return [
         candidate
         for candidate, nats in zip(fitted, behind, strict=True)
-        if candidate is best or is_near(nats, len(candidate.optimum.point), most)
+        if candidate is best or _is_near(nats, len(candidate.optimum.point), most)
     ]
 
 
@@ -80,11 +80,11 @@ def names_of_contenders(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
         str(row["name"])
         for row in rows
         if row["equivalent"]
-        or is_near(float(row["behind"]), int(row["parameters"]), int(best["parameters"]))
+        or _is_near(float(row["behind"]), int(row["parameters"]), int(best["parameters"]))
     )
 
 
-def is_near(behind: float, parameters: int, of_best: int) -> bool:
+def _is_near(behind: float, parameters: int, of_best: int) -> bool:
     """Whether another estimate of hold-out densities could reverse that of fits without strokes.
 
     The log density of unseen strokes lies about a nat a parameter below that of strokes that were

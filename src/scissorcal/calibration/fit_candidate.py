@@ -3,13 +3,14 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.candidates import LeftOut, leave_strokes_out
+from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference.autocorrelation import ljung_box
@@ -21,32 +22,6 @@ from scissorcal.inference.problem import Counter, Problem, Stop
 FOLDS = 4
 SEARCH_REACH = 8.0
 """Half-width of the search, in prior standard deviations."""
-
-
-class StrokeSums(Protocol):
-    """A likelihood from sums by stroke, whose cost does not depend on how much was recorded."""
-
-    @property
-    def counted(self) -> float:
-        """Bins that count."""
-
-    def log_likelihood(self, u: Array) -> float:
-        """Log-likelihood at ``u`` (p,)."""
-
-    def log_likelihoods(self, points: Array) -> Array:
-        """Log-likelihoods (k,) at points (k, p)."""
-
-    def slope(self, u: Array) -> Array:
-        """Its derivative (p,)."""
-
-    def information(self, u: Array) -> Array:
-        """Fisher's information (p, p)."""
-
-    def by_stroke(self, draws: Array) -> Array:
-        """Log-likelihood (k, strokes) of each stroke at draws (k, p)."""
-
-    def without(self, labels: Integers) -> "StrokeSums":
-        """The same over all strokes but those of ``labels``."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +56,7 @@ class CandidateProblem(Problem):
 
     prior_mean: Array = field(default_factory=lambda: np.zeros(0))
     prior_precision: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    reduced: StrokeSums | None = None
+    reduced: ReducedLaw | None = None
 
     def log_priors(self, points: Array) -> Array:
         """Log-priors of points (k, p), shape (k,)."""
@@ -127,7 +102,7 @@ class Candidate:
     prior_precision: Array
     blocks: Integers | None = None
     populations: Integers | None = None
-    reduced: StrokeSums | None = None
+    reduced: ReducedLaw | None = None
     search: Callable[[CandidateProblem], Optimum] | None = None
     share: float | None = None
     curved: tuple[int, ...] = ()

@@ -199,14 +199,14 @@ def friction_of(blank: LogSummary) -> Interval | None:
     return difference_interval(0.5 * closing, 0.5 * opening)
 
 
-def effort_of(recording: Recording, effort: Effort) -> Array:
+def _effort_of(recording: Recording, effort: Effort) -> Array:
     """The channel (N,): of a rotary joint, a force becomes a torque where its lever is known."""
     values = np.asarray(recording.samples[effort], dtype=np.float64)
     return values * recording.handle_radius_m if _has_lever(recording, effort) else values
 
 
 def effort_unit(recording: Recording, effort: Effort) -> str:
-    """Unit of :func:`effort_of`."""
+    """Unit of :func:`_effort_of`."""
     if effort == "handle_force" and not _has_lever(recording, effort):
         return "N"
     return recording.joint.effort_unit
@@ -237,7 +237,7 @@ class _Strokes:
 
     @classmethod
     def of(cls, recording: Recording, effort: Effort, places: Array) -> "_Strokes":
-        values = effort_of(recording, effort)
+        values = _effort_of(recording, effort)
         if float(np.ptp(values)) == 0.0:
             raise InputError(
                 f"{recording.source}: {effort} is constant at {values[0]:.4g}: name its column, or "

@@ -1,7 +1,6 @@
 """How uncertain a fitted camera is, and whether two halves of the photographs agree with that."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,24 +19,16 @@ _TURN_STEPS = 8
 _LEAST_LEFT = 0.05
 
 
-@dataclass(frozen=True)
-class Spread:
-    """Covariance (9, 9) of the camera, and the stretch of standard errors that is in it."""
-
-    covariance: Array
-    stretch: float
-
-
-def camera_covariance(bundle: Bundle, stretch: float | None = None) -> Spread:
-    """Covariance of the camera's parameters, widened for errors that a photograph's corners share.
+def camera_covariance(bundle: Bundle, stretch: float | None = None) -> tuple[Array, float]:
+    """Covariance (9, 9) of the camera, widened for errors that a photograph's corners share.
 
     Corners taken as independent give the sandwich covariance C of a robust fit. But a board that is
     not flat, or a detector's bias, moves all corners of a photograph together, and C is then too
     small. The pulls of whole photographs show by how much, corrected for each photograph's share
     in the fit so that independent corners would give C on average (CR2: Bell and McCaffrey 2002).
     A dozen photographs cannot give a whole matrix: only one number is taken from them, the mean of
-    the variances over C's, and C is multiplied by it. ``stretch`` gives its root where it is known
-    from elsewhere.
+    the variances over C's, and C is multiplied by it. Its root, the stretch of standard errors,
+    comes second; ``stretch`` gives it where it is known from elsewhere.
     """
     structure = bundle.structure
     back = np.linalg.inv(np.linalg.cholesky(bundle.information.sum(axis=0) + bundle.prior))
@@ -53,7 +44,7 @@ def camera_covariance(bundle: Bundle, stretch: float | None = None) -> Spread:
         stretch = float(np.sqrt(max(ratio, 1.0)))
     single = back.T @ noise @ back
     own = structure.spread[: len(PARAMETERS)]
-    return Spread(stretch**2 * own @ single @ own.T, stretch)
+    return stretch**2 * own @ single @ own.T, stretch
 
 
 def _inverse_root(symmetric: Array) -> Array:
@@ -74,15 +65,16 @@ def halves(views: Sequence[SeenBoard], bundle: Bundle) -> tuple[Bundle, Bundle] 
 
 def pixel_map(
     camera: Camera,
-    spread: Spread,
+    stretch: float,
     parts: tuple[Bundle, Bundle] | None,
     region: Array,
     rivals: Sequence[Array] = (),
 ) -> tuple[PixelMap, CrossValidation | None]:
     """Lay the projection's uncertainty and the two halves' difference over the picture.
 
-    ``rivals`` are the parameters (9,) of models that predict unseen photographs as well as the
-    chosen one: how far they differ from it is what the choice of a model leaves open.
+    ``camera`` has its covariance, in which standard errors were widened by ``stretch``. ``rivals``
+    are the parameters (9,) of models that predict unseen photographs as well as the chosen one: how
+    far they differ from it is what the choice of a model leaves open.
 
     Two cameras are compared as a user would notice: a direction seen by one is turned by the
     rotation that makes both agree best over the valid region, and projected by the other.
@@ -100,14 +92,15 @@ def pixel_map(
     known = np.isfinite(rays).all(axis=1)
     within = inside & known
     slope = _without_turn(rays, camera, within)
-    variance = np.einsum("npi,ij,npj->n", slope, spread.covariance, slope) / 2.0
+    assert camera.covariance is not None
+    variance = np.einsum("npi,ij,npj->n", slope, camera.covariance, slope) / 2.0
     shape = (GRID[1], GRID[0])
     sd = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan).reshape(shape)
     model = _apart(pixels, camera.parameters, rivals, within, shape)
     if parts is None:
         return PixelMap(x, y, sd, inside.reshape(shape), None, model), None
     difference = _difference(pixels, parts[0].camera, parts[1].camera, within)
-    covariance = sum(camera_covariance(part, spread.stretch).covariance for part in parts)
+    covariance = sum(camera_covariance(part, stretch)[0] for part in parts)
     cross = _judged(difference, slope, np.asarray(covariance), within)
     length = np.linalg.norm(difference, axis=1).reshape(shape)
     return PixelMap(x, y, sd, inside.reshape(shape), length, model), cross

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.assemble import CriticRequest, Particulars, assemble
+from scissorcal.calibration.assemble import Particulars, assemble
 from scissorcal.calibration.between import BetweenRecordings, widened
 from scissorcal.calibration.comparison import choose
 from scissorcal.calibration.cut.checks import (
@@ -178,8 +178,7 @@ def fit_cut(
         ),
         recordings,
         usage,
-        Particulars(verdicts, notes, diagnostics),
-        CriticRequest(recipe.fit.cut.critic and effort != "draft"),
+        Particulars(verdicts, notes, diagnostics, recipe.fit.cut.critic and effort != "draft"),
         rng,
     )
     return with_unknowns(with_toughness(fit, recipe, rng), recipe, friction, recordings)

@@ -68,7 +68,7 @@ class CutLikelihood:
         away = (found.log_period - self.line.log_period) / self.line.sd
         share = -0.5 * away**2 * self.data.line_weight
         terms = found.terms.copy()
-        terms[self.elastic_count :] += share
+        terms[self._elastic_count :] += share
         return found._replace(total=found.total - 0.5 * away**2, terms=terms)
 
     def log_likelihoods(self, values: Mapping[str, Array], response: Response) -> Array:
@@ -80,7 +80,7 @@ class CutLikelihood:
         return totals
 
     @cached_property
-    def elastic_count(self) -> int:
+    def _elastic_count(self) -> int:
         """Elastic segments."""
         return sum(len(piece.torque) for piece in self.segments.pieces)
 
@@ -186,7 +186,7 @@ class CutLikelihood:
         return {
             "run_first": _starts(by_sheet),
             "joined": np.concatenate(joined).astype(np.int32) if runs else np.zeros(0, np.int32),
-            "run_torque": self._measured(runs, self.elastic_count),
+            "run_torque": self._measured(runs, self._elastic_count),
             "run_late": _joined([run.late for run in runs]),
             "run_direction": _joined([run.direction for run in runs]),
             "run_lever": view.lever,

@@ -251,7 +251,7 @@ class _Builder:
         rest = len(self.rests) - 1
         covariance += material.torque_doubt(motion, ends)
         covariance += np.diag(self._by_opening(motion, ends, self.rests[rest].place) ** 2)
-        direction = mean_direction(motion, material, ends)
+        direction = _mean_direction(motion, material, ends)
         self.pieces.append(Piece(kind, rest, index, ends, torque, late, direction, covariance))
 
     def _by_opening(self, motion: PathMotion, ends: Integers, place: float) -> Array:
@@ -289,7 +289,7 @@ class _Builder:
                     ends=ends,
                     torque=work / path,
                     late=late * turned / path,
-                    direction=mean_direction(motion, material, ends, by_torque=True),
+                    direction=_mean_direction(motion, material, ends, by_torque=True),
                     path=path,
                     noise=noise + (work / path) ** 2 if unseen else noise,
                     speed=float(np.median(np.abs(turned) / (ticks * motion.tick_s))),
@@ -330,7 +330,7 @@ def free_path(
     return np.diff(path[at]), np.diff(material.work[ends]) - np.diff(extra[at])
 
 
-def mean_direction(
+def _mean_direction(
     motion: PathMotion, material: Material, ends: Integers, by_torque: bool = False
 ) -> Array:
     """Mean direction (k,) of friction between samples ``ends`` (k + 1,), weighed by the path.

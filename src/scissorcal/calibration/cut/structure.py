@@ -25,7 +25,7 @@ def cutting_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> C
     Parameters that begin with ``edge_`` take the place of the structure's own of the edge.
     """
     return Cutting(
-        edge=edge_from(structure, values),
+        edge=_edge_from(structure, values),
         response=response_from(structure, values),
         moving_blades=structure["moving_blades"],
         upper_face_m=structure["upper_face_m"],
@@ -50,7 +50,7 @@ def response_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> 
     return Response(family, force, exponent, reference, np.stack(steps, axis=-1), knots)
 
 
-def edge_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Edge:
+def _edge_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Edge:
     """The edge of a fit's structure, with the parameters among ``values`` that describe it."""
     edge = Edge(**structure["edge"])
     named = {name.removeprefix("edge_"): v for name, v in values.items() if _of_edge(name)}

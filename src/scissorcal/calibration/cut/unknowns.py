@@ -115,7 +115,7 @@ def with_unknowns(
     lies within the data. A bound is no observed error: a large one rejects nothing; the check
     counts as not evaluated and names what to measure.
     """
-    unknowns = find_unknowns(fit, recipe, friction, recordings)
+    unknowns = _find_unknowns(fit, recipe, friction, recordings)
     limit = recipe.scene.tolerance_percent / 100.0
     facts = {"not_measured": [dict(vars(unknown)) for unknown in unknowns]}
     return replace(
@@ -125,7 +125,7 @@ def with_unknowns(
     )
 
 
-def find_unknowns(
+def _find_unknowns(
     fit: FitResult, recipe: Recipe, friction: FitResult, recordings: tuple[Recording, ...]
 ) -> tuple[Unknown, ...]:
     """Bound the scene's mean torque by zeros, edge shape and friction by load."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.aliases import Array, Mask
-from scissorcal.calibration.between import BetweenRecordings, FitsApart, gather_recordings
+from scissorcal.calibration.between import BetweenRecordings, gather_recordings
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.inference import Posterior, find_optimum, infer
@@ -160,14 +160,14 @@ def compare_cuts(
     design = replace(design, likelihood=replace(design.likelihood, line=None), _last={})
     rung = replace(design.candidate(design.observed), starts=point[None, :])
 
-    def own(here: Mask) -> Posterior:
+    def alone(here: Mask) -> Posterior:
         problem = rung.problem(design.series, here)
         return infer(problem, "draft", rng, optimum=find_optimum(problem))
 
     def others(here: Mask) -> Array:
         return find_optimum(rung.problem(design.series, ~here)).point
 
-    return gather_recordings(design, point, recordings, FitsApart(own, others), usual, rng)
+    return gather_recordings(design, point, recordings, (alone, others), usual, rng)
 
 
 def between_notes(between: BetweenRecordings | None, nuisance: tuple[str, ...]) -> tuple[str, ...]:

@@ -15,13 +15,12 @@ from scissorcal.calibration.edge.model import (
     CellData,
     EdgeEvidence,
     Family,
-    Found,
     basis_of,
     search,
 )
 from scissorcal.calibration.edge.result import Band, BladeFit, FoundNick, PhotographRow, RungRow
 from scissorcal.errors import InputError
-from scissorcal.inference import Effort, InferOptions
+from scissorcal.inference import Effort, InferOptions, Optimum
 from scissorcal.inference.infer import infer
 from scissorcal.inference.problem import SamplingStatus
 from scissorcal.model import Edge, EdgeBelief, draw_edges, edge_height
@@ -281,16 +280,18 @@ def compare_edges(
     (`MOST_EVALUATIONS`, `SEARCH_EVALUATIONS`), and ``sentence`` says what came of it.
     """
     tell = progress or (lambda done, sentence: None)
-    found, evidences = [], []
+    optima, logs, evidences = [], [], []
     for number, family in enumerate(families):
         tell(0.4 * number / len(families), f"comparing edges: {family}")
         evidences.append(EdgeEvidence(data, basis_of(data, family, priors), priors))
-        found.append(search(evidences[-1]))
+        optimum, log_evidence = search(evidences[-1])
+        optima.append(optimum)
+        logs.append(log_evidence)
     sizes = [evidence.basis.columns.shape[1] for evidence in evidences]
-    chosen = _chosen(families, sizes, [searched.evidence for searched in found])
+    chosen = _chosen(families, sizes, logs)
     rows = tuple(
-        _row(data, family, searched, index == chosen)
-        for index, (family, searched) in enumerate(zip(families, found, strict=True))
+        _row(data, family, optima[index], logs[index], index == chosen)
+        for index, family in enumerate(families)
     )
     evidence = evidences[chosen]
     posterior = infer(
@@ -298,7 +299,7 @@ def compare_edges(
         effort,
         rng,
         count=_COUNT[effort],
-        optimum=found[chosen].optimum,
+        optimum=optima[chosen],
         options=InferOptions(
             budget=MOST_EVALUATIONS[effort] or None,
             progress=lambda done, sentence: tell(0.4 + 0.5 * done, sentence),
@@ -307,7 +308,7 @@ def compare_edges(
     draws = np.stack([_draw(evidence, u, rng) for u in posterior.draws])
     residual = data.offset - evidence.basis.columns @ draws.mean(axis=0)
     belief, natural = _belief(data, families[chosen], draws)
-    others = sum(searched.evaluations for index, searched in enumerate(found) if index != chosen)
+    others = sum(o.evaluations for index, o in enumerate(optima) if index != chosen)
     tell(1.0, f"edge fitted: {families[chosen]}")
     return EdgeComparison(
         rows,
@@ -320,10 +321,12 @@ def compare_edges(
     )
 
 
-def _row(data: CellData, family: Family, found: Found, chosen: bool) -> RungRow:
-    noise, rough, length, _, *more = (float(size) for size in np.exp(found.optimum.point))
+def _row(
+    data: CellData, family: Family, optimum: Optimum, log_evidence: float, chosen: bool
+) -> RungRow:
+    noise, rough, length, _, *more = (float(size) for size in np.exp(optimum.point))
     between = more[0] if data.several else 0.0
-    return RungRow(family, found.evidence, chosen, noise, rough, length, between)
+    return RungRow(family, log_evidence, chosen, noise, rough, length, between)
 
 
 def _chosen(families: Sequence[Family], sizes: Sequence[int], evidences: Sequence[float]) -> int:

@@ -269,20 +269,10 @@ class EdgeEvidence:
         return np.stack([self.middle, np.clip(seen, self.middle - reach, self.middle + reach)])
 
 
-@dataclass(frozen=True)
-class Found:
-    """An optimum of the sizes, and the logarithm of the evidence by Laplace's approximation."""
+def search(evidence: EdgeEvidence) -> tuple[Optimum, float]:
+    """The most probable sizes, from each start by a quasi-Newton method, and the log evidence.
 
-    optimum: Optimum
-    evidence: float
-
-    @property
-    def evaluations(self) -> int:
-        return self.optimum.evaluations
-
-
-def search(evidence: EdgeEvidence) -> Found:
-    """The most probable sizes, from each start by a quasi-Newton method, and the evidence there.
+    The evidence is by Laplace's approximation.
 
     Distinct optima are kept, since disagreement of photographs can be explained in two ways.
     """
@@ -334,7 +324,7 @@ def search(evidence: EdgeEvidence) -> Found:
         status,
         tuple(clusters),
     )
-    return Found(optimum, clusters[0].value + len(sd) * _HALF_LOG_TWO_PI + volume)
+    return optimum, clusters[0].value + len(sd) * _HALF_LOG_TWO_PI + volume
 
 
 def _log_volume(evidence: EdgeEvidence, z: Array) -> float:

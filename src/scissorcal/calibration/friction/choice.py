@@ -45,7 +45,7 @@ def choose_law(
     """Fit every candidate law and choose one.
 
     The fits of all laws, that of the chosen one, its design, and notes on laws that were passed
-    over: those with build-up after reversals, where :func:`gain_of_build_up` is less
+    over: those with build-up after reversals, where :func:`_gain_of_build_up` is less
     than evidence asks for. The chosen law is fitted again with a Student-t noise where its
     residuals have outliers; that fit takes the place of the first. A share ``lack_of_fit`` of the
     drive that is stated as the law's error is what makes laws differ, and residuals below it have
@@ -58,7 +58,7 @@ def choose_law(
     for index, law in enumerate(every):
         plain = by_name.get(law.name.replace(BUILD_UP, ""))
         if plain is not None and law.name not in by_name:
-            gain = gain_of_build_up(plain, law)
+            gain = _gain_of_build_up(plain, law)
             if gain < POSITIVE_EVIDENCE:
                 passed[law.name] = gain
                 continue
@@ -93,7 +93,7 @@ def _notes(passed: Mapping[str, float]) -> tuple[str, ...]:
     )
 
 
-def gain_of_build_up(plain: FittedCandidate, rich: FrictionExperiment) -> float:
+def _gain_of_build_up(plain: FittedCandidate, rich: FrictionExperiment) -> float:
     """Log density (nats) that build-up after reversals would add to a fitted law, by a score test.
 
     ``rich`` is the law of ``plain`` with build-up, over the same windows. At each length of the

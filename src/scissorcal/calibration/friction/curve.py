@@ -60,7 +60,7 @@ def friction_curve(fit: FitResult) -> FrictionCurve | None:
     one_way = np.geomspace(SLOWEST_SHARE * fastest, fastest, POINTS_EACH_WAY)
     rate = np.concatenate([-one_way[::-1], one_way])
     center = _center(fit)
-    curves = friction_at(fit, _draws(fit, MOST_DRAWS), np.asarray(center), rate[None, :])
+    curves = _friction_at(fit, _draws(fit, MOST_DRAWS), np.asarray(center), rate[None, :])
     low, high = np.quantile(curves, [0.05, 0.95], axis=0)
     return FrictionCurve(center, rate, curves.mean(axis=0), low, high)
 
@@ -68,7 +68,7 @@ def friction_curve(fit: FitResult) -> FrictionCurve | None:
 def partial_residuals(fit: FitResult) -> Array:
     """What was measured less all of the model but friction, (n,)."""
     series = fit.series
-    own = friction_at(fit, fit.map_point[:, None], series.opening, series.opening_rate)
+    own = _friction_at(fit, fit.map_point[:, None], series.opening, series.opening_rate)
     return np.asarray(own + series.measured - series.predicted)
 
 
@@ -88,14 +88,14 @@ def friction_map(fit: FitResult) -> FrictionMap | None:
     rate = np.concatenate([-speeds[::-1], speeds])
     opening = np.linspace(low, high, OPENINGS)
     w, theta = (values.ravel() for values in np.meshgrid(rate, opening, indexing="ij"))
-    curves = np.abs(friction_at(fit, _draws(fit, MAP_DRAWS), theta, w))
+    curves = np.abs(_friction_at(fit, _draws(fit, MAP_DRAWS), theta, w))
     residual = _residuals(fit, w, theta, float(high - low) / OPENINGS)
     shape = (len(rate), len(opening))
     grids = (curves.mean(axis=0), curves.std(axis=0), residual)
     return FrictionMap(rate, opening, *(grid.reshape(shape) for grid in grids))
 
 
-def friction_at(fit: FitResult, columns: Array, opening: Array, rate: Array) -> Array:
+def _friction_at(fit: FitResult, columns: Array, opening: Array, rate: Array) -> Array:
     """The law for parameters ``columns``, whose axis of parameters is the last but one."""
     named = {p.name: np.take(columns, i, axis=-2) for i, p in enumerate(fit.parameters)}
     return friction_torque(FrictionLaw.of_fit(named, _center(fit)), opening, rate)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.assemble import CriticRequest, Particulars, assemble
+from scissorcal.calibration.assemble import Particulars, assemble
 from scissorcal.calibration.between import (
     NOT_KNOWN,
     BetweenRecordings,
@@ -157,8 +157,10 @@ def fit_friction(
         Outcome(law, effort, compared, chosen, posterior, structure, simulated=prior is not None),
         recordings,
         usage,
-        Particulars(verdicts, notes, diagnostics | (zero.as_dict() if zero else {})),
-        CriticRequest(
+        Particulars(
+            verdicts,
+            notes,
+            diagnostics | (zero.as_dict() if zero else {}),
             run.critic or (settings.critic and effort != "draft"),
             tolerance=None if prior else run.tolerance,
             known=("time",) if zero and np.isfinite(zero.drift) else (),

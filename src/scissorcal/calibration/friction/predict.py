@@ -13,6 +13,7 @@ from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.search import search_from
 from scissorcal.calibration.friction.transmission import LoadSolver, two_ended
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.weak_form import Windows, weigh
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros
 from scissorcal.errors import InputError
@@ -101,7 +102,8 @@ def effort_band(design: FrictionExperiment, fit: FitResult, level: float = 0.9) 
     folds = _Folds.of(design, fit)
     return _band(
         folds,
-        _Judged(design.strokes, design.bins.recording, np.ones(len(design.observed), dtype=bool)),
+        design.strokes,
+        design.bins,
         lambda point: design.observed - design.mean(point),
         level,
         folds.freedom(),
@@ -127,7 +129,8 @@ def load_band(
     folds = _Folds.of(design, fit)
     return _band(
         folds,
-        _Judged(_carried(design, windows), windows.bins.recording, windows.bins.moving),
+        _carried(design, windows),
+        windows.bins,
         lambda point: solver(design.layout.natural(point)) - measured,
         level,
         float(len(folds.recordings)),
@@ -228,17 +231,18 @@ def _quantile(ascending: Array, mass: Array, level: float) -> float:
 
 def _band(
     folds: "_Folds",
-    judged: "_Judged",
+    strokes: Integers,
+    bins: Bins,
     errors: Callable[[Array], Array],
     level: float,
     freedom: float,
 ) -> Band:
-    """The band of the windows that are ``judged``; ``errors`` (n,) are by a point.
+    """The band of windows with these ``strokes`` (n,) and ``bins``; ``errors`` (n,) are by a point.
 
     Strokes are the units until recordings are enough; ``freedom`` is that of the recordings' mean
     squared error.
     """
-    strokes, recordings, moving = judged.strokes, judged.recordings, judged.moving
+    recordings, moving = bins.recording, bins.moving
     left_out = np.full(len(moving), np.nan)
     whole = np.full(len(moving), np.nan)
     labels, several = folds.strokes, folds.recordings
@@ -263,15 +267,6 @@ def _band(
         new = half_width(whole[there], recordings[there], level, freedom)[0]
     unit: Unit = "recording" if by_recording else "stroke"
     return Band(level, unit, count, width, resting, calibrated, len(several), new)
-
-
-@dataclass(frozen=True)
-class _Judged:
-    """Windows (n,) whose errors are judged: their strokes, recordings, and whether they move."""
-
-    strokes: Integers
-    recordings: Integers
-    moving: Mask
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def search_from(problem: CandidateProblem, start: Array) -> LocalOptimum:
 
 def _law(problem: CandidateProblem) -> ReducedLaw:
     """The law over products; TypeError where there is none."""
-    if not isinstance(problem.reduced, ReducedLaw):
+    if problem.reduced is None:
         raise TypeError("this posterior is one over bins: search it with find_optimum")
     return problem.reduced
 

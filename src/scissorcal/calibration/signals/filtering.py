@@ -80,26 +80,18 @@ def low_pass(values: Array, cutoff_Hz: float, rate_Hz: float) -> Array:
     return np.asarray(smooth[beyond : beyond + len(values)])
 
 
-@dataclass(frozen=True)
-class PositionError:
-    """What hides a motion: the sensor's ``step`` (NaN: none to be seen), its error's ``sd``."""
+def position_error(position: Array) -> tuple[float, float]:
+    """The step of a position sensor (NaN: none to be seen) and its error, from a recording (m,).
 
-    step: float
-    sd: float
-
-
-def position_error(position: Array) -> PositionError:
-    """The error of a position sensor, from a whole recording (m,).
-
-    Its standard deviation is that of the steps, step / sqrt(12), or of the noise where that exceeds
-    a step: a table has steps of its last digit, however noisy the sensor. Of a part of a recording
-    it must not be taken: a steady motion has even steps, and would hide itself.
+    The error's standard deviation is that of the steps, step / sqrt(12), or of the noise where that
+    exceeds a step: a table has steps of its last digit, however noisy the sensor. Of a part of a
+    recording it must not be taken: a steady motion has even steps, and would hide itself.
     """
     step, noise = resolution_of(position), noise_of(position)
     noise = noise if np.isfinite(noise) else 0.0
     if not np.isfinite(step) or noise > step:
-        return PositionError(step, noise)
-    return PositionError(step, float(step / np.sqrt(12.0)))
+        return step, noise
+    return step, float(step / np.sqrt(12.0))
 
 
 def rate_floor(sd: float, cutoff_Hz: float, rate_Hz: float) -> float:
@@ -160,7 +152,7 @@ class Motion:
         """Which windows from ``first`` (n,) on hold no turn, no rest and no faulty sample."""
         return np.asarray(_held(self.turning | self.faulty, first, length) == 0)
 
-    def not_resting(self, first: Integers, length: int) -> Mask:
+    def _not_resting(self, first: Integers, length: int) -> Mask:
         """Which windows hold no rest and no faulty sample; a quick turn is no rest."""
         low, high = stretches(self.turning)
         rests = np.zeros(len(self.turning), dtype=bool)
@@ -219,7 +211,7 @@ def _acceleration(pieces: list[Motion], steps: list[float], knot: int) -> tuple[
         twice = second_derivative(knot, piece.rate_Hz)
         first = piece.places(len(twice))
         count += int(piece.moving(first, len(twice)).sum())
-        first = first[piece.not_resting(first, len(twice))]
+        first = first[piece._not_resting(first, len(twice))]
         if len(first) == 0:
             continue
         square += float(

@@ -13,7 +13,6 @@ from scissorcal.calibration.signals.filtering import (
     SMOOTH,
     Bins,
     Motion,
-    PositionError,
     knot_samples,
     longer_knot,
     low_pass,
@@ -255,7 +254,7 @@ def _motion(
     piece: tuple[int, int],
     cutoff_Hz: float,
     usable: Mask,
-    error: PositionError,
+    error: tuple[float, float],
 ) -> Motion:
     low, high = piece
     time = recording.device_time_s[low:high]
@@ -264,9 +263,10 @@ def _motion(
     band_Hz = RATE_BAND * cutoff_Hz
     opening = low_pass(position, band_Hz, rate_Hz)
     rate = np.gradient(opening) * rate_Hz
-    floor = rate_floor(error.sd, band_Hz, rate_Hz)
+    step, sd = error
+    floor = rate_floor(sd, band_Hz, rate_Hz)
     turns = _turns(rate, floor if np.ptp(position) > 0.0 else np.inf)
-    return Motion(position, error.step, opening, rate, floor, turns, ~usable, rate_Hz)
+    return Motion(position, step, opening, rate, floor, turns, ~usable, rate_Hz)
 
 
 def _weigh_piece(

@@ -171,7 +171,7 @@ def _half(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
     experiment = study.experiment
     keep = study.split.first if index == 0 else study.split.second
     rung = replace(experiment.candidate(experiment.observed), starts=study.start[None, :])
-    series = unbroken(experiment.series, keep)
+    series = _unbroken(experiment.series, keep)
     posterior = infer(rung.problem(series, keep), study.effort, rng, count=study.draws)
     residuals = rung.likelihood.standardised(posterior.optimum.point)
     white = ljung_box(residuals[keep], series[keep])
@@ -313,10 +313,10 @@ def refit_prior(experiment: Experiment, generating: Generating) -> StatedPrior:
     )
 
 
-def unbroken(series: NDArray[np.int64], kept: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _unbroken(series: NDArray[np.int64], kept: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Labels (n,) of the contiguous stretches where only ``kept`` bins of ``series`` are used.
 
-    >>> unbroken(np.array([0, 0, 0, 0, 1]), np.array([True, True, False, True, True]))
+    >>> _unbroken(np.array([0, 0, 0, 0, 1]), np.array([True, True, False, True, True]))
     array([0, 0, 1, 2, 3])
     """
     turns = (np.diff(series) != 0) | (np.diff(kept.astype(np.int64)) != 0)

@@ -118,7 +118,7 @@ def _camera_verdicts(engine: "Engine", seen: Sequence["BladePhoto"]) -> tuple[Ve
     """How well the camera is known where the edges were; none where no fitted camera was used."""
     import numpy as np
 
-    from scissorcal.calibration.camera.checks import CameraThere
+    from scissorcal.calibration.camera.checks import verdict_there
     from scissorcal.calibration.edge.checks import CAMERA
 
     fitted = _camera_fit(engine)
@@ -131,7 +131,7 @@ def _camera_verdicts(engine: "Engine", seen: Sequence["BladePhoto"]) -> tuple[Ve
         float(np.linalg.norm(np.ptp(photo.whole(own.edge.pixels), axis=0)) / np.ptp(own.station))
         for photo, own in edges
     )
-    return (CameraThere.of(fitted.pixel_map, pixels, scale).verdict(CAMERA),)
+    return (verdict_there(CAMERA, fitted.pixel_map, pixels, scale),)
 
 
 def _refuse_other_setup(before: Sequence[PhotoCapture], setup: BladeSetup) -> None:

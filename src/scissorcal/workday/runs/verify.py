@@ -114,7 +114,7 @@ def _experiment(
     engine: Engine, kind: FitKind, fit: "FitResult"
 ) -> "tuple[Experiment, Simulator, dict[int, int]]":
     """The design of a fit, its simulator, and the sheet that each of its strokes went through."""
-    from scissorcal.calibration.cut import cut_experiment
+    from scissorcal.calibration.cut.fit import cut_experiment
     from scissorcal.calibration.friction.advance import actuation_of, sliding_joints
     from scissorcal.calibration.friction.fit import friction_experiment
     from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
