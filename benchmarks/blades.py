@@ -206,7 +206,7 @@ def measured(setting: Setting, effort: Any, rng: np.random.Generator) -> dict[st
     end = time.perf_counter()
     stations = CHECKED * setting.shape.length_m
     truth, angle = true_edge(setting.shape, stations)
-    edges = fit.belief.with_values(fit.draws)
+    edges = fit.edge_posterior.with_values(fit.draws)
     offsets, tapers = edges.offset_at(stations), np.arctan(edges.slope_at(stations))
     miss = offsets.mean(axis=0) - truth
     wrong = tapers.mean(axis=0) - angle

@@ -25,7 +25,7 @@ from scissorcal.recording.chunks import run_end
 from scissorcal.vision.camera_files import read_camera_file
 from scissorcal.vision.live import frames_of
 from scissorcal.vision.photo import read_photo
-from scissorcal.vision.stances import read_stances
+from scissorcal.vision.rig_positions import read_rig_positions
 from tests.recording.logs import COLUMNS
 from tests.recording.made import made_samples, written_live
 
@@ -41,7 +41,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "a.zip": open_package,
     "a.toml": load_recipe,
     "path.csv": read_path,
-    "stances.csv": read_stances,
+    "positions.csv": read_rig_positions,
     "plate.svg": read_drawing,
     "heights.csv": lambda path: probed_surface(path, 0.02),
     "cut.verify.json": lambda path: load(path, VerifyResult),

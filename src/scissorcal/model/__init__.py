@@ -15,14 +15,14 @@ if TYPE_CHECKING:
         mean_share,
         settled_contact,
     )
-    from scissorcal.model.edge import Edge, EdgeBelief, EdgeView, draw_edges, edge_height
+    from scissorcal.model.edge import Edge, EdgeDistribution, EdgeView, draw_edges, edge_height
     from scissorcal.model.friction import FrictionLaw, friction_torque, presliding_state
     from scissorcal.model.response import Response
 
 __all__ = [
     "Cutting",
     "Edge",
-    "EdgeBelief",
+    "EdgeDistribution",
     "EdgeView",
     "FrictionLaw",
     "Response",

@@ -18,7 +18,7 @@ from scissorcal.recording.recording import Joint, Recording
 from scissorcal.recording.strokes import label_strokes
 
 COULOMB, VISCOUS = 0.05, 0.02
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
 
 
 def log(

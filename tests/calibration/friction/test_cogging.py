@@ -16,7 +16,7 @@ from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 from tests.calibration.truth import Truth, friction_recording
 
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
 PERIODS, SIZE = 137.0, 6e-4
 
 

@@ -13,7 +13,7 @@ from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
 from scissorcal.recording.resolution import resolution_of
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
 
 
 @pytest.fixture(scope="module")
