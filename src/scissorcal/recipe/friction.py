@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, Field, Strict
 
@@ -129,3 +129,15 @@ class AdvanceSettings(FitFriction):
     def lack_of_fit(self) -> float:
         """Share by which a law may be wrong without the data showing it."""
         return 0.01 * self.lack_of_fit_percent
+
+
+def as_first_named(settings: Any) -> Any:
+    """Settings, as JSON has them, under the keys that identities of stored results have."""
+    if isinstance(settings, list | tuple):
+        return [as_first_named(item) for item in settings]
+    if isinstance(settings, dict):
+        return {
+            OLD_LAW_KEY if key == "law" else key: as_first_named(item)
+            for key, item in settings.items()
+        }
+    return settings

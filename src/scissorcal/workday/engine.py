@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from scissorcal.errors import InputError, OtherKindError
 from scissorcal.foreign.kinds import fit_name
 from scissorcal.identity import digest
-from scissorcal.recipe.friction import OLD_LAW_KEY
+from scissorcal.recipe.friction import as_first_named
 from scissorcal.recipe.requirements import CaptureKind, Requirements, requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.facts import UNFINISHED, rendering
@@ -118,7 +118,7 @@ class Engine:
         made_from = {
             "step": name,
             "version": step.version,
-            "settings": _as_first_named(step.settings(self.recipe)),
+            "settings": as_first_named(step.settings(self.recipe)),
             "effort": effort if step.by_effort else "",
             "inputs": {_plain(item): self._content(step, item) for item in step.inputs},
         }
@@ -397,15 +397,3 @@ def _captured(step: Step) -> CaptureKind:
 
 def _plain(item: str) -> str:
     return item.rstrip("?")
-
-
-def _as_first_named(settings: Any) -> Any:
-    """Settings under the keys that identities of stored results have."""
-    if isinstance(settings, list | tuple):
-        return [_as_first_named(item) for item in settings]
-    if isinstance(settings, dict):
-        return {
-            OLD_LAW_KEY if key == "law" else key: _as_first_named(item)
-            for key, item in settings.items()
-        }
-    return settings
