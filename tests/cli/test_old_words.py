@@ -1,4 +1,4 @@
-"""Old words of options and recipes are read for one version, with a note that names the new ones."""
+"""Old words of options and recipes are read for one version, with a note of the new ones."""
 
 from pathlib import Path
 

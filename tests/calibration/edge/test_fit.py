@@ -23,11 +23,8 @@ from scissorcal.calibration.edge.model import (
 from scissorcal.calibration.edge.result import BladeResult, FoundNick
 from scissorcal.errors import InputError
 from scissorcal.inference import SamplingStatus
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import load_recipe
-from scissorcal.vision.blade.borders import BorderPoints
-from scissorcal.vision.blade.measure import BladeMeasurement
-from scissorcal.vision.blade.silhouette import BladeParts
+from scissorcal.recipe import load_recipe, recipe_path
+from scissorcal.vision import BladeMeasurement, BladeParts, BorderPoints
 
 LENGTH = 0.075
 
@@ -98,7 +95,7 @@ def test_the_family_is_found_and_the_edge_within_its_intervals(family):
     draws = compared.edge_posterior.with_values(compared.draws).offset_at(s)
     z = (draws.mean(axis=0) - shape(family, s)) / draws.std(axis=0)
     assert np.abs(z).max() < 3.5
-    # the belief is what the draws are
+    # the posterior is what the draws are
     np.testing.assert_allclose(
         compared.edge_posterior.edge.offset_at(s), draws.mean(axis=0), atol=1e-8
     )

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from scissorcal.recipe.priors import PlatePriors
+from scissorcal.recipe import PlatePriors
 from scissorcal.vision.geometry.board_pose import Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, between, difference, left_jacobian
@@ -198,7 +198,7 @@ def test_the_rig_is_located_from_advances_and_turns():
     for seed in range(2):
         truth, views = card_views(positions, np.random.default_rng(seed))
         found = locate_rig(views, CAMERA, MIDDLE)
-        assert found.untold == ()
+        assert found.undetermined == ()
         away = difference(found.camera_rig, truth) / np.sqrt(np.diag(found.camera_rig.covariance))
         assert np.abs(away).max() < 4.5
         assert np.degrees(np.linalg.norm(difference(found.camera_rig, truth)[:3])) < 1.0
@@ -227,7 +227,7 @@ def test_a_picture_with_another_position_than_stated_is_not_left_out():
 
 def test_motion_that_determines_part_of_the_frame_names_the_rest():
     _, shifted = card_views([(a, 0.2) for a in (0.0, 0.03, 0.06)], np.random.default_rng(9))
-    assert locate_rig(shifted, CAMERA, MIDDLE).untold
+    assert locate_rig(shifted, CAMERA, MIDDLE).undetermined
     _, still = card_views([(0.0, 0.2)], np.random.default_rng(9))
     with pytest.raises(ValueError, match="same position in all pictures"):
         locate_rig(still, CAMERA, MIDDLE)
