@@ -13,8 +13,8 @@ from scissorcal.model.terms import Transform
 class Parameter:
     """One parameter with its prior: normal in u, where its value is ``transform.natural(u)``.
 
-    ``mean`` and ``sd`` are the prior's in u. ``believed`` marks a prior from other measurements:
-    these data need not narrow it.
+    ``mean`` and ``sd`` are the prior's in u. ``measured_prior`` marks a prior from other
+    measurements: these data need not narrow it.
     """
 
     name: str
@@ -23,7 +23,7 @@ class Parameter:
     mean: float
     sd: float
     meaning: str
-    believed: bool = False
+    measured_prior: bool = False
 
 
 NEAREST, FARTHEST = 1.2816, 1.9600
@@ -58,7 +58,7 @@ def in_words(mean: float, sd: float, q05: float, q50: float, q95: float) -> str:
 class FittedParameter:
     """One parameter with its marginal posterior, in ``unit``.
 
-    ``believed`` marks a prior from another measurement, such as photographs of the edge.
+    ``measured_prior`` marks a prior from another measurement, such as photographs of the edge.
     ``identifiability`` is the ratio of posterior to prior standard deviation: near 0 the data
     determine the parameter, near 1 the prior does.
     """
@@ -72,7 +72,7 @@ class FittedParameter:
     q95: float
     identifiability: float
     meaning: str = ""
-    believed: bool = False
+    measured_prior: bool = False
 
     @staticmethod
     def summary_of(draws: Array) -> dict[str, Any]:
@@ -84,8 +84,8 @@ class FittedParameter:
     @property
     def moments(self) -> tuple[float, float] | None:
         """Mean and sd for people to read; None where they do not agree with the quantiles."""
-        told = moments_agree(self.mean, self.sd, self.q05, self.q95)
-        return (self.mean, self.sd) if told else None
+        agree = moments_agree(self.mean, self.sd, self.q05, self.q95)
+        return (self.mean, self.sd) if agree else None
 
     @property
     def words(self) -> str:
@@ -158,7 +158,7 @@ class Layout:
                     **FittedParameter.summary_of(natural[:, index]),
                     identifiability=float(min(u.std(ddof=1) / parameter.sd, 1.0)),
                     meaning=parameter.meaning,
-                    believed=parameter.believed,
+                    measured_prior=parameter.measured_prior,
                 )
             )
         return tuple(rows)

@@ -52,6 +52,13 @@ _Variables = Mapping[str, NDArray[Any]]
 FORMAT = "scissorcal-result/1"
 EARLIER = ("scissorcal-fit/1", "scissorcal-fit/2")
 """Formats of earlier versions, which are refused: the fit is made again."""
+EARLIER_FIELDS = {
+    "rung": "candidate",
+    "rungs": "candidates",
+    "belief": "edge_posterior",
+    "believed": "measured_prior",
+}
+"""What fields are called now that files may have under an old name."""
 COMPRESSED_BYTES = 4096
 """Size from which an array is compressed."""
 FITS = ("friction", "friction-advance", "cut", "camera", "blade", "plate")
@@ -367,6 +374,7 @@ def _object_of(
     kind: Any, value: dict[str, Any], file: _Variables | None, stored: Stored | None
 ) -> Any:
     known = _fields(kind)
+    value = {EARLIER_FIELDS.get(name, name): item for name, item in value.items()}
     names = {field.name for field in fields(kind)} | set(getattr(kind, "also_written", ()))
     if unknown := value.keys() - names:
         raise ValueError(f"{kind.__name__} has the unknown {', '.join(sorted(unknown))}")

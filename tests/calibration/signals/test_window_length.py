@@ -13,7 +13,7 @@ from scissorcal.calibration.signals.filtering import (
     spline,
 )
 from scissorcal.calibration.signals.weak_form import next_cutoff, weigh
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recording import SAMPLE_DTYPE, Recording
 
 INERTIA, RATE_HZ = 2e-4, 1000.0
 

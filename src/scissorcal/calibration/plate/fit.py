@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.calibration.camera.result import PixelMap
 from scissorcal.calibration.plate.checks import camera_verdict, plate_verdicts
-from scissorcal.calibration.plate.result import Halves, PlateFit, PoseView
+from scissorcal.calibration.plate.result import PlateFit, PoseHalves, PoseView
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
@@ -120,7 +120,7 @@ def _located(
         ) from None
 
 
-def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> Halves | None:
+def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> PoseHalves | None:
     """Compare poses of two halves of the corners, of the same camera: the worse of two ways.
 
     Every other group of four corners (a marker's, or neighbours on a chessboard, which err
@@ -136,7 +136,7 @@ def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> Halves | N
 
 def _half_and_half(
     corners: Corners, camera: Camera, priors: PlatePriors, way: NDArray[np.bool_]
-) -> Halves | None:
+) -> PoseHalves | None:
     alone = replace(camera, covariance=None), priors.model_copy(update=_EXACT_PRINT)
     try:
         first, second = (locate_board(corners.where(half), *alone) for half in (way, ~way))
@@ -151,7 +151,7 @@ def _half_and_half(
     if camera.covariance is not None:
         bent = first.by_camera - second.by_camera
         claimed = claimed + bent @ camera.covariance @ bent.T
-    return Halves(
+    return PoseHalves(
         rotation_deg=float(np.degrees(np.linalg.norm(away[:3]))),
         translation_mm=float(1e3 * np.linalg.norm(away[3:])),
         square=float(away @ np.linalg.solve(claimed, away)),
