@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from scissorcal.aliases import Array, Progress
-from scissorcal.inference.optimise import Cluster, Optimum
+from scissorcal.inference.optimise import Optimum
 from scissorcal.inference.problem import SamplingStatus, Stop
 
 Effort = Literal["draft", "standard", "thorough"]
@@ -67,8 +67,3 @@ class Posterior:
     log_posterior: Callable[[Array], float]
     noise_orders: tuple[int, ...] = ()
     dispersion: float = 1.0
-
-    @property
-    def optima(self) -> tuple[Cluster, ...]:
-        """Distinct optima that the search found, highest first."""
-        return self.optimum.optima

@@ -239,17 +239,6 @@ class Knowledge:
         return usual_sd(self.layout, self.usual_scatter)
 
     @property
-    def shares_of_prior(self) -> dict[str, float]:
-        """Standard deviation of each parameter as a share of its prior's, by name."""
-        sds = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return dict(zip(self.layout.names, (sds / self.layout.sd).tolist(), strict=True))
-
-    def sd_of(self, name: str) -> float:
-        """Standard deviation of one parameter in its unconstrained coordinate."""
-        place = self.layout.names.index(name)
-        return float(np.sqrt(self.covariance[place, place]))
-
-    @property
     def _common(self) -> Information:
         return self.common or Information.none(len(self.point))
 
