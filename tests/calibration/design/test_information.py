@@ -94,10 +94,6 @@ def test_one_recording_with_white_noise_is_a_normal_regression() -> None:
     known = Knowledge(layout, np.zeros(2), prior).plus(told(*rows, noise=0.1))
     exact = np.linalg.inv(columns.T @ columns / 0.01 + prior)
     np.testing.assert_allclose(known.covariance, exact, rtol=1e-9)
-    assert np.sqrt(known.covariance[1, 1]) == pytest.approx(np.sqrt(exact[1, 1]))
-    assert np.sqrt(known.covariance[0, 0]) / known.layout.sd[0] == pytest.approx(
-        np.sqrt(exact[0, 0]) / 2.0
-    )
 
 
 def test_the_order_of_strokes_does_not_matter() -> None:
