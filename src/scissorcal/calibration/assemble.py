@@ -209,8 +209,8 @@ def _predictions(outcome: Outcome, thin: slice) -> Array:
     """Means (draws, k) by draws of the posterior, at the points that ``thin`` selects."""
     posterior, measured = outcome.posterior, outcome.design.observed
     residuals = outcome.chosen.candidate.likelihood.residuals
-    every = max(1, len(posterior.draws) // BAND_DRAWS)
-    return np.stack([(measured - residuals(u))[thin] for u in posterior.draws[::every]])
+    step = max(1, len(posterior.draws) // BAND_DRAWS)
+    return np.stack([(measured - residuals(u))[thin] for u in posterior.draws[::step]])
 
 
 def _series(outcome: Outcome, predictions: Array, thin: slice) -> FitSeries:

@@ -106,8 +106,8 @@ class BetweenRecordings:
     def _given(self, tau: Array) -> Array:
         """Covariance (k, p, p) of the mean over recordings given scatters ``tau`` (k, p)."""
         spread = tau[:, None, :, None] ** 2 * np.eye(tau.shape[1])
-        own = np.linalg.inv(self.precisions + BROAD * self.prior)
-        return np.linalg.inv(np.linalg.inv(own + spread).sum(axis=1) + self.prior)
+        covariances = np.linalg.inv(self.precisions + BROAD * self.prior)
+        return np.linalg.inv(np.linalg.inv(covariances + spread).sum(axis=1) + self.prior)
 
     def diagnostics(self) -> dict[str, Any]:
         """Plain numbers by parameter and by recording, for the fit's file."""
@@ -278,8 +278,8 @@ def jackknife(
     for group in groups:
         rest = law.without(labels[group])
         repeated &= np.diag(rest.information(point)) > REPEATED * information
-        seen = replace(problem, reduced=rest)
-        left.append(design.layout.columns(search_from(seen, point).point))
+        others = replace(problem, reduced=rest)
+        left.append(design.layout.columns(search_from(others, point).point))
     size = np.array([[law.counted / counts[group].sum()] for group in groups])
     pseudo = size * full - (size - 1.0) * np.stack(left)
     centre = np.sum(pseudo / size, axis=0)

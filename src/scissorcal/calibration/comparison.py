@@ -158,11 +158,11 @@ def candidate_rows(
 def _loo(candidate: FittedCandidate, share: float) -> dict[str, float]:
     if not np.isfinite(share):
         return {"loo": share, "loo_se": share, "loo_k_hat": share}
-    found = candidate.left_out
+    left_out = candidate.left_out
     return {
-        "loo": float(found.scores.sum()) * share,
-        "loo_se": standard_error(found.scores * share),
-        "loo_k_hat": float(found.k_hats.max()),
+        "loo": float(left_out.scores.sum()) * share,
+        "loo_se": standard_error(left_out.scores * share),
+        "loo_k_hat": float(left_out.k_hats.max()),
     }
 
 
@@ -195,8 +195,8 @@ def comparison_text(
     ]
     if not others:
         return text + doubt
-    found = max((_apart(chosen, other, bins, contact) for other in others), key=lambda p: p.nats)
-    return f"{text} {_advice(found, chosen, bins, joint)}{doubt}"
+    place = max((_apart(chosen, other, bins, contact) for other in others), key=lambda p: p.nats)
+    return f"{text} {_advice(place, chosen, bins, joint)}{doubt}"
 
 
 @dataclass(frozen=True)

@@ -115,8 +115,8 @@ class Candidate:
             return -0.5 * float(away @ self.prior_precision @ away)
 
         def terms(u: Array) -> Array:
-            every = self.likelihood.terms(u)
-            return every if keep is None else every[keep]
+            all_terms = self.likelihood.terms(u)
+            return all_terms if keep is None else all_terms[keep]
 
         def normal(u: Array) -> tuple[Array, Array]:
             z, log_sd = self.likelihood.normal(u)
@@ -301,9 +301,9 @@ class _Refits:
             share, slope = rest.counted / candidate.reduced.counted, rest.slope(point)
             others: Problem = replace(candidate.problem(self.problem.series), reduced=rest)
         else:
-            seen = ~np.isin(self.strokes, fold)
-            share, slope = float(np.mean(seen)), self._scores[seen].sum(axis=0)
-            others = self.counter.over(candidate.problem(self.problem.series, seen))
+            kept = ~np.isin(self.strokes, fold)
+            share, slope = float(np.mean(kept)), self._scores[kept].sum(axis=0)
+            others = self.counter.over(candidate.problem(self.problem.series, kept))
         slope = self.problem.share * slope
         slope = slope - candidate.prior_precision @ (point - candidate.prior_mean)
         precision = share * self.problem.share * self.information + candidate.prior_precision

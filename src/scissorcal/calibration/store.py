@@ -270,8 +270,8 @@ class _Writer:
 
     def _object(self, value: Any, path: str, stored: Stored | None) -> dict[str, Any]:
         tree, kind = {}, cast(Any, type(value))
-        for name, (_, own) in _fields(kind).items():
-            item, here = getattr(value, name), own or stored
+        for name, (_, annotation) in _fields(kind).items():
+            item, here = getattr(value, name), annotation or stored
             if isinstance(item, np.ndarray):
                 tree[name] = self._array(item, f"{path}/{name}", here, value)
             else:
@@ -379,8 +379,8 @@ def _object_of(
     if unknown := value.keys() - names:
         raise ValueError(f"{kind.__name__} has the unknown {', '.join(sorted(unknown))}")
     given = {
-        name: _built(hint, value[name], file, own or stored)
-        for name, (hint, own) in known.items()
+        name: _built(hint, value[name], file, annotation or stored)
+        for name, (hint, annotation) in known.items()
         if name in value
     }
     return kind(**given)

@@ -118,8 +118,10 @@ def find_plateau(
     height = level(slice(*place))
     if drawn is None:
         return Plateau(first, last, height)
-    found = [plateau_of(drawn(), places) for _ in range(RESAMPLES)]
-    ends = np.array([(places[one[0]], places[one[1] - 1]) for one in found if one is not None])
+    plateaus = [plateau_of(drawn(), places) for _ in range(RESAMPLES)]
+    ends = np.array(
+        [(places[span[0]], places[span[1] - 1]) for span in plateaus if span is not None]
+    )
     if not len(ends):
         return Plateau(first, last, height, share=0.0)
     (low, high), (low_, high_) = np.quantile(ends, [0.05, 0.95], axis=0).T

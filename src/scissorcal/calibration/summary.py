@@ -123,14 +123,16 @@ def summarise(logs: Sequence[tuple[Recording, Effort]], places: Array) -> tuple[
     overflow are left out. Raises InputError where a channel is constant or too few strokes reach
     over the range.
     """
-    seen = [_Strokes.of(recording, effort, places) for recording, effort in logs]
+    measured = [_Strokes.of(recording, effort, places) for recording, effort in logs]
     signs = {
-        effort: {one.sign.sign for one, log in zip(seen, logs, strict=True) if log[1] == effort}
+        effort: {
+            part.sign.sign for part, log in zip(measured, logs, strict=True) if log[1] == effort
+        }
         for _, effort in logs
     }
     return tuple(
         _summary(recording, strokes, places, signs[effort] - {0})
-        for strokes, (recording, effort) in zip(seen, logs, strict=True)
+        for strokes, (recording, effort) in zip(measured, logs, strict=True)
     )
 
 
@@ -281,14 +283,14 @@ def _summary(recording: Recording, strokes: _Strokes, places: Array, signs: set[
     if turned:
         closing = negated(closing)
         opening = None if opening is None else negated(opening)
-    every = (closing, *((opening,) if opening else ()))
+    ways = (closing, *((opening,) if opening else ()))
     width = float(places[-1] - places[0]) * len(places) / (len(places) - 1)
     return LogSummary(
         source=recording.source,
         places=places,
         closing=closing,
         opening=opening,
-        speeds=tuple(one for curves in every for one in speed_classes(curves)),
+        speeds=tuple(speed_class for curves in ways for speed_class in speed_classes(curves)),
         mean=mean_interval(closing.values.mean(axis=1)),
         work=mean_interval(closing.work),
         drift=trend_interval(closing.values.mean(axis=1)),

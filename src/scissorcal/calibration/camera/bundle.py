@@ -198,20 +198,20 @@ class _Place:
         again, which leaves 6 views + p + 1 rows.
         """
         size, views = self.structure.spread.shape[1], len(self.poses)
-        own = np.zeros((6 * views, size + 6 * views + 1))
+        of_poses = np.zeros((6 * views, size + 6 * views + 1))
         common = []
         for index in range(views):
             turned = np.asarray(np.linalg.qr(self._robust(index, sd_px), mode="r"))
             six = slice(6 * index, 6 * index + 6)
-            own[six, :size], own[six, -1] = turned[:6, 6:-1], turned[:6, -1]
-            own[six, size + 6 * index : size + 6 * index + 6] = turned[:6, :6]
+            of_poses[six, :size], of_poses[six, -1] = turned[:6, 6:-1], turned[:6, -1]
+            of_poses[six, size + 6 * index : size + 6 * index + 6] = turned[:6, :6]
             common.append(turned[6:, 6:])
         prior = np.sqrt(self._precision(sd_px))[:, None]
         common.append(prior * np.column_stack([self.structure.spread, self.shared]))
         rest = np.asarray(np.linalg.qr(np.concatenate(common), mode="r"))
-        whole = np.zeros((len(own) + len(rest), own.shape[1]))
-        whole[: len(own)] = own
-        whole[len(own) :, :size], whole[len(own) :, -1] = rest[:, :-1], rest[:, -1]
+        whole = np.zeros((len(of_poses) + len(rest), of_poses.shape[1]))
+        whole[: len(of_poses)] = of_poses
+        whole[len(of_poses) :, :size], whole[len(of_poses) :, -1] = rest[:, :-1], rest[:, -1]
         if np.any(self.poses[:, 5] <= 0.0):
             whole[:, -1] = np.inf
         return whole[:, -1], whole[:, :-1]
@@ -256,9 +256,9 @@ class _Place:
             doubled = np.repeat(weight, 2)[:, None]
             inner = by_pose.T @ (doubled * by_pose)
             share = np.linalg.solve(inner, by_pose.T @ (doubled * by_shared)).T
-            own = by_shared - by_pose @ share.T
-            pulls = own * (doubled * residual.reshape(-1, 1))
-            information.append(curvature * own.T @ (doubled * by_shared))
+            less_pose = by_shared - by_pose @ share.T
+            pulls = less_pose * (doubled * residual.reshape(-1, 1))
+            information.append(curvature * less_pose.T @ (doubled * by_shared))
             scores.append(pulls.sum(axis=0))
             single = pulls.reshape(len(residual), 2, size).sum(axis=1)
             # The pose has taken up six of the residuals' degrees of freedom.

@@ -110,10 +110,10 @@ def _without_turn(rays: Array, camera: Camera, within: NDArray[np.bool_]) -> Arr
     """Slopes (n, 2, 9) of pixels by the camera's parameters, the best rotation taken out."""
     points = np.column_stack([np.nan_to_num(rays), np.ones(len(rays))])
     _, by_pose, by_camera = projected(points, np.zeros(6), camera.parameters)
-    turn, own = by_pose[:, :3], by_camera
+    turn, by_parameter = by_pose[:, :3], by_camera
     rows = np.repeat(within, 2)
-    absorbed, *_ = np.linalg.lstsq(turn[rows], own[rows], rcond=None)
-    return np.asarray((own - turn @ absorbed).reshape(-1, 2, 9))
+    absorbed, *_ = np.linalg.lstsq(turn[rows], by_parameter[rows], rcond=None)
+    return np.asarray((by_parameter - turn @ absorbed).reshape(-1, 2, 9))
 
 
 def _apart(
@@ -140,12 +140,12 @@ def _difference(pixels: Array, first: Array, second: Array, within: NDArray[np.b
     safe = np.nan_to_num(points)
     pose = np.zeros(6)
     for _ in range(_TURN_STEPS):
-        seen, by_pose, _ = projected(safe, pose, second)
+        image, by_pose, _ = projected(safe, pose, second)
         rows = np.repeat(used, 2)
-        step, *_ = np.linalg.lstsq(by_pose[rows][:, :3], (pixels - seen)[used].ravel(), rcond=None)
+        step, *_ = np.linalg.lstsq(by_pose[rows][:, :3], (pixels - image)[used].ravel(), rcond=None)
         pose[:3] += step
-    seen, _, _ = projected(safe, pose, second)
-    return np.asarray(np.where(np.isfinite(rays), seen - pixels, np.nan))
+    image, _, _ = projected(safe, pose, second)
+    return np.asarray(np.where(np.isfinite(rays), image - pixels, np.nan))
 
 
 def _judged(
@@ -156,7 +156,9 @@ def _judged(
     used = within & np.isfinite(difference).all(axis=1)
     moved = np.einsum("npi,di->dnp", slope[used], drawn)
     expected = np.mean(np.sum(moved**2, axis=2), axis=1)
-    seen = float(np.mean(np.sum(difference[used] ** 2, axis=1)))
+    squared = float(np.mean(np.sum(difference[used] ** 2, axis=1)))
     return CrossValidation(
-        float(np.sqrt(seen)), float(np.sqrt(expected.mean())), float(np.mean(expected >= seen))
+        float(np.sqrt(squared)),
+        float(np.sqrt(expected.mean())),
+        float(np.mean(expected >= squared)),
     )

@@ -218,9 +218,9 @@ def count_empty(
     least = EMPTY * float(np.quantile(list(torque.values()), THROUGH))
     rows = []
     for recording, sheet in dict.fromkeys(key[:2] for key in torque):
-        own = [value for key, value in torque.items() if key[:2] == (recording, sheet)]
+        levels = [value for key, value in torque.items() if key[:2] == (recording, sheet)]
         name = Path(recordings[recording].source or "the recording").name
-        rows.append(SheetStrokes(name, sheet, len(own), sum(value < least for value in own)))
+        rows.append(SheetStrokes(name, sheet, len(levels), sum(value < least for value in levels)))
     return tuple(rows)
 
 
@@ -303,9 +303,9 @@ def counted(
     sound = sum(tick * np.count_nonzero(good) for tick, good in zip(ticks, usable, strict=True))
     kept = under = moving = 0.0
     for motion in motions:
-        own = motion.usable & (np.diff(motion.source, prepend=-1) > 0)
-        below = own & (motion.sheet >= 0)
-        kept += motion.tick_s * np.count_nonzero(own)
+        counts = motion.usable & (np.diff(motion.source, prepend=-1) > 0)
+        below = counts & (motion.sheet >= 0)
+        kept += motion.tick_s * np.count_nonzero(counts)
         under += motion.tick_s * np.count_nonzero(below)
         moving += motion.tick_s * np.count_nonzero(below & ~motion.standing)
     return (

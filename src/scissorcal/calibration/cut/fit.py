@@ -338,8 +338,8 @@ def _knots(scouted: Scouted, geometry: Geometry) -> tuple[float, ...]:
         opening = motion.opening[piece.ends]
         contact = segments.rests[piece.rest].place - motion.advance[piece.ends]
         depths.append(geometry.depth_and_lever(geometry.edge, opening, contact)[0])
-    every = np.concatenate(depths)
-    pressed = every[every > 0.0]
+    all_depths = np.concatenate(depths)
+    pressed = all_depths[all_depths > 0.0]
     deepest = float(np.quantile(pressed, DEEPEST)) if len(pressed) else geometry.reference_m
     return tuple(float(f"{knot:.4g}") for knot in np.geomspace(deepest / SPAN, deepest, KNOTS))
 

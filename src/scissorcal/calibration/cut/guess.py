@@ -226,7 +226,7 @@ def _power_law(
 
 def _running_energy(data: MaterialData, runs: Sequence[Run], geometry: Geometry) -> float:
     """Median of m t torque / lever over closing, where that is no small share of its largest."""
-    found = []
+    energies = []
     for run in runs:
         motion = data.motions[run.motion]
         if motion.opening[run.high] >= motion.opening[run.low]:
@@ -236,8 +236,8 @@ def _running_energy(data: MaterialData, runs: Sequence[Run], geometry: Geometry)
         )
         if len(opening):
             view = geometry.running(opening)
-            found.append(geometry.moving_blades * view.slope / view.lever * torque)
-    energy = np.concatenate(found) if found else np.zeros(1)
+            energies.append(geometry.moving_blades * view.slope / view.lever * torque)
+    energy = np.concatenate(energies) if energies else np.zeros(1)
     large = energy[energy > 0.3 * np.quantile(energy, 0.9)]
     return float(max(np.median(large) if len(large) else 0.0, 1e-6))
 
@@ -308,11 +308,11 @@ def place_at_turn(
         ends = ends[opening[ends] < turn + (1.0 + 0.3) * length]
         if len(ends) < 4 or not np.all(motion.usable[low : ends[-1] + 1]):
             return place, False
-        seen, _ = mean_torque(motion, work, ends)
+        measured, _ = mean_torque(motion, work, ends)
         middle = 0.5 * (opening[ends[1:]] + opening[ends[:-1]])
         at = place - 0.5 * (motion.advance[ends[1:]] + motion.advance[ends[:-1]])
         expected, by_place = guess.torque(geometry, middle, at)
-        step = float(by_place @ (seen - expected)) / max(float(by_place @ by_place), 1e-12)
+        step = float(by_place @ (measured - expected)) / max(float(by_place @ by_place), 1e-12)
         place += float(np.clip(step, -2e-4, 2e-4))
         if abs(step) < 1e-7:
             break

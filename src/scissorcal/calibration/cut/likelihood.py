@@ -62,14 +62,14 @@ class CutLikelihood:
 
     def evaluate(self, values: Mapping[str, Array], response: Response) -> Evaluation:
         """Compare with parameters by name (scalars) and a response."""
-        found = Evaluation(*cut_log_likelihood(self.data, self._parameters(values, response)))
+        evaluation = Evaluation(*cut_log_likelihood(self.data, self._parameters(values, response)))
         if self.line is None:
-            return found
-        away = (found.log_period - self.line.log_period) / self.line.sd
+            return evaluation
+        away = (evaluation.log_period - self.line.log_period) / self.line.sd
         share = -0.5 * away**2 * self.data.line_weight
-        terms = found.terms.copy()
+        terms = evaluation.terms.copy()
         terms[self._elastic_count :] += share
-        return found._replace(total=found.total - 0.5 * away**2, terms=terms)
+        return evaluation._replace(total=evaluation.total - 0.5 * away**2, terms=terms)
 
     def log_likelihoods(self, values: Mapping[str, Array], response: Response) -> Array:
         """Log-likelihoods (k,) at parameters by name (k,), those of the response among them."""
@@ -260,12 +260,12 @@ def response_table(response: Response, reference_m: float) -> tuple[Array, Array
     depth, shapes = np.exp(log_depth), np.reshape(response.shape, (len(force), -1))
     rows = []
     for one_force, one_exponent, shape in zip(force, exponent, shapes, strict=True):
-        one = replace(response, force=one_force, exponent=one_exponent, shape=shape)
+        drawn = replace(response, force=one_force, exponent=one_exponent, shape=shape)
         held, energy = (
             np.maximum(some, np.finfo(np.float64).tiny)  # a trial exponent of 13 underflows
-            for some in (one.force_at(depth), one.energy_at(depth))
+            for some in (drawn.force_at(depth), drawn.energy_at(depth))
         )
-        rows.append((np.log(held), one.stiffness_at(depth) * depth / held, energy))
+        rows.append((np.log(held), drawn.stiffness_at(depth) * depth / held, energy))
     log_force, slope, energy = (np.stack(row) for row in zip(*rows, strict=True))
     return log_depth, log_force, slope, np.log(energy)
 

@@ -204,7 +204,7 @@ class _Builder:
         """Unloading from where the blades turned; a crack may have come to rest there."""
         motion = self.data.motions[run.motion]
         if self.cuts:
-            found = place_at_turn(
+            at_turn = place_at_turn(
                 motion,
                 self.data.materials[run.motion].work,
                 run,
@@ -212,10 +212,10 @@ class _Builder:
                 self.guess,
                 self.data.noise,
             )
-            if found is None:
+            if at_turn is None:
                 return
             turn = float(motion.opening[run.low]), float(motion.advance[run.low])
-            place, seen = found
+            place, seen = at_turn
             turned = bool(motion.usable[run.low])
             self.rests.append(Rest(self.sheet, False, place, *turn, seen and turned, turned))
             if not turned:
@@ -269,9 +269,9 @@ class _Builder:
         motion, geometry = self.data.motions[run.motion], self.geometry
         _, period = self.guess.tooth(geometry, motion.opening[low : run.high + 1])
         step = max(RUNNING_RAD, SEGMENT_CYCLES * period)
-        every = split(motion.opening, low, run.high, step)
+        all_ends = split(motion.opening, low, run.high, step)
         invalid = np.concatenate([[0], np.cumsum(~motion.usable)])
-        for ends in _parts(every, invalid):
+        for ends in _parts(all_ends, invalid):
             material = self.data.materials[run.motion]
             path, work = free_path(motion, material, geometry, ends)
             turned = np.diff(motion.opening[ends])

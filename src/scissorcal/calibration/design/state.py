@@ -183,7 +183,7 @@ def expected_cut(
     """
     fractures = ("none", "smooth", "rippled")
     laws = allowed_laws(recipe)
-    law = max(laws, key=lambda one: (fractures.index(one.fracture), one.loaded))
+    law = max(laws, key=lambda candidate: (fractures.index(candidate.fracture), candidate.loaded))
     basis = CutBasis.of(recipe, friction.known, edge)
     layout, prior = cut_prior(basis, law)
     geometry = basis.geometry
@@ -226,9 +226,9 @@ def sharing_of(recipe: Recipe, friction: FrictionState, cut: CutState) -> Sharin
     places = (names.index("offset_closing"), names.index("offset_opening"))
     floor = recipe.fit.cut.priors.friction_sd_floor_Nm
     if cut.knowledge.recordings:
-        own = np.einsum("ij,jk,ik->i", slopes, friction.knowledge.covariance, slopes)
+        variances = np.einsum("ij,jk,ik->i", slopes, friction.knowledge.covariance, slopes)
         stated = 1.0 / np.diag(cut.knowledge.prior)[list(places)]
-        rest = np.sqrt(np.maximum(stated - np.maximum(own, floor**2), 0.0))
+        rest = np.sqrt(np.maximum(stated - np.maximum(variances, floor**2), 0.0))
     else:
         rest = np.full(2, np.sqrt(2.0) * (friction.zero_sd or 0.0))
     return Sharing(slopes, places, floor, rest)

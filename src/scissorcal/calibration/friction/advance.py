@@ -283,8 +283,8 @@ def find_actuation(recordings: tuple[Recording, ...], cutoff_Hz: float) -> Actua
 
     starts = [np.array([delay, lag]) for delay in DELAYS for lag in LAGS]
     best = min(starts, key=badness)
-    found = minimize(badness, best, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6})
-    return Actuation(*np.abs(found.x).tolist())
+    fitted = minimize(badness, best, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6})
+    return Actuation(*np.abs(fitted.x).tolist())
 
 
 def _columns(windows: Windows) -> Array:

@@ -54,21 +54,21 @@ def choose_law(
     compared: list[FittedCandidate] = []
     by_name: dict[str, FittedCandidate] = {}
     passed: dict[str, float] = {}
-    every, laws = laws, []
-    for index, law in enumerate(every):
+    all_laws, laws = laws, []
+    for index, law in enumerate(all_laws):
         plain = by_name.get(law.name.replace(BUILD_UP, ""))
         if plain is not None and law.name not in by_name:
             gain = _gain_of_build_up(plain, law)
             if gain < POSITIVE_EVIDENCE:
                 passed[law.name] = gain
                 continue
-        tell(0.6 * index / len(every), f"friction: trying {law.name}")
+        tell(0.6 * index / len(all_laws), f"friction: trying {law.name}")
         laws.append(law)
         compared.append(fit_candidate(law.candidate(law.observed), law.series, law.strokes, stop))
         by_name[law.name] = compared[-1]
     drive = _rms(laws[0].observed)
     chosen = choose(compared, drive, lack_of_fit)
-    place = next(i for i, one in enumerate(compared) if one.candidate is chosen.candidate)
+    place = next(i for i, entry in enumerate(compared) if entry.candidate is chosen.candidate)
     law = replace(laws[place], share=chosen.candidate.share)
     likelihood, point = chosen.candidate.likelihood, chosen.optimum.point
     if _rms(likelihood.residuals(point)) < lack_of_fit * drive:

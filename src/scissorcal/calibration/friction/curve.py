@@ -68,8 +68,8 @@ def friction_curve(fit: FitResult) -> FrictionCurve | None:
 def partial_residuals(fit: FitResult) -> Array:
     """What was measured less all of the model but friction, (n,)."""
     series = fit.series
-    own = _friction_at(fit, fit.map_point[:, None], series.opening, series.opening_rate)
-    return np.asarray(own + series.measured - series.predicted)
+    friction = _friction_at(fit, fit.map_point[:, None], series.opening, series.opening_rate)
+    return np.asarray(friction + series.measured - series.predicted)
 
 
 def friction_map(fit: FitResult) -> FrictionMap | None:
@@ -109,15 +109,15 @@ def _draws(fit: FitResult, most: int) -> Array:
 def _residuals(fit: FitResult, rate: Array, opening: Array, reach: float) -> Array:
     series = fit.series
     residual = np.sign(series.opening_rate) * (series.measured - series.predicted)
-    found = np.full(len(rate), np.nan)
+    means = np.full(len(rate), np.nan)
     for place, (w, theta) in enumerate(zip(rate, opening, strict=True)):
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = series.opening_rate / w
         near = (ratio > NEAR_SPEED[0]) & (ratio < NEAR_SPEED[1])
         near &= np.abs(series.opening - theta) <= reach
         if np.count_nonzero(near) >= FEWEST_SAMPLES:
-            found[place] = np.mean(residual[near])
-    return found
+            means[place] = np.mean(residual[near])
+    return means
 
 
 def _center(fit: FitResult) -> float:

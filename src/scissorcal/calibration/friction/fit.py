@@ -182,8 +182,8 @@ def friction_experiment(
     joint = recordings[0].joint
     cleaned, zero = _cleaned(recordings, settings, simulated=False)
     usable = inspect_sensors(recordings).usable
-    every = _slid(steadiness(recordings), cleaned, settings.cutoff_Hz, usable)
-    windows = every.where(every.bins.moving)
+    whole = _slid(steadiness(recordings), cleaned, settings.cutoff_Hz, usable)
+    windows = whole.where(whole.bins.moving)
     settings = with_probed(settings, SlowFriction.of(recordings, windows.bins, settings))
     zero_sd = zero.sd if zero and _has_offset(fit) else None
     choice = LawChoice.of(fit.structure, zero_sd)
@@ -227,12 +227,12 @@ def _diagnostics(
     point = chosen.optimum.point
     noise = sample_noise(law, point, idle_noise(recordings))
     probe = newest_probe(recording.device for recording in recordings)
-    seen = probe.facts if probe else {}
+    facts = probe.facts if probe else {}
     residuals = chosen.candidate.likelihood.residuals(point)
     return {
         "window_lengthening": law.windows.lengthening,
         "jackknife_sd": jackknife(law, point, NUISANCE),
-        **({PRESLIDING: seen[PRESLIDING]} if PRESLIDING in seen else {}),
+        **({PRESLIDING: facts[PRESLIDING]} if PRESLIDING in facts else {}),
         **(between.diagnostics() if between else {}),
         **noise_diagnostics(noise),
         "stroke_offset_sd_Nm": stroke_offsets(residuals, law.strokes, law.windows, noise),
@@ -261,8 +261,8 @@ def _bandwidth(
             f"fit.friction.cutoff_Hz to {longer_Hz:.3g} or less, or log at a higher rate."
         )
         return BANDWIDTH.verdict("fail", None, why)
-    every = weighed(other_Hz)
-    windows = every.where(every.bins.moving)
+    whole = weighed(other_Hz)
+    windows = whole.where(whole.bins.moving)
     if len(windows.first) < FEWEST_BINS:
         why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
         return BANDWIDTH.not_evaluated(why)

@@ -204,15 +204,15 @@ def half_width(errors: Array, units: Integers, level: float, freedom: float) -> 
     order = np.argsort(size, kind="stable")
     size, unit, count = size[order], unit[order], len(labels)
     mass = 1.0 / (counts[unit] * count)
-    found = _quantile(size, mass, level)
+    width = _quantile(size, mass, level)
     if enough(count, level):
-        held = count * np.bincount(unit, mass * (size <= found), count)
+        held = count * np.bincount(unit, mass * (size <= width), count)
         rho = min(float(np.mean((held - level) ** 2)) / (level * (1.0 - level)), 1.0)
         return _quantile(size, mass, min(level * (1.0 + rho / count), 1.0)), True
     tail = 0.5 + 0.5 * level
     student = float(t.ppf(tail, max(freedom, 1.0)))
     rms = float(np.sqrt(np.sum(mass * size**2)))
-    return max(found * student / float(norm.ppf(tail)), rms * student), False
+    return max(width * student / float(norm.ppf(tail)), rms * student), False
 
 
 def enough(count: int, level: float) -> bool:
@@ -301,7 +301,7 @@ class _Folds:
         """
         if len(self.recordings) < 2:
             return 1.0
-        shift, own = 0.0, 0.0
+        shift, residual = 0.0, 0.0
         for label in self.recordings:
             here = self.design.bins.recording == label
             strokes = self.of_recording(label)
@@ -309,9 +309,9 @@ class _Folds:
             shift += float(
                 np.mean((by_itself - self.design.mean(self.without(strokes)))[here] ** 2)
             )
-            own += float(np.mean((self.design.observed - by_itself)[here] ** 2))
+            residual += float(np.mean((self.design.observed - by_itself)[here] ** 2))
         count = len(self.recordings)
-        return (shift + own) ** 2 / (shift**2 / count + own**2 / len(self.strokes))
+        return (shift + residual) ** 2 / (shift**2 / count + residual**2 / len(self.strokes))
 
     def without(self, left_out: Integers) -> Array:
         """The optimum (p,) without some strokes."""

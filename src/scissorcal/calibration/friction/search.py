@@ -124,8 +124,8 @@ def _least_squares(problem: CandidateProblem, point: Array) -> tuple[Array, int]
         root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * size
         return root[:, -1], root[:, :-1]
 
-    found, _ = least_squares(evaluate, point[:-1])
-    return np.clip(found, problem.lower[:-1], problem.upper[:-1]), count
+    solution, _ = least_squares(evaluate, point[:-1])
+    return np.clip(solution, problem.lower[:-1], problem.upper[:-1]), count
 
 
 def _with_best_noise(problem: CandidateProblem, point: Array) -> Array:
@@ -160,14 +160,14 @@ def _scanned(problem: CandidateProblem) -> list[Array]:
     rates: list[int | None] = [None]
     if slow is not None:
         rates = list(_scan(problem, slow, basis.stribeck.spacing))
-    found = []
+    scanned = []
     for rate, length in product(rates, lengths):
         cell: Cell = (() if rate is None else (rate,), (length,))
-        found.append((_free_squares(law, problem.starts[0], cell), rate, length))
-    found.sort(key=lambda end: end[0])
+        scanned.append((_free_squares(law, problem.starts[0], cell), rate, length))
+    scanned.sort(key=lambda end: end[0])
     starts: list[Array] = []
     taken: list[int] = []
-    for _, rate, length in found:
+    for _, rate, length in scanned:
         if any(abs(length - other) * basis.lag.spacing < 1.5 * SCAN_STEP for other in taken):
             continue
         taken.append(length)

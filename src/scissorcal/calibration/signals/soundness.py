@@ -49,14 +49,14 @@ def refuse_unsound(recordings: tuple[Recording, ...]) -> None:
 
 def farthest_torque(recordings: tuple[Recording, ...]) -> str:
     """The sample whose torque lies farthest from the median of its recording, in words."""
-    found = []
+    torques = []
     for recording in recordings:
         torque = np.asarray(recording.samples["motor_torque"], dtype=np.float64)
         away = np.abs(torque - np.median(torque))
         at = int(np.argmax(away))
         words = f"{_name(recording)}, sample {at}: {torque[at]:.4g} N m"
-        found.append((float(away[at]), words))
-    return max(found)[1]
+        torques.append((float(away[at]), words))
+    return max(torques)[1]
 
 
 def _refuse_values(recording: Recording) -> None:
@@ -90,7 +90,7 @@ def _refuse_two_rigs(recordings: tuple[Recording, ...]) -> None:
                 "recordings of each rig in a separate workspace; if it is one rig, import the "
                 "log again with --handle-radius-mm."
             )
-    seen = {
+    rigs = {
         str(
             recording.device["serial"]
         ): f"{_name(recording)} ({recording.device.get('name', 'rig')}, serial number "
@@ -98,8 +98,8 @@ def _refuse_two_rigs(recordings: tuple[Recording, ...]) -> None:
         for recording in reversed(recordings)
         if recording.device.get("serial")
     }
-    if len(seen) > 1:
-        one, another, *_ = reversed(seen.values())
+    if len(rigs) > 1:
+        one, another, *_ = reversed(rigs.values())
         raise InputError(
             f"{one} and {another} are of two rigs, and one fit is of one rig: fit the recordings "
             "of each rig in another workspace, or exclude those of one."
@@ -107,23 +107,23 @@ def _refuse_two_rigs(recordings: tuple[Recording, ...]) -> None:
 
 
 def _refuse_copied_recordings(recordings: tuple[Recording, ...]) -> None:
-    seen: dict[bytes, str] = {}
+    sources: dict[bytes, str] = {}
     for recording in recordings:
         motion = [np.asarray(recording.samples[name], dtype=np.float64) for name in _CHANNELS[:3]]
         if len(np.unique(motion[1])) < FEWEST_LEVELS:
             continue
         key = hashlib.sha256(b"".join(channel.tobytes() for channel in motion)).digest()
-        if key in seen:
+        if key in sources:
             raise InputError(
-                f"{_name(recording)} and {seen[key]} are the same recording: every opening and "
+                f"{_name(recording)} and {sources[key]} are the same recording: every opening and "
                 "torque is equal to the last digit. Remove one of them; it would count as a second "
                 "measurement."
             )
-        seen[key] = _name(recording)
+        sources[key] = _name(recording)
 
 
 def _refuse_copies(recordings: tuple[Recording, ...]) -> None:
-    seen: dict[bytes, str] = {}
+    keys: dict[bytes, str] = {}
     for recording in recordings:
         stroke = np.asarray(recording.samples["stroke"], dtype=np.int64)
         edges = np.flatnonzero(np.diff(stroke)) + 1
@@ -135,13 +135,13 @@ def _refuse_copies(recordings: tuple[Recording, ...]) -> None:
             force = np.asarray(recording.samples["handle_force"][low:high], dtype=np.float64)
             key = hashlib.sha256(opening.tobytes() + torque.tobytes() + force.tobytes()).digest()
             here = f"stroke {stroke[low]} of {_name(recording)}"
-            if key in seen:
+            if key in keys:
                 raise InputError(
-                    f"{here} is a copy of {seen[key]}: every opening and torque is the same to the "
+                    f"{here} is a copy of {keys[key]}: every opening and torque is the same to the "
                     "last digit, which no sensor with noise gives twice. Remove the copy; it would "
                     "count as a second measurement."
                 )
-            seen[key] = here
+            keys[key] = here
 
 
 def _name(recording: Recording) -> str:
@@ -212,7 +212,7 @@ def interruptions(recordings: tuple[Recording, ...]) -> Interruptions:
         strokes += len(recording.strokes)
         interrupted += len(hit)
         late += sum(hit.values())
-    worst = max((float(np.mean(found)) for found in kinds.values()), default=0.0)
+    worst = max((float(np.mean(hits)) for hits in kinds.values()), default=0.0)
     return Interruptions(strokes, interrupted, worst, late)
 
 
@@ -226,15 +226,15 @@ def _interrupted(recording: Recording) -> dict[int, bool]:
     faulty = (flags & int(StateFlag.FAULT_LATCHED)) != 0
     latched: NDArray[np.intp] = np.flatnonzero(faulty[1:] & ~faulty[:-1]) + 1
     planned = np.flatnonzero(label >= 0)
-    found: dict[int, bool] = {}
+    late_strokes: dict[int, bool] = {}
     for at in latched:
         place = int(np.searchsorted(planned, at))
         before = int(label[planned[place - 1]]) if place else -1
         later = int(label[planned[place]]) if place < len(planned) else -1
         if before >= 0 and (before == later or label[at - 1] == before):
             late = bool(flags[at] & int(StateFlag.COMMANDS_LOST))
-            found[before] = found.get(before, True) and late
-    return found
+            late_strokes[before] = late_strokes.get(before, True) and late
+    return late_strokes
 
 
 ENDS = 0.1

@@ -82,15 +82,15 @@ class Windows:
         ``columns`` (samples) gives them at a stretch of samples, a block of windows at a time, so
         that columns which are worked out from the samples take no memory for all of them.
         """
-        found = np.empty((len(columns(slice(0, 0))), len(self.first)))
+        averages = np.empty((len(columns(slice(0, 0))), len(self.first)))
         for low in range(0, len(self.first), WINDOWS_AT_ONCE):
             windows = slice(low, low + WINDOWS_AT_ONCE)
             first = self.first[windows]
             samples = slice(int(first[0]), int(first[-1]) + len(self.weights))
             over = _over(first - samples.start, self.weights)
-            for row, column in zip(found, columns(samples), strict=True):
+            for row, column in zip(averages, columns(samples), strict=True):
                 row[windows] = over(column)
-        return found
+        return averages
 
     @property
     def bears_load(self) -> bool:
@@ -140,7 +140,7 @@ def weigh(
     if not recordings:
         raise InputError("There is no recording to fit: capture or import one first.")
     loaded = all(np.isfinite(recording.handle_radius_m) for recording in recordings)
-    found: list[tuple[int, tuple[int, int], Motion]] = []
+    parts: list[tuple[int, tuple[int, int], Motion]] = []
     filled: list[Recording] = []
     for index, recording in enumerate(recordings):
         good = np.ones(len(recording.samples), dtype=bool) if usable is None else usable[index]
@@ -151,16 +151,16 @@ def weigh(
             motion = _motion(
                 bridged.recording, (low, high), cutoff_Hz, bridged.usable[low:high], error
             )
-            found.append((index, (low, high), motion))
-    if not found:
+            parts.append((index, (low, high), motion))
+    if not parts:
         raise no_piece(recordings)
-    motions = [motion for _, _, motion in found]
+    motions = [motion for _, _, motion in parts]
     asked = _common_knot(recordings, window_Hz or cutoff_Hz)
     knot = asked if window_Hz else longer_knot(motions, asked)
     strokes = np.cumsum([0, *(len(recording.strokes) for recording in recordings)]).tolist()
     pieces: list[Windows] = []
     samples = 0
-    for number, ((index, (low, high), _), motion) in enumerate(zip(found, motions, strict=True)):
+    for number, ((index, (low, high), _), motion) in enumerate(zip(parts, motions, strict=True)):
         numbers = (index, strokes[index], number)
         piece = _weigh_piece(filled[index], (low, high), motion, knot, cutoff_Hz, numbers)
         shifted = replace(piece, first=piece.first + samples, starts=piece.starts + samples)

@@ -248,11 +248,11 @@ def idle_zero(recordings: tuple[Recording, ...]) -> Zero | None:
     spans = [(recording, span) for recording in recordings for span in _idle_spans(recording)]
     if not spans:
         return None
-    every = np.concatenate(
+    drive = np.concatenate(
         [replace(one, samples=one.samples[span]).drive_effort for one, span in spans]
     )
     seconds = sum(_tick(recording) * (span.stop - span.start) for recording, span in spans)
-    return Zero(float(every.mean()), _standard_error(every, seconds), seconds)
+    return Zero(float(drive.mean()), _standard_error(drive, seconds), seconds)
 
 
 def idle_noise(recordings: tuple[Recording, ...]) -> float:
