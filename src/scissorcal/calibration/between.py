@@ -192,7 +192,7 @@ def compare_recordings(
 
     def others(here: Mask) -> Array:
         left = law.without(np.unique(design.strokes[here]))
-        return np.asarray(search_from(replace(problem, reduced=left), point).point)
+        return np.asarray(search_from(replace(problem, reduced=left), point)[0].point)
 
     return gather_recordings(design, point, recordings, (alone, others), usual, rng)
 
@@ -279,7 +279,7 @@ def jackknife(
         rest = law.without(labels[group])
         repeated &= np.diag(rest.information(point)) > REPEATED * information
         others = replace(problem, reduced=rest)
-        left.append(design.layout.columns(search_from(others, point).point))
+        left.append(design.layout.columns(search_from(others, point)[0].point))
     size = np.array([[law.counted / counts[group].sum()] for group in groups])
     pseudo = size * full - (size - 1.0) * np.stack(left)
     centre = np.sum(pseudo / size, axis=0)

@@ -13,7 +13,6 @@ from scissorcal.calibration.camera.bundle import (
     SHARED,
     Bundle,
     SeenBoard,
-    Structure,
     fit_bundle,
     fit_pose,
 )
@@ -185,25 +184,26 @@ FOLDS = 5
 _SQUARE = (("fx", "fy"), ("cx",), ("cy",))
 
 
-def _structure(*camera: tuple[str, ...]) -> Structure:
+def _free(*camera: tuple[str, ...]) -> Array:
+    """How the shared parameters move (11, p) with groups of the camera's and the two bulges."""
     groups = (*camera, ("bulge_x",), ("bulge_y",))
     spread = np.zeros((len(SHARED), len(groups)))
     for column, group in enumerate(groups):
         for name in group:
             spread[SHARED.index(name), column] = 1.0
-    return Structure(tuple(group[0] if len(group) == 1 else "f" for group in groups), spread)
+    return spread
 
 
-CANDIDATES: tuple[tuple[str, Structure], ...] = (
-    ("no distortion", _structure(*_SQUARE)),
-    ("k1", _structure(*_SQUARE, ("k1",))),
-    ("k1, k2", _structure(*_SQUARE, ("k1",), ("k2",))),
-    ("k1, k2, p1, p2", _structure(*_SQUARE, ("k1",), ("k2",), ("p1",), ("p2",))),
+CANDIDATES: tuple[tuple[str, Array], ...] = (
+    ("no distortion", _free(*_SQUARE)),
+    ("k1", _free(*_SQUARE, ("k1",))),
+    ("k1, k2", _free(*_SQUARE, ("k1",), ("k2",))),
+    ("k1, k2, p1, p2", _free(*_SQUARE, ("k1",), ("k2",), ("p1",), ("p2",))),
     (
         "k1, k2, p1, p2, oblong pixels",
-        _structure(*((name,) for name in PARAMETERS if name != "k3")),
+        _free(*((name,) for name in PARAMETERS if name != "k3")),
     ),
-    ("k1, k2, p1, p2, k3, oblong pixels", _structure(*((name,) for name in PARAMETERS))),
+    ("k1, k2, p1, p2, k3, oblong pixels", _free(*((name,) for name in PARAMETERS))),
 )
 """Pixels are square (fx = fy) in all but the last two. The board may bulge in every candidate."""
 
@@ -220,34 +220,32 @@ def compare_cameras(
     over the squared stretch that :func:`camera_covariance` finds.
     """
     shared, bundles = start, []
-    for _, structure in CANDIDATES:
-        bundles.append(fit_bundle(views, structure, shared))
+    for _, spread in CANDIDATES:
+        bundles.append(fit_bundle(views, spread, shared))
         shared = bundles[-1].shared
     densities, errors = [], []
-    for index, (name, structure) in enumerate(CANDIDATES):
+    for index, (name, spread) in enumerate(CANDIDATES):
         tell(0.8 * index / len(CANDIDATES), f"camera: {name}")
-        residuals = _unseen_residuals(views, structure, bundles[index])
+        residuals = _unseen_residuals(views, spread, bundles[index])
         densities.append([_log_density(residual, bundles[-1].sd_px) for residual in residuals])
         errors.append(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2) * 2.0)))
     share = camera_covariance(bundles[-1])[1] ** -2
     rows = compare(
         [name for name, _ in CANDIDATES],
-        [len(structure.names) for _, structure in CANDIDATES],
+        [spread.shape[1] for _, spread in CANDIDATES],
         [Account(share * np.array(densities))],
     )
     return tuple(zip(rows, bundles, errors, strict=True))
 
 
-def _unseen_residuals(
-    views: Sequence[SeenBoard], structure: Structure, whole: Bundle
-) -> list[Array]:
+def _unseen_residuals(views: Sequence[SeenBoard], spread: Array, whole: Bundle) -> list[Array]:
     """Residuals of each photograph under a camera fitted without it; its pose is its own."""
     folds = min(FOLDS, len(views))
     found: list[Array] = [np.empty((0, 2))] * len(views)
     for fold in range(folds):
         seen = [index for index in range(len(views)) if index % folds != fold]
         trained = fit_bundle(
-            [views[index] for index in seen], structure, whole.shared, whole.poses[seen]
+            [views[index] for index in seen], spread, whole.shared, whole.poses[seen]
         )
         for index in range(fold, len(views), folds):
             found[index] = fit_pose(views[index], trained.shared, whole.poses[index])

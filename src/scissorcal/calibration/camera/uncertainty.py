@@ -30,7 +30,6 @@ def camera_covariance(bundle: Bundle, stretch: float | None = None) -> tuple[Arr
     the variances over C's, and C is multiplied by it. Its root, the stretch of standard errors,
     comes second; ``stretch`` gives it where it is known from elsewhere.
     """
-    structure = bundle.structure
     back = np.linalg.inv(np.linalg.cholesky(bundle.information.sum(axis=0) + bundle.prior))
     noise = back @ (bundle.noise + bundle.sd_px**2 * bundle.prior) @ back.T
     if stretch is None:
@@ -43,7 +42,7 @@ def camera_covariance(bundle: Bundle, stretch: float | None = None) -> tuple[Arr
         ratio = float(np.trace(np.linalg.solve(noise, pulls.T @ pulls))) / len(back)
         stretch = float(np.sqrt(max(ratio, 1.0)))
     single = back.T @ noise @ back
-    own = structure.spread[: len(PARAMETERS)]
+    own = bundle.spread[: len(PARAMETERS)]
     return stretch**2 * own @ single @ own.T, stretch
 
 
@@ -57,8 +56,7 @@ def halves(views: Sequence[SeenBoard], bundle: Bundle) -> tuple[Bundle, Bundle] 
     if len(views) < FEWEST_TO_HALVE:
         return None
     first, second = (
-        fit_bundle(views[at::2], bundle.structure, bundle.shared, bundle.poses[at::2])
-        for at in (0, 1)
+        fit_bundle(views[at::2], bundle.spread, bundle.shared, bundle.poses[at::2]) for at in (0, 1)
     )
     return first, second
 

@@ -318,9 +318,8 @@ class _Folds:
         candidate = self.design.candidate(self.design.observed)
         assert candidate.reduced is not None
         problem = candidate.problem(self.design.series)
-        return search_from(
-            replace(problem, reduced=candidate.reduced.without(left_out)), self.point
-        ).point
+        others = replace(problem, reduced=candidate.reduced.without(left_out))
+        return search_from(others, self.point)[0].point
 
 
 def _values(fit: FitResult) -> dict[str, Array]:

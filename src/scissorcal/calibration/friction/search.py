@@ -1,6 +1,5 @@
 """The optimum of a friction law by least squares over products of its columns."""
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -26,15 +25,6 @@ SCANNED_STARTS = 2
 RIDGE = 1e-10
 
 
-@dataclass(frozen=True)
-class LocalOptimum:
-    """Where a search from one start ended: point (p,) and log-posterior."""
-
-    point: Array
-    value: float
-    evaluations: int
-
-
 def search(problem: CandidateProblem) -> Optimum:
     """Maximise the log-posterior of a law from the problem's starts and from scans of its scales.
 
@@ -43,13 +33,14 @@ def search(problem: CandidateProblem) -> Optimum:
     places are starts too.
     """
     starts = [*problem.starts, *_scanned(problem)]
-    ended = [search_from(problem, start) for start in starts]
+    searched = [search_from(problem, start) for start in starts]
+    ended = [end for end, _ in searched]
     best = max(ended, key=lambda end: end.value)
     agreeing = sum(end.value > best.value - SAME_HEIGHT for end in ended)
     optima: list[Cluster] = []
     for end in sorted(ended, key=lambda end: -end.value):
         if all(np.abs((end.point - c.point) / problem.prior_sd).max() > 1e-3 for c in optima):
-            optima.append(Cluster(end.point, end.value, 1, True))
+            optima.append(end)
     optima = [c for i, c in enumerate(optima) if i == 0 or _dips(problem, optima[0], c)]
     status, concerns = _status(problem, best.point)
     sentence = about(status, concerns)
@@ -62,15 +53,15 @@ def search(problem: CandidateProblem) -> Optimum:
         sentence=sentence,
         agreeing=agreeing,
         starts=len(ended),
-        evaluations=sum(end.evaluations for end in ended),
+        evaluations=sum(evaluations for _, evaluations in searched),
         status=status,
         optima=tuple(optima),
         concerns=concerns,
     )
 
 
-def search_from(problem: CandidateProblem, start: Array) -> LocalOptimum:
-    """Maximise the log-posterior from one start (p,).
+def search_from(problem: CandidateProblem, start: Array) -> tuple[Cluster, int]:
+    """Maximise the log-posterior from one start (p,); with the number of evaluations.
 
     Least squares over the law's coefficients and the best noise for what they leave follow each
     other until the log-posterior stays.
@@ -87,7 +78,7 @@ def search_from(problem: CandidateProblem, start: Array) -> LocalOptimum:
             point, value = reached, height
         if not gained > ARRIVED:
             break
-    return LocalOptimum(point, value, evaluations)
+    return Cluster(point, value, 1, True), evaluations
 
 
 def _law(problem: CandidateProblem) -> ReducedLaw:

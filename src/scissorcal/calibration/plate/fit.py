@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +11,12 @@ from scissorcal.calibration.plate.checks import camera_verdict, plate_verdicts
 from scissorcal.calibration.plate.result import PlateFit, PoseHalves, PoseView
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recipe.priors import PlatePriors
+from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.targets.detect import Detection
-
-if TYPE_CHECKING:
-    from scissorcal.recipe.schema import Recipe
-
 
 UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _EXACT_PRINT = {"print_scale_sd_percent": 0.0}
@@ -99,7 +95,7 @@ def fit_plate(
     )
 
 
-def plate_target(recipe: "Recipe") -> Pose:
+def plate_target(recipe: Recipe) -> Pose:
     """T_plate_target of the recipe: printed y runs down and z into the sheet, hence the half turn
     about x."""
     x, y = (1e-3 * value for value in recipe.plate.place_mm)
