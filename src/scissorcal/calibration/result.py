@@ -87,6 +87,22 @@ class Result:
 
 
 @dataclass(frozen=True)
+class Header:
+    """What a stored result is of: enough for its state, without its arrays.
+
+    ``model`` is the chosen candidate model in words, ``failed`` names the checks that failed,
+    ``origin`` is "fitted" or "imported"; ``effort`` is empty where a result has none.
+    """
+
+    what: str
+    effort: str
+    model: str
+    inputs_hash: str
+    failed: tuple[str, ...]
+    origin: str = "fitted"
+
+
+@dataclass(frozen=True)
 class StrokeError:
     """Hold-out error: one stroke as predicted by a fit without it.
 

@@ -10,7 +10,7 @@ bytes. A result without arrays may be kept as plain JSON, in a file that ends in
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from dataclasses import asdict, fields, is_dataclass, replace
 from functools import cache
 from io import BytesIO
 from operator import attrgetter
@@ -32,7 +32,7 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.result import FitResult, Result, Stored
+from scissorcal.calibration.result import FitResult, Header, Result, Stored
 from scissorcal.errors import InputError, OtherKindError, ScissorcalError
 from scissorcal.files import replacing
 from scissorcal.foreign import Format, parse_isolated, read_foreign, read_json
@@ -65,22 +65,6 @@ FITS = ("friction", "friction-advance", "cut", "camera", "blade", "plate")
 """Names of the files that fits have in a workspace, without ".nc"."""
 _LOAD = "scissorcal.calibration.store_contents:load_contents"
 _SEAL_SIZE = len(FIT_SEAL) + 64 + 1
-
-
-@dataclass(frozen=True)
-class Header:
-    """What a stored result is of: enough for its state, without its arrays.
-
-    ``model`` is the chosen candidate model in words, ``failed`` names the checks that failed,
-    ``origin`` is "fitted" or "imported"; ``effort`` is empty where a result has none.
-    """
-
-    what: str
-    effort: str
-    model: str
-    inputs_hash: str
-    failed: tuple[str, ...]
-    origin: str = "fitted"
 
 
 def save(result: Result, path: Path) -> None:
