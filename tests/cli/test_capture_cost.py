@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.device.advance_trajectory import advance_plan
 from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.trajectory import Plan, friction_plan
+from scissorcal.device.trajectory import Plan, advance_plan, friction_plan
 from scissorcal.errors import InputError
 from scissorcal.recipe.library import builtin_recipe
 from scissorcal.recipe.load import parse_recipe

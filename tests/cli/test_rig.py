@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.diagnosis import diagnose
-from scissorcal.device.doctor import Examination
+from scissorcal.device.doctor import Examination, diagnose
 from scissorcal.device.link import PortLink
 from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.sim.faults import Faults
 from scissorcal.device.sim.process import SimProcess
+from scissorcal.device.sim.sensors import Faults
 from tests.device.in_step import in_step, patient
 from tests.device.test_doctor import SOUND
 

@@ -11,10 +11,10 @@ from scissorcal.calibration.signals.steadiness import steadiness
 from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.capture_gains import Probed, capture_gains
 from scissorcal.device.control import Axis, Gains, greatest_fall
+from scissorcal.device.control_design import StribeckFall
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.probe import probe
 from scissorcal.device.session import RigSession
-from scissorcal.device.slow_sliding import StribeckFall
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
 from scissorcal.workday.runs.sweep_speeds import with_usable_sweeps

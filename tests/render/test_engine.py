@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.session import Operator, RigSession
-from scissorcal.device.sim.faults import Faults
+from scissorcal.device.sim.sensors import Faults
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability, ConfigKey, Identity, StateFlag
 from scissorcal.package import ModelPackage

@@ -28,11 +28,10 @@ from tests.second_rig.simulate import BRAKE, HAND, OFF, SERVO
 HERE = Path(__file__).parent
 ALLOWED = {
     "scissorcal.aliases",
-    "scissorcal.device.advance_trajectory",
-    "scissorcal.device.rig_record",
+    "scissorcal.device.trajectory",
+    "scissorcal.device.session",
     "scissorcal.device.cut_trajectory",
     "scissorcal.device.hand",
-    "scissorcal.device.trajectory",
     "scissorcal.kernel",
     "scissorcal.recipe.library",
     "scissorcal.recipe.schema",

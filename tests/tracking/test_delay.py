@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
-from scissorcal.tracking.delay import DelayFit, _last, measure_delay
+from scissorcal.tracking.judge import DelayFit, _last, measure_delay
 from scissorcal.tracking.rows import CameraPose
 
 

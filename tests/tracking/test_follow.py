@@ -16,7 +16,7 @@ from scissorcal.errors import DeviceError
 from scissorcal.model.surface import Plane
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PoseFollower
-from scissorcal.tracking.rotation import pose_error
+from scissorcal.tracking.plate_pose import pose_error
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.tracker import Outcome
 

@@ -28,7 +28,7 @@ from scissorcal.render import (
 )
 from scissorcal.render.admission import rendered_tables
 from scissorcal.tracking.contacts import TipContacts
-from scissorcal.tracking.rotation import pose_error
+from scissorcal.tracking.plate_pose import pose_error
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import PicturePose
 from scissorcal.vision.live import Frame

@@ -16,12 +16,11 @@ import pytest
 
 from scissorcal.aliases import Array
 from scissorcal.device import capture as rig_capture
-from scissorcal.device.crossing import Blade
+from scissorcal.device.cut_trajectory import Blade
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.session import RigSession
-from scissorcal.device.sim.blade import blade_on
+from scissorcal.device.sim.blade import Sheet, blade_on
 from scissorcal.device.sim.cutting import Cut
-from scissorcal.device.sim.material import Sheet
 from scissorcal.device.sim.specimen import Specimen
 from scissorcal.errors import InputError
 from scissorcal.kernel import Kernel

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.control.contours import Foot, contour_at, foot_of
 from scissorcal.control.control_result import (
     ControlResult,
     control_figures,
@@ -15,11 +14,20 @@ from scissorcal.control.control_result import (
 )
 from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.path_file import SurfacePoints
-from scissorcal.control.plate_request import put_plate, refuse_nobody
-from scissorcal.control.settings import LIFT_M, Material, Settings, control_settings
+from scissorcal.control.settings import (
+    LIFT_M,
+    Material,
+    Settings,
+    control_settings,
+    put_plate,
+    refuse_nobody,
+)
 from scissorcal.control.surface_path import (
     ContourMap,
+    Foot,
     TimedPath,
+    contour_at,
+    foot_of,
     map_contour,
     start_foot,
     time_path,
@@ -29,8 +37,8 @@ from scissorcal.device.capture_gains import Probed, capture_gains
 from scissorcal.device.loading import is_simulator
 from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import LoopTask, Motion, Samples
-from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder, Reference
+from scissorcal.device.port_motion import open_motion
 from scissorcal.device.session import RigSession
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import CONTROL_DTYPE, ConfigKey, ControlFlag

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.control.contact_loop import ContactGains, ContactLoop, contact_decays
-from scissorcal.control.contours import Foot
 from scissorcal.control.gains import HybridGains, choose_gains, friction_rates
 from scissorcal.control.mechanics import (
     FASTEST_m_per_s,
@@ -15,9 +14,12 @@ from scissorcal.control.mechanics import (
     axis_friction,
     contact_loop,
 )
-from scissorcal.control.surface_path import TimedPath
+from scissorcal.control.surface_path import Foot, TimedPath
+from scissorcal.device.loading import Confirm, is_simulator
+from scissorcal.device.motion import Motion
+from scissorcal.device.session import RigSession
 from scissorcal.errors import InputError
-from scissorcal.kernel import ControlConfig, HybridConfig, Identity
+from scissorcal.kernel import ConfigKey, ControlConfig, HybridConfig, Identity
 from scissorcal.recipe.schema import Limits
 
 FORCE_CUTOFF_HZ = 30.0
@@ -258,3 +260,45 @@ def _largest_force(
         dry = axis_friction(axis.friction, fastest).largest + abs(axis.offset)
         found.append((SHARE_OF_LIMIT * limit - dry) / by if by > 0.0 else math.inf)
     return min(found)
+
+
+PLATE = 2.0
+"""MATERIAL that puts a virtual rig's plate in."""
+REQUEST_FIRST = (
+    "Put the plate in its place, below the blades, and keep hands off the handles and away from "
+    "the blades: once the plate's pose is known, they open, move over the plate and press on it."
+)
+REQUEST = (
+    "Put the plate in its place, and keep hands off the handles and away from the blades: they "
+    "open, move over the plate and press on it."
+)
+
+
+def ask_for_plate(session: RigSession) -> None:
+    """Have a person put the plate in before a camera looks for it; a simulator does so by itself.
+
+    Nothing moves meanwhile. InputError where nobody can be asked.
+    """
+    refuse_nobody(session)
+    if not session.simulated:
+        assert session.operator.confirm is not None
+        session.operator.confirm(REQUEST_FIRST)
+
+
+def put_plate(motion: Motion, confirm: Confirm | None) -> None:
+    """Have the plate put in while a motion waits with its motors off."""
+    if is_simulator(motion.identity):
+        motion.configure(ConfigKey.MATERIAL, PLATE)
+        return
+    assert confirm is not None
+    with motion.paused():
+        confirm(REQUEST)
+
+
+def refuse_nobody(session: RigSession) -> None:
+    """InputError where a person must be asked, and none can be."""
+    if not session.simulated and session.operator.confirm is None:
+        raise InputError(
+            "A person must be asked to put the plate in its place: pass a confirm callback that "
+            "shows a sentence and returns when that is done."
+        )

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from scissorcal.device.advance_trajectory import advance_plan, refuse_without_motor
 from scissorcal.device.capture_gains import (
     ADVANCE_ERROR_M,
     OPENING_ERROR_RAD,
@@ -17,11 +16,10 @@ from scissorcal.device.drive import Drive
 from scissorcal.device.hand import hand_strokes, hand_travel
 from scissorcal.device.loading import Loader
 from scissorcal.device.motion import STOP_MARGIN_RAD, LoopTask, Motion, MotionReport
-from scissorcal.device.open_motion import open_motion
+from scissorcal.device.port_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
-from scissorcal.device.rig_record import rig_facts
-from scissorcal.device.session import RigSession
-from scissorcal.device.trajectory import Plan, friction_plan
+from scissorcal.device.session import RigSession, rig_facts
+from scissorcal.device.trajectory import Plan, advance_plan, friction_plan, refuse_without_motor
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.kernel import Identity, ServoConfig
 from scissorcal.recipe.requirements import CaptureKind

@@ -22,8 +22,7 @@ from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import Motion
 from scissorcal.device.parts import Part
 from scissorcal.device.recorder import Recorder
-from scissorcal.device.rig_record import rig_facts
-from scissorcal.device.session import RigSession
+from scissorcal.device.session import RigSession, rig_facts
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.recording import Joint, Recording, RecordingWriter, Stroke

@@ -9,7 +9,7 @@ from scissorcal.aliases import Mask
 from scissorcal.device.capture import planned
 from scissorcal.device.completeness import planned_excitation_s
 from scissorcal.device.coverage import NEEDED_S, CoverageGrid, coverage_of
-from scissorcal.device.rig_record import identity_of
+from scissorcal.device.session import identity_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
 from scissorcal.recipe.load import parse_recipe

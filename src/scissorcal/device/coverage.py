@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.device.advance_trajectory import advance_range, sliding_speeds
 from scissorcal.device.cut_trajectory import cut_openings, press_openings
-from scissorcal.device.trajectory import opening_range
+from scissorcal.device.trajectory import advance_range, opening_range, sliding_speeds
 from scissorcal.kernel import Identity
 from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe

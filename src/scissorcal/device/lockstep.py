@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 
 from scissorcal.device.link import check_echo, check_identity
-from scissorcal.device.sim.faults import Faults
 from scissorcal.device.sim.protocol import RigProtocol
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
+from scissorcal.device.sim.sensors import Faults
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (

@@ -8,12 +8,15 @@ from scissorcal.kernel.control import (
     ControlFlag,
     ControlTask,
 )
-from scissorcal.kernel.crack import CrackLaw, CrackPath, Curve, walk_crack
 from scissorcal.kernel.cut_fit import (
+    CrackLaw,
+    CrackPath,
+    Curve,
     CutFitData,
     CutFitParameters,
     cut_log_likelihood,
     cut_log_likelihoods,
+    walk_crack,
 )
 from scissorcal.kernel.hybrid import (
     HYBRID_INPUT_DTYPE,
@@ -24,6 +27,7 @@ from scissorcal.kernel.hybrid import (
     NormalLaw,
     hybrid_inputs,
 )
+from scissorcal.kernel.joint import estimated_rates, presliding_path
 from scissorcal.kernel.loop import (
     Histogram,
     LoopBlock,
@@ -49,8 +53,6 @@ from scissorcal.kernel.messages import (
     StateFlag,
 )
 from scissorcal.kernel.modes import Mode
-from scissorcal.kernel.passivity import EnergyLedger, PassivityConfig
-from scissorcal.kernel.paths import estimated_rates, presliding_path
 from scissorcal.kernel.pieces import (
     MOST_PIECES,
     MOST_STRIPS,
@@ -70,9 +72,8 @@ from scissorcal.kernel.servo import (
 from scissorcal.kernel.sources import c_sources
 from scissorcal.kernel.stepping import STEP_DTYPE, Kernel, StepFlag, StepOutput
 from scissorcal.kernel.stop_reason import StopReason
-from scissorcal.kernel.table16 import Row16, Table16
-from scissorcal.kernel.tables import ModelTables, Table
-from scissorcal.kernel.watching import LagCounts, WatchConfig
+from scissorcal.kernel.tables import ModelTables, Row16, Table, Table16
+from scissorcal.kernel.watching import EnergyLedger, LagCounts, PassivityConfig, WatchConfig
 from scissorcal.kernel.wire import FrameDecoder, crc16, decode, encode, encode_frame
 
 __all__ = [

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.kernel.sources import c_sources
-from scissorcal.kernel.table16 import Row16
-from scissorcal.kernel.tables import TABLE_NAMES, ModelTables
+from scissorcal.kernel.tables import TABLE_NAMES, ModelTables, Row16
 
 Target = Literal["host", "cortex-m4f"]
 Rows = tuple[Row16, Row16, Row16]

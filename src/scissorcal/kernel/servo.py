@@ -13,12 +13,19 @@ from scissorcal.kernel.control import ControlConfig, ControlTask, control_sample
 from scissorcal.kernel.layout import dtype_of, fill_struct
 from scissorcal.kernel.messages import Command, State
 from scissorcal.kernel.modes import Mode, reference_arrays, refuse_change, refuse_mode
-from scissorcal.kernel.passivity import UNWATCHED_ENERGY, EnergyLedger, PassivityConfig
 from scissorcal.kernel.pieces import Piece, fill_pieces, refuse_pieces
 from scissorcal.kernel.plate import KNOWN_PLATE, PlateConfig, Section, placing
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, model_struct
-from scissorcal.kernel.watching import NO_WATCHES, LagCounts, WatchConfig, largest_seen
+from scissorcal.kernel.watching import (
+    NO_WATCHES,
+    UNWATCHED_ENERGY,
+    EnergyLedger,
+    LagCounts,
+    PassivityConfig,
+    WatchConfig,
+    largest_seen,
+)
 from scissorcal.kernel.wire import encode_frame
 
 SAMPLE_DTYPE = dtype_of("sc_sample")

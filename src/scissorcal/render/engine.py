@@ -6,9 +6,8 @@ from pathlib import Path
 
 from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, LoopTask, Motion
-from scissorcal.device.open_motion import open_motion
-from scissorcal.device.rig_record import rig_facts
-from scissorcal.device.session import RigSession
+from scissorcal.device.port_motion import open_motion
+from scissorcal.device.session import RigSession, rig_facts
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, PlateConfig, ServoConfig
@@ -23,16 +22,16 @@ from scissorcal.render.admission import (
     rendered_tables,
 )
 from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
-from scissorcal.render.mismatch import find_mismatch, refuse_other_rig
 from scissorcal.render.pose_placer import EVERY_S, PosePlacer, plate_config, pose_placer
 from scissorcal.render.result import (
+    LOOK_EVERY_S,
     AppliedLimits,
     RenderResult,
+    Watch,
     felt_verdict,
     render_verdicts,
 )
-from scissorcal.render.rig_facts import RigFacts
-from scissorcal.render.watch import LOOK_EVERY_S, Watch
+from scissorcal.render.rig_facts import RigFacts, find_mismatch, refuse_other_rig
 from scissorcal.tracking.plate_pose import PoseSource
 
 SUPERVISOR_S = 0.2

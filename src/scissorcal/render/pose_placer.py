@@ -15,8 +15,7 @@ from scissorcal.package import ModelPackage
 from scissorcal.package.manifest import PoseRecord
 from scissorcal.recording import RecordingWriter
 from scissorcal.render import pose_sentences as sentences
-from scissorcal.render.pose_section import PoseSection, pose_section
-from scissorcal.render.pose_torque import PoseTorque, TorqueSpread
+from scissorcal.render.pose_section import PoseSection, PoseTorque, TorqueSpread, pose_section
 from scissorcal.tracking.plate_pose import PlatePose, PoseSource, fixed_pose
 
 EVERY_S = 0.01

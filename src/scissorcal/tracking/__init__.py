@@ -11,10 +11,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from scissorcal.tracking.clocks import ClockFit, ClockWatch, fit_clock
     from scissorcal.tracking.contacts import TipContact, TipContacts
-    from scissorcal.tracking.delay import DelayFit, measure_delay
     from scissorcal.tracking.follow import FollowedRow, PoseFollower
-    from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
-    from scissorcal.tracking.rotation import pose_error
+    from scissorcal.tracking.judge import (
+        DelayFit,
+        TrackFigures,
+        measure_delay,
+        track_figures,
+        track_verdicts,
+    )
+    from scissorcal.tracking.plate_pose import pose_error
     from scissorcal.tracking.rows import CameraPose
     from scissorcal.tracking.settings import (
         CameraErrors,

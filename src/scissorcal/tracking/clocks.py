@@ -6,7 +6,7 @@ the highest one that no arrival lies below and that is nearest to all of them: a
 convex hull (Zhang, Liu and Xia 2002, doi:10.1109/INFCOM.2002.1019257; the linear program is that of
 Moon, Skelly and Towsley 1999, doi:10.1109/INFCOM.1999.749287). Late arrivals, however many, change
 nothing. The shortest delay itself looks like an offset and cannot be seen: see
-`scissorcal.tracking.delay`.
+`scissorcal.tracking.judge`.
 """
 
 import itertools

@@ -27,7 +27,7 @@ from scissorcal.tracking.filter import (
     ZERO,
     FilterState,
 )
-from scissorcal.tracking.rotation import cross, cross_matrix, rotation_vector
+from scissorcal.tracking.plate_pose import cross, cross_matrix, rotation_vector
 from scissorcal.tracking.settings import ContactErrors, ForceErrors
 
 KNOWN_SLIDING = 3.0

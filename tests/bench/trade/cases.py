@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.device.rig_record import identity_facts
+from scissorcal.device.session import identity_facts
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import SAMPLE_DTYPE, Kind, Recording
 from tests.device.conftest import IDENTITY

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from scissorcal.device.sim.faults import Faults
 from scissorcal.device.sim.protocol import ENCODER_CHECK_MS, RigProtocol
 from scissorcal.device.sim.rig import VirtualRig
+from scissorcal.device.sim.sensors import Faults
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.kernel import (
     PROTOCOL_VERSION,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scissorcal.control.plate_request import REQUEST_FIRST
+from scissorcal.control.settings import REQUEST_FIRST
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError, InputError, MissingError

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.device.loading import Confirm
-from scissorcal.device.probe.guards import SENSORS
-from scissorcal.device.probe.talk import RELEASE, Stage, Talk
+from scissorcal.device.probe.talk import RELEASE, SENSORS, Stage, Talk
 from scissorcal.kernel import ConfigKey, Identity
 from scissorcal.verdicts import Check, Verdict
 

@@ -7,12 +7,12 @@ determined ends a probe as a verdict that fails does, without accusing anything.
 import math
 from dataclasses import dataclass
 
-from scissorcal.device.probe.guards import MOTORS, SENSORS
 from scissorcal.device.probe.idle import REST_RAD, Idle
 from scissorcal.device.probe.joint_values import LATE_S
 from scissorcal.device.probe.pushes import Axis
 from scissorcal.device.probe.search import LEAST_INERTIA, Search, Sense
 from scissorcal.device.probe.swings import Swung
+from scissorcal.device.probe.talk import MOTORS, SENSORS
 from scissorcal.recording.probe import NORMAL_90
 from scissorcal.verdicts import Check, Verdict
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.device.probe.guards import LINE, MOTORS
-from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
+from scissorcal.device.probe.talk import LINE, MOTORS, RELEASE, Answer, Stage, Talk
 from scissorcal.kernel import StateFlag
 from scissorcal.verdicts import Check, Verdict
 

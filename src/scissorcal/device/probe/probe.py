@@ -6,8 +6,7 @@ from datetime import UTC, datetime
 
 from scissorcal.device.link import PortLink
 from scissorcal.device.loading import Confirm, is_simulator
-from scissorcal.device.probe.clipping import clipping
-from scissorcal.device.probe.guards import REAL_TIME
+from scissorcal.device.probe.clipping import clipping, follow
 from scissorcal.device.probe.hand_pass import (
     HandPass,
     by_virtual_hand,
@@ -30,14 +29,12 @@ from scissorcal.device.probe.judge_push import (
     judge_sense,
 )
 from scissorcal.device.probe.lag import judge_lag, lag
-from scissorcal.device.probe.measured_torque import follow
 from scissorcal.device.probe.pushes import axis_of, push
 from scissorcal.device.probe.search import search, sense
 from scissorcal.device.probe.swings import Swung, swings
-from scissorcal.device.probe.talk import Bounds, RunawayError, Talk
+from scissorcal.device.probe.talk import REAL_TIME, Bounds, RunawayError, Talk
 from scissorcal.device.probe.watchdog import watchdog
-from scissorcal.device.rig_record import identity_facts
-from scissorcal.device.session import RigSession, ShowProgress
+from scissorcal.device.session import RigSession, ShowProgress, identity_facts
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.identity import digest
 from scissorcal.kernel import Capability, ConfigKey, Identity

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.device.probe.joint_fit import fit_joint, swings_of, travel_of
-from scissorcal.device.probe.joint_posterior import JointFit
-from scissorcal.device.probe.joint_values import NAMES, Prior, Push
+from scissorcal.device.probe.joint_problem import fit_joint, swings_of, travel_of
+from scissorcal.device.probe.joint_values import NAMES, JointFit, Prior, Push
 from scissorcal.device.probe.pushes import MOVED_STEPS, Axis, Pushed, push
 from scissorcal.device.probe.talk import Talk
 from scissorcal.kernel import CommandFlag

@@ -23,6 +23,14 @@ from scissorcal.kernel import Command, CommandFlag, ConfigKey, State, StateFlag,
 from scissorcal.kernel.loop import STALL_TICKS
 from scissorcal.kernel.servo import LEAP_RATES, OPENING_RATE_LIMIT, STUCK_FRAMES
 
+LINE = "the line, before a motor runs"
+SENSORS = "the sensors, before a motor runs"
+MOTORS = "the motors, before they run in earnest"
+"""What checks of a probe guard begins so."""
+REAL_TIME = "real_time"
+"""Fact: 1 where the probe ran on a port, 0 in virtual time."""
+
+
 Done = TypeVar("Done")
 
 RATE_OVER_S = 4e-3

@@ -26,8 +26,8 @@ from collections import deque
 
 import numpy as np
 
-from scissorcal.device.sim.faults import Faults, FaultyLine
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
+from scissorcal.device.sim.sensors import Faults, FaultyLine
 from scissorcal.kernel import (
     Capability,
     Command,

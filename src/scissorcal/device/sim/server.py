@@ -26,9 +26,9 @@ from types import FrameType
 
 import numpy as np
 
-from scissorcal.device.sim.faults import Faults, parse_faults
 from scissorcal.device.sim.protocol import RigProtocol
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
+from scissorcal.device.sim.sensors import Faults, parse_faults
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import ScissorcalError, needs_unix
 

@@ -72,8 +72,8 @@ def capture_into(
     without an advance motor or without travel, before anything moves; MissingError where one until
     the tolerance lacks a fit that it builds on; and what the capture itself raises.
     """
-    from scissorcal.device.advance_trajectory import refuse_without_motor
     from scissorcal.device.capture import capture, open_writer, planned
+    from scissorcal.device.trajectory import refuse_without_motor
     from scissorcal.workday.engine import Engine
 
     _refuse_at_odds(kind, options)
