@@ -7,8 +7,7 @@ from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.friction import FrictionLaw
 from scissorcal.model.mechanism import AxisLaw
 from scissorcal.model.surface import Plane
-from scissorcal.tracking.contacts import EVERY_S, TipContact, TipContacts
-from scissorcal.tracking.rows import CameraPose
+from scissorcal.tracking.rows import EVERY_S, CameraPose, TipContact, TipContacts
 from scissorcal.tracking.tracker import Outcome, PoseTracker
 
 TIP = BladePoint(station_m=0.075, offset_m=-0.005, moving_blades=2)

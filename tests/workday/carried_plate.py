@@ -27,8 +27,8 @@ from scissorcal.render import (
     render,
 )
 from scissorcal.render.admission import rendered_tables
-from scissorcal.tracking.contacts import TipContacts
 from scissorcal.tracking.plate_pose import pose_error
+from scissorcal.tracking.rows import TipContacts
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import PicturePose
 from scissorcal.vision.live import Frame

@@ -16,8 +16,8 @@ from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import parse_recipe, read_text
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.recipe.schema import Recipe
-from scissorcal.tracking.contacts import TipContacts
 from scissorcal.tracking.plate_pose import pose_error
+from scissorcal.tracking.rows import TipContacts
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.geometry.rig_frame import RigPose

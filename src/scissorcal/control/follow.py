@@ -34,12 +34,11 @@ from scissorcal.control.surface_path import (
 )
 from scissorcal.device.capture import servo_config
 from scissorcal.device.capture_gains import Probed, capture_gains
-from scissorcal.device.loading import is_simulator
 from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import LoopTask, Motion, Samples
 from scissorcal.device.paths import PathBuilder, Reference
 from scissorcal.device.port_motion import open_motion
-from scissorcal.device.session import RigSession
+from scissorcal.device.session import RigSession, is_simulator
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import CONTROL_DTYPE, ConfigKey, ControlFlag
 from scissorcal.model.surface import Surface

@@ -15,9 +15,8 @@ from scissorcal.control.mechanics import (
     contact_loop,
 )
 from scissorcal.control.surface_path import Foot, TimedPath
-from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import Motion
-from scissorcal.device.session import RigSession
+from scissorcal.device.session import Confirm, RigSession, is_simulator
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, ControlConfig, HybridConfig, Identity
 from scissorcal.recipe.schema import Limits

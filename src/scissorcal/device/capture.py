@@ -14,11 +14,10 @@ from scissorcal.device.coverage import CoverageGrid, coverage_of
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.drive import Drive
 from scissorcal.device.hand import hand_strokes, hand_travel
-from scissorcal.device.loading import Loader
 from scissorcal.device.motion import STOP_MARGIN_RAD, LoopTask, Motion, MotionReport
 from scissorcal.device.port_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
-from scissorcal.device.session import RigSession, rig_facts
+from scissorcal.device.session import Loader, RigSession, rig_facts
 from scissorcal.device.trajectory import Plan, advance_plan, friction_plan, refuse_without_motor
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.kernel import Identity, ServoConfig

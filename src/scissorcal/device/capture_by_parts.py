@@ -17,12 +17,11 @@ from scissorcal.device.capture import (
 from scissorcal.device.coverage import CoverageGrid, coverage_of
 from scissorcal.device.drive import Drive
 from scissorcal.device.link import Link
-from scissorcal.device.loading import Loader
 from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import Motion
 from scissorcal.device.parts import Part
 from scissorcal.device.recorder import Recorder
-from scissorcal.device.session import RigSession, rig_facts
+from scissorcal.device.session import Loader, RigSession, rig_facts
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.recording import Joint, Recording, RecordingWriter, Stroke

@@ -1,5 +1,6 @@
 """The C core and its thin binding: wire frames, tables, the model's step, the servo loop."""
 
+from scissorcal.kernel.compiled_step import c_sources
 from scissorcal.kernel.control import (
     CONTROL_DTYPE,
     AxisFriction,
@@ -7,6 +8,7 @@ from scissorcal.kernel.control import (
     ControlConfig,
     ControlFlag,
     ControlTask,
+    Mode,
 )
 from scissorcal.kernel.cut_fit import (
     CrackLaw,
@@ -52,16 +54,18 @@ from scissorcal.kernel.messages import (
     State,
     StateFlag,
 )
-from scissorcal.kernel.modes import Mode
-from scissorcal.kernel.pieces import (
+from scissorcal.kernel.plate import (
     MOST_PIECES,
     MOST_STRIPS,
     Piece,
     PiecesModel,
+    PlacedModel,
+    PlateConfig,
+    Pull,
+    Section,
     Strip,
     largest_overlap,
 )
-from scissorcal.kernel.plate import PlacedModel, PlateConfig, Pull, Section
 from scissorcal.kernel.servo import (
     SAMPLE_DTYPE,
     SampleFlag,
@@ -69,7 +73,6 @@ from scissorcal.kernel.servo import (
     ServoConfig,
     ServoCounters,
 )
-from scissorcal.kernel.sources import c_sources
 from scissorcal.kernel.stepping import STEP_DTYPE, Kernel, StepFlag, StepOutput
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, Row16, Table, Table16

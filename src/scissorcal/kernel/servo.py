@@ -9,12 +9,26 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.control import ControlConfig, ControlTask, control_sample
+from scissorcal.kernel.control import (
+    ControlConfig,
+    ControlTask,
+    Mode,
+    control_sample,
+    reference_arrays,
+    refuse_change,
+    refuse_mode,
+)
 from scissorcal.kernel.layout import dtype_of, fill_struct
 from scissorcal.kernel.messages import Command, State
-from scissorcal.kernel.modes import Mode, reference_arrays, refuse_change, refuse_mode
-from scissorcal.kernel.pieces import Piece, fill_pieces, refuse_pieces
-from scissorcal.kernel.plate import KNOWN_PLATE, PlateConfig, Section, placing
+from scissorcal.kernel.plate import (
+    KNOWN_PLATE,
+    Piece,
+    PlateConfig,
+    Section,
+    fill_pieces,
+    placing,
+    refuse_pieces,
+)
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, model_struct
 from scissorcal.kernel.watching import (

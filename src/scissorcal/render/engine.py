@@ -4,10 +4,9 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, LoopTask, Motion
 from scissorcal.device.port_motion import open_motion
-from scissorcal.device.session import RigSession, rig_facts
+from scissorcal.device.session import Confirm, RigSession, is_simulator, rig_facts
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, PlateConfig, ServoConfig

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scissorcal.tracking.clocks import ClockFit, ClockWatch, fit_clock
-    from scissorcal.tracking.contacts import TipContact, TipContacts
     from scissorcal.tracking.follow import FollowedRow, PoseFollower
     from scissorcal.tracking.judge import (
         DelayFit,
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
         track_verdicts,
     )
     from scissorcal.tracking.plate_pose import pose_error
-    from scissorcal.tracking.rows import CameraPose
+    from scissorcal.tracking.rows import CameraPose, TipContact, TipContacts
     from scissorcal.tracking.settings import (
         CameraErrors,
         ContactErrors,

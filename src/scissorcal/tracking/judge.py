@@ -8,9 +8,8 @@ import numpy as np
 
 from scissorcal.model.surface import Surface
 from scissorcal.tracking.clocks import DRIFT_LIMIT_PPM, ClockWatch
-from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PoseFollower
-from scissorcal.tracking.rows import CameraPose
+from scissorcal.tracking.rows import CameraPose, TipContact
 from scissorcal.tracking.settings import TrackingSettings
 from scissorcal.tracking.tracker import Outcome, PoseTracker
 from scissorcal.verdicts import Check, Verdict

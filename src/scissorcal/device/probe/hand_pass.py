@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.device.loading import Confirm
 from scissorcal.device.probe.talk import RELEASE, SENSORS, Stage, Talk
+from scissorcal.device.session import Confirm
 from scissorcal.kernel import ConfigKey, Identity
 from scissorcal.verdicts import Check, Verdict
 

@@ -9,9 +9,8 @@ import math
 from scissorcal.device.motion import STOP_MARGIN_RAD
 from scissorcal.device.probe.clipping import Follow
 from scissorcal.device.probe.idle import JITTER_RAD, Idle
-from scissorcal.device.probe.lag import Lag
+from scissorcal.device.probe.lag import Lag, Watchdog
 from scissorcal.device.probe.talk import LINE, MOTORS, SENSORS
-from scissorcal.device.probe.watchdog import Watchdog
 from scissorcal.kernel import Capability, Identity
 from scissorcal.verdicts import STATED, TORQUE, Check, Verdict
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from scissorcal.device.link import PortLink
-from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.probe.clipping import clipping, follow
 from scissorcal.device.probe.hand_pass import (
     HandPass,
@@ -28,13 +27,18 @@ from scissorcal.device.probe.judge_push import (
     judge_search,
     judge_sense,
 )
-from scissorcal.device.probe.lag import judge_lag, lag
+from scissorcal.device.probe.lag import judge_lag, lag, watchdog
 from scissorcal.device.probe.pushes import axis_of, push
 from scissorcal.device.probe.search import search, sense
 from scissorcal.device.probe.swings import Swung, swings
 from scissorcal.device.probe.talk import REAL_TIME, Bounds, RunawayError, Talk
-from scissorcal.device.probe.watchdog import watchdog
-from scissorcal.device.session import RigSession, ShowProgress, identity_facts
+from scissorcal.device.session import (
+    Confirm,
+    RigSession,
+    ShowProgress,
+    identity_facts,
+    is_simulator,
+)
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.identity import digest
 from scissorcal.kernel import Capability, ConfigKey, Identity

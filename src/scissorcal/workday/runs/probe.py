@@ -67,7 +67,7 @@ def ensure_probed(
     DeviceError, besides what the probe raises, where blades of its inertia would get too fast
     without commands (`refuse_unanswered`).
     """
-    from scissorcal.device.unanswered import refuse_unanswered
+    from scissorcal.device.session import refuse_unanswered
 
     recipe, say = session.recipe, session.operator.say
     last = _kept(workspace)
