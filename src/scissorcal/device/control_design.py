@@ -93,7 +93,7 @@ def design_gains(
     raise DeviceError(_refusal(axis, demand, cutoffs_Hz, name, found))
 
 
-def largest_deviation(axis: Axis, gains: Gains, demand: Demand) -> float:
+def _largest_deviation(axis: Axis, gains: Gains, demand: Demand) -> float:
     """How far the axis may fall behind: at a reversal, accelerating, as the load sets in.
 
     All of it at once, as a step: simulated captures fall behind by about half of it.
@@ -108,7 +108,7 @@ def largest_deviation(axis: Axis, gains: Gains, demand: Demand) -> float:
 
 
 def _strong_enough(found: Design, demand: Demand) -> bool:
-    return largest_deviation(found.axis, found.gains, demand) <= demand.error_limit
+    return _largest_deviation(found.axis, found.gains, demand) <= demand.error_limit
 
 
 def _best(axis: Axis, cutoffs_Hz: tuple[float, ...]) -> Design | None:
@@ -175,7 +175,7 @@ def _refusal(
     enough = _enough_delay(axis, demand, cutoffs_Hz)
     behind = "and no gains keep that margin"
     if found is not None:
-        far = largest_deviation(found.axis, found.gains, demand)
+        far = _largest_deviation(found.axis, found.gains, demand)
         unit = "m" if name == "advance" else "rad"
         behind = (
             f"and the {name} would fall behind by up to {far:.2g} {unit}, beyond the "

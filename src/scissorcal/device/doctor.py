@@ -121,7 +121,7 @@ def clock_drift(arrival_s: Array, device_us: Integers) -> tuple[float, float]:
 
 def adapter_timer_ms(port: str, sys_root: Path = Path("/sys")) -> float | None:
     """Latency timer (ms) of the USB adapter behind a port, None where there is none."""
-    path = adapter_timer_path(port, sys_root)
+    path = _adapter_timer_path(port, sys_root)
     try:
         return float(path.read_text(encoding="ascii"))
     except (OSError, ValueError):
@@ -233,7 +233,7 @@ def brake_after_ms(m: Measurements) -> float:
     return min(max(5.0 * math.ceil(needed / 5.0), LEAST_BRAKE_MS), MOST_BRAKE_MS)
 
 
-def adapter_timer_path(port: str, sys_root: Path = Path("/sys")) -> Path:
+def _adapter_timer_path(port: str, sys_root: Path = Path("/sys")) -> Path:
     """Return the file in which Linux keeps the latency timer of a USB serial adapter."""
     return sys_root / "bus/usb-serial/devices" / Path(port).resolve().name / "latency_timer"
 
@@ -287,7 +287,7 @@ def _adapter(m: Measurements, port: str) -> Verdict:
         why = f"{port} has no USB adapter with a latency timer."
         return LATENCY_TIMER.not_evaluated(why)
     found = f"The adapter delays data by up to {delay_ms:g} ms."
-    bad = f"{found} Run: echo 1 | sudo tee {adapter_timer_path(port)}"
+    bad = f"{found} Run: echo 1 | sudo tee {_adapter_timer_path(port)}"
     return LATENCY_TIMER.judge(delay_ms, found, bad)
 
 

@@ -22,10 +22,12 @@ from scissorcal.kernel import (
     ControlConfig,
     EnergyLedger,
     Identity,
+    LoopBlock,
     Mode,
     ModelTables,
     Piece,
     Section,
+    Servo,
     ServoCounters,
     StopReason,
 )
@@ -100,6 +102,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
     """
 
     identity: Identity
+    _servo: Servo | LoopBlock
 
     def __init__(self, identity: Identity, every_s: float = BLOCK_S) -> None:
         self.identity = identity
@@ -185,13 +188,16 @@ class Motion(AbstractContextManager["Motion"], ABC):
             raise self._stopped()
         return samples
 
-    @abstractmethod
     def engage(self, mode: Mode) -> None:
         """Request a mode; it takes effect with the next frame."""
+        self._servo.engage(mode)
 
-    @abstractmethod
     def set_reference(self, reference: Reference) -> None:
-        """Set what TRACK follows; not while TRACK is engaged."""
+        """Set what TRACK follows; motors off first where one is followed now."""
+        self._stop_following()
+        self._servo.set_reference(
+            reference.opening, reference.opening_rate, reference.advance, reference.stroke
+        )
 
     @abstractmethod
     def set_path(self, place: Array, rate: Array, force: Array, stage: Stages) -> None:
@@ -205,18 +211,18 @@ class Motion(AbstractContextManager["Motion"], ABC):
     def control_samples(self) -> Samples:
         """Samples of CONTROL since the last call, shape (n,) with CONTROL_DTYPE."""
 
-    @abstractmethod
     def fresh_sheet(self, crack: float = 0.0) -> None:
         """Put the rendered crack at ``crack`` (m)."""
+        self._servo.fresh_sheet(crack)
 
     @property
     @abstractmethod
     def now_s(self) -> float:
         """The clock of this process, by which an estimate's age counts: the host's, or virtual."""
 
-    @abstractmethod
     def place(self, section: Section, usable: bool, age_s: float) -> None:
         """Take an estimate of where the plate stands, ``age_s`` old; not usable: force falls."""
+        self._servo.place(section, usable, age_s)
 
     @abstractmethod
     def configure(self, key: int, value: float) -> float:
@@ -235,14 +241,14 @@ class Motion(AbstractContextManager["Motion"], ABC):
         """Motors off, streaming off; the link stays open."""
 
     @property
-    @abstractmethod
     def mode(self) -> Mode:
         """The mode in force."""
+        return self._servo.mode
 
     @property
-    @abstractmethod
     def track_index(self) -> int:
         """Ticks of the reference that have passed."""
+        return self._servo.track_index
 
     @property
     @abstractmethod
@@ -253,6 +259,14 @@ class Motion(AbstractContextManager["Motion"], ABC):
     @abstractmethod
     def garbled(self) -> int:
         """Frames discarded so far."""
+
+    @abstractmethod
+    def _go_idle(self) -> None:
+        """Switch the motors off and wait for the mode to change."""
+
+    def _stop_following(self) -> None:
+        if self.mode in (Mode.TRACK, Mode.CONTROL):
+            self._go_idle()
 
     @abstractmethod
     def _why_lost(self) -> DeviceError | None:

@@ -285,7 +285,7 @@ def fill_pieces(struct: Any, pieces: Sequence[Piece], model: Any) -> None:
 
     Raises ValueError for none at all, and for more than the kernel holds.
     """
-    check_pieces(pieces)
+    _check_pieces(pieces)
     strips = [strip for piece in pieces for strip in piece.strips]
     struct.count = len(pieces)
     first = 0
@@ -302,7 +302,7 @@ def fill_pieces(struct: Any, pieces: Sequence[Piece], model: Any) -> None:
     lib.sc_pieces_prepare(model, struct)
 
 
-def check_pieces(pieces: Sequence[Piece]) -> None:
+def _check_pieces(pieces: Sequence[Piece]) -> None:
     """Raise ValueError for no pieces at all, and for more than the kernel holds."""
     strips = sum(len(piece.strips) for piece in pieces)
     if not pieces:
@@ -316,7 +316,7 @@ def check_pieces(pieces: Sequence[Piece]) -> None:
 
 def refuse_pieces(pieces: Sequence[Piece], has_model: bool, plate_is_estimated: bool) -> None:
     """Raise ValueError for pieces that cannot be rendered: without a model, on a tracked plate."""
-    check_pieces(pieces)
+    _check_pieces(pieces)
     if not has_model:
         raise ValueError("Pieces of a plate need the tables of a model, and there are none.")
     if plate_is_estimated:

@@ -56,7 +56,7 @@ class Table:
         """
         places = np.asarray(x, dtype=np.float32, order="C")
         values = np.empty_like(places)
-        table, _keep = table_struct(self)
+        table, _keep = _table_struct(self)
         lib.sc_table_many(
             ffi.addressof(table),
             held,
@@ -166,7 +166,7 @@ def _never_falls(table: Table) -> bool:
     return bool(np.all(least >= -slack))
 
 
-def table_struct(table: Table, area: Float32 | None = None) -> tuple[Any, tuple[Any, ...]]:
+def _table_struct(table: Table, area: Float32 | None = None) -> tuple[Any, tuple[Any, ...]]:
     """Give the C struct that points at a table's arrays, and what must be kept alive with it.
 
     With ``area`` (shape (n,), written here) the table can be integrated.
@@ -190,7 +190,7 @@ def model_struct(tables: ModelTables) -> tuple[Any, tuple[Any, ...]]:
     for name in TABLE_NAMES:
         table = getattr(tables, name)
         area = np.zeros(len(table.x), dtype=np.float32) if name == "response" else None
-        struct, kept = table_struct(table, area)
+        struct, kept = _table_struct(table, area)
         setattr(model, name, struct)
         keep.append(kept)
     fill_numbers(model, tables)

@@ -122,10 +122,10 @@ def admit(
     alone, held = (allowed_stiffness(facts, damping, rate) for damping in (0.0, hand))
     cures = stated_cures(facts, hand, rate, needs.stiffness)
     if not held > 0.0:
-        raise InputError(nothing_allowed(facts, cures))
+        raise InputError(_nothing_allowed(facts, cures))
     derated = derate(tables, needs.stiffness, held, asked.limit_Nm, pieces)
     if derated.is_refused(needs.stiffness, held):
-        raise InputError(too_stiff(needs, held, cures))
+        raise InputError(_too_stiff(needs, held, cures))
     steepest = derated.steepest_N_per_m
     damping = damping_share(needs.damper, facts)
     width = friction_width(needs.friction_Nm, facts, held)
@@ -154,9 +154,9 @@ def admit(
         tolerance=asked.tolerance,
         sources=(),
         reasons=(
-            *need_sentences(needs, facts, (alone, held), is_drawn=bool(pieces)),
-            *cost_sentences(needs, derated.stiffness, felt, is_drawn=bool(pieces)),
-            *damping_sentences(needs, damping),
+            *_need_sentences(needs, facts, (alone, held), is_drawn=bool(pieces)),
+            *_cost_sentences(needs, derated.stiffness, felt, is_drawn=bool(pieces)),
+            *_damping_sentences(needs, damping),
         ),
         cures=() if steepest is None else cures,
         felt_cures=felt_cures(tables, facts, asked, needs, pieces) if beyond else (),
@@ -239,7 +239,7 @@ def _unchecked(needs: Needs, asked: Asked, *, is_drawn: bool) -> Admission:
     )
 
 
-def need_sentences(
+def _need_sentences(
     needs: Needs, facts: LoopFacts, allowed: tuple[float, float], *, is_drawn: bool
 ) -> tuple[str, ...]:
     """What the package needs, and what the rig renders alone and in a hand."""
@@ -254,7 +254,7 @@ def need_sentences(
     )
 
 
-def cost_sentences(
+def _cost_sentences(
     needs: Needs, left: float, felt: Sequence[float], *, is_drawn: bool
 ) -> tuple[str, ...]:
     """What derating costs; nothing where all is rendered.
@@ -275,7 +275,7 @@ def cost_sentences(
     )
 
 
-def damping_sentences(needs: Needs, share: float) -> tuple[str, ...]:
+def _damping_sentences(needs: Needs, share: float) -> tuple[str, ...]:
     """How much of the material's damping is rendered; nothing where all is."""
     if share == 1.0:
         return ()
@@ -285,7 +285,7 @@ def damping_sentences(needs: Needs, share: float) -> tuple[str, ...]:
     )
 
 
-def too_stiff(needs: Needs, held: float, cures: Sequence[str]) -> str:
+def _too_stiff(needs: Needs, held: float, cures: Sequence[str]) -> str:
     """The refusal of what even the softest response does not make stable."""
     return (
         f"This rig cannot render the package stably: {needs.stiffness:.3g} N m/rad are needed "
@@ -294,7 +294,7 @@ def too_stiff(needs: Needs, held: float, cures: Sequence[str]) -> str:
     )
 
 
-def nothing_allowed(facts: LoopFacts, cures: Sequence[str]) -> str:
+def _nothing_allowed(facts: LoopFacts, cures: Sequence[str]) -> str:
     """The refusal where no dry friction is known for sure."""
     known = f"known to be at least {facts.coulomb_Nm * 1e3:.2g} mN m"
     again = "Capture friction again, for longer, so that its lower end is above 0. "

@@ -60,7 +60,7 @@ def measure_delay(
         return _unknown(math.nan, math.inf, f"{why}, and {FEWEST} of each are needed")
 
     def cost(later: float) -> float:
-        return replay_cost(surface, settings, pictures, contacts, later)
+        return _replay_cost(surface, settings, pictures, contacts, later)
 
     steps = np.arange(-REACH_S, REACH_S + 1e-9, STEP_S)
     coarse = [cost(step) for step in steps.tolist()]
@@ -87,7 +87,7 @@ def measure_delay(
     return DelayFit(middle, sd, True, sentence)
 
 
-def replay_cost(
+def _replay_cost(
     surface: Surface,
     settings: TrackingSettings,
     pictures: Sequence[CameraPose],

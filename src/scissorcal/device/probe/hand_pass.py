@@ -124,7 +124,7 @@ def judge_hand_pass(found: HandPass, identity: Identity) -> list[Verdict]:
     something between the blades); two that disagree are a person's, and determine nothing.
     """
     if not found.alive:
-        return [not_determined()]
+        return [_not_determined()]
     stated = identity.opening_max - identity.opening_min
     if len(found.ranges) == 2 and not _is_right(found, identity) and not _agree(found):
         first, second = found.ranges
@@ -159,7 +159,7 @@ def judge_hand_pass(found: HandPass, identity: Identity) -> list[Verdict]:
     return [*verdicts, OPENING_ZERO.judge(abs(zero), f"{said}.", bad)]
 
 
-def not_determined() -> Verdict:
+def _not_determined() -> Verdict:
     """Nobody moved the blades by hand, so nothing is known of scale, sign and zero."""
     why = (
         "Not determined: the opening did not change between the requests to close and to open the "

@@ -63,7 +63,7 @@ def swings(
     wide = axis.until(_most_way(axis), MOST_RATE)
 
     def telling() -> list[Push]:
-        return pushes_of(talk, pushes, least, prior.stop, axis.seen)
+        return _pushes_of(talk, pushes, least, prior.stop, axis.seen)
 
     fit = _fitted(talk, telling(), prior, noise_rad)
     for pairs in range(MOST_PAIRS + 1):
@@ -111,7 +111,7 @@ def known(fit: JointFit, strongest: float) -> bool:
     )
 
 
-def pushes_of(
+def _pushes_of(
     talk: Talk, pushed: list[Pushed] | tuple[Pushed, ...], least: float, stop: int, seen: float
 ) -> list[Push]:
     """What was heard of each push of ``least`` and more that nothing disturbed, for the fit.
