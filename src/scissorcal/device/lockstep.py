@@ -155,7 +155,7 @@ class LockstepLink:
             raise DeviceError("The link to the virtual rig is closed: open a new one.")
 
 
-_STATE_TYPE = FrameDecoder().feed(encode(State(0, 0, 0, 0.0, 0.0, 0.0, 0.0)))[0][0]
+_STATE_TYPE = FrameDecoder().feed(encode(State(0, 0, 0)))[0][0]
 
 
 def _is_state(payload: bytes) -> bool:

@@ -333,10 +333,8 @@ class Servo(ServoView):
         of time passes with the first of them (or ``passed_us``), and slews and clearings of faults
         count by commands that are sent.
         """
-        c = self._state
-        c.flags, c.sequence, c.device_us = state.flags, state.sequence, state.device_us
-        c.opening, c.advance = state.opening, state.advance
-        c.motor_torque, c.handle_force = state.motor_torque, state.handle_force
+        for name, value in zip(State._fields, state, strict=True):
+            setattr(self._state, name, value)
         self._step(heartbeat, host_time_ns, answered, passed_us)
         command = self._command
         return Command(command.flags, command.echo_sequence, command.torque, command.force)

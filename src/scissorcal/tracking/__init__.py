@@ -32,12 +32,10 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "clocks": ("ClockFit", "ClockWatch", "fit_clock"),
-    "contacts": ("TipContact", "TipContacts"),
-    "delay": ("DelayFit", "measure_delay"),
     "follow": ("FollowedRow", "PoseFollower"),
-    "judge": ("TrackFigures", "track_figures", "track_verdicts"),
-    "rotation": ("pose_error",),
-    "rows": ("CameraPose",),
+    "judge": ("DelayFit", "TrackFigures", "measure_delay", "track_figures", "track_verdicts"),
+    "plate_pose": ("pose_error",),
+    "rows": ("CameraPose", "TipContact", "TipContacts"),
     "settings": (
         "CameraErrors",
         "ContactErrors",

@@ -68,6 +68,8 @@ GAIN_HOLD_S, HELD_SHARE = 0.1, 0.6
 """How long an effort is held for its gain, and its share of the one that moved the blades."""
 SLEDGE_FORCE_SHARE = 0.2
 """Of the recipe's and the device's force limit, for the sledge."""
+NOISE_FACTS = {"motor_torque": "torque_noise_Nm", "handle_force": "force_noise_N"}
+"""Facts of what is subtracted at rest; whatever else a device measures is a fact by its name."""
 SLEDGE_WAY_M, SLEDGE_SPEED_M_PER_S = 2e-3, 0.05
 
 
@@ -243,11 +245,11 @@ def _of_hand(passed: HandPass, identity: Identity) -> dict[str, float]:
 def _of_idle(found: Idle, identity: Identity) -> dict[str, object]:
     sensor = identity.capabilities & Capability.HANDLE_FORCE_SENSOR
     return {
-        "torque_zero_Nm": _finite(found.torque_zero),
-        "force_zero_N": _finite(found.force_zero) if sensor else None,
+        "torque_zero_Nm": _finite(found.zeros["motor_torque"]),
+        "force_zero_N": _finite(found.zeros["handle_force"]) if sensor else None,
         "facts": {
-            "torque_noise_Nm": found.torque_noise,
-            "force_noise_N": found.force_noise,
+            **{NOISE_FACTS.get(name, f"{name}_noise"): sd for name, sd in found.noises.items()},
+            **{name: at.mean for name, at in found.zeros.items() if name not in NOISE_FACTS},
             "encoder_jitter_rad": found.jitter_rad,
             "encoder_jitters": float(jitters(found, identity)),
             "clock_ratio": found.clock_ratio,

@@ -11,10 +11,11 @@ from scissorcal.device.sim.specimen import Sensors
 from scissorcal.errors import InputError
 
 BLOCK = 4096
+MEASURED_FLAGS = 3
 
 
 class Measured(NamedTuple):
-    """One tick as the device reports it: SI units, and three flags.
+    """One tick as the device reports it: SI units in the order of STATE, and three flags.
 
     ``opening`` (rad), ``advance`` (m), ``motor_torque`` (N m, positive opens the blades),
     ``handle_force`` (N, positive pushes the handles closed).
