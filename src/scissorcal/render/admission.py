@@ -116,8 +116,9 @@ def admit(
     softest response is too stiff.
     """
     needs = needs_on(tables, asked.limit_Nm, pieces)
+    unchecked = _unchecked(needs, asked, bool(pieces))
     if facts is None:
-        return _unchecked(needs, asked, is_drawn=bool(pieces))
+        return unchecked
     rate, hand = max(asked.fastest, OSCILLATION_RATE), asked.hand_damping
     alone, held = (allowed_stiffness(facts, damping, rate) for damping in (0.0, hand))
     cures = stated_cures(facts, hand, rate, needs.stiffness)
@@ -135,24 +136,17 @@ def admit(
         torque = FeltTorque(tables, asked.limit_Nm, rates, plate)
         felt.append(torque.change(rendered, width))
     beyond = felt[0] > asked.tolerance
-    return Admission(
+    return replace(
+        unchecked,
         facts=facts,
-        hand_damping_Nm_s_per_rad=hand,
         allowed_alone=alone,
         allowed_in_hand=held,
-        needed=needs.stiffness,
-        needed_found=needs.found,
-        needed_at=(needs.opening, needs.contact),
         rendered=derated.stiffness,
-        drop_Nm=needs.drop_Nm,
         steepest_N_per_m=steepest,
         felt_share=felt[0],
         felt_sheet_share=felt[-1],
-        is_drawn=bool(pieces),
         damping_share=damping,
         friction_width_rad=width,
-        tolerance=asked.tolerance,
-        sources=(),
         reasons=(
             *_need_sentences(needs, facts, (alone, held), is_drawn=bool(pieces)),
             *_cost_sentences(needs, derated.stiffness, felt, is_drawn=bool(pieces)),
@@ -211,7 +205,8 @@ def _asked(package: ModelPackage, limit: float) -> Asked:
     )
 
 
-def _unchecked(needs: Needs, asked: Asked, *, is_drawn: bool) -> Admission:
+def _unchecked(needs: Needs, asked: Asked, is_drawn: bool) -> Admission:
+    """What holds of a rig of which nothing is known; `admit` adds what it checks."""
     return Admission(
         facts=None,
         hand_damping_Nm_s_per_rad=asked.hand_damping,

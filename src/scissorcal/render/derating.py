@@ -159,14 +159,13 @@ def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) 
     friction = _friction(tables)
     slopes = LayerSlopes(tables, torque_limit + friction, pieces)
     steepest = slopes.bound("opening")
-    damper = slopes.bound("rate").value if tables.rate_damping > 0.0 else 0.0
     found = _found_on(tables, torque_limit, pieces)
     return Needs(
         stiffness=max(steepest.value, found),
         opening=steepest.opening,
         contact=steepest.contact,
         drop_Nm=largest_drop(tables, torque_limit, pieces),
-        damper=damper,
+        damper=slopes.bound("rate").value if tables.rate_damping > 0.0 else 0.0,
         friction_Nm=friction,
         found=found,
     )

@@ -184,17 +184,15 @@ def _result(
     follower: PosePlacer | None,
 ) -> RenderResult:
     """Figures of a rendering that has ended."""
-    report, admission, accepted = motion.report(), start.admission, start.accepted
+    report, tick_us = motion.report(), motion.identity.tick_us
     out_s = report.counters.plate_out_frames * motion.tick_s
-    seconds = watch.frames * motion.tick_s
-    plate = follower.report(seconds, out_s) if follower else None
-    latency = watch.latency
+    plate = follower.report(watch.frames * motion.tick_s, out_s) if follower else None
     limited = watch.limited / max(1, watch.frames)
     return RenderResult(
-        seconds=seconds,
+        seconds=watch.frames * motion.tick_s,
         frames=report.counters.frames,
         strokes=watch.strokes,
-        latency=latency,
+        latency=watch.latency,
         interval=report.interval,
         lag=report.lag,
         rights=report.rights,
@@ -209,12 +207,12 @@ def _result(
         largest_torque_Nm=watch.largest_torque,
         ledger=report.ledger,
         limits=start.limits,
-        admission=admission,
-        accepted_derated=accepted,
+        admission=start.admission,
+        accepted_derated=start.accepted,
         plate=plate,
         package_hash=package.manifest.content_hash,
         verdicts=render_verdicts(
-            report, latency, motion.identity.tick_us, admission, plate, accepted=accepted
+            report, watch.latency, tick_us, start.admission, plate, accepted=start.accepted
         ),
         warnings=start.warnings
         + _limited_warning(limited, start.limits)

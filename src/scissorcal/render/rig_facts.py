@@ -92,8 +92,7 @@ def with_probe(rig: RigFacts, probe: ProbeResult | None) -> RigFacts:
         return rig
     found, name = replace(rig, rest=probe.rest), f"the probe of {probe.made_at}"
     if probe.delay_s is not None:
-        late_s = max(probe.delay_s.interval[1], 0.0)
-        found = replace(found, late_s=late_s, late_source=name)
+        found = replace(found, late_s=max(probe.delay_s.interval[1], 0.0), late_source=name)
     if found.coulomb_Nm is None and probe.coulomb_Nm is not None:
         viscous = probe.viscous_Nm_s_per_rad
         found = replace(

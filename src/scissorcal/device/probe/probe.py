@@ -83,9 +83,11 @@ class ProbeRefusedError(DeviceError):
 
 @dataclass
 class _Finding:
-    """The result as it grows, and the errors of what was looked at so far."""
+    """The result as it grows, how far it is, and whether the encoder was seen to move by hand."""
 
     result: ProbeResult
+    tell: ShowProgress
+    by_hand: bool = False
 
     def add(self, verdicts: list[Verdict], **found: object) -> None:
         """Take verdicts and findings; ProbeRefusedError where a verdict failed."""
@@ -128,22 +130,22 @@ def probe(session: RigSession, *, then: str = "", now: datetime | None = None) -
         )
     made = (now or datetime.now(UTC)).astimezone(UTC).isoformat(timespec="seconds")
     finding = _Finding(
-        ProbeResult(session.name, identity_digest(identity), made, recipe.rig.motor_sign)
+        ProbeResult(session.name, identity_digest(identity), made, recipe.rig.motor_sign), tell
     )
     with Talk(session.link, bounds_of(recipe, identity), recipe.rig.motor_sign) as talk:
         tell(0.0, "the blades by hand, motors off")
         try:
-            hand = _by_hand(talk, finding, recipe, confirm, then)
-            _stages(talk, finding, recipe, hand, tell)
+            finding.by_hand = _by_hand(talk, finding, recipe, confirm, then)
+            _stages(talk, finding, recipe)
         except RunawayError as error:
             raise ProbeRefusedError(str(error), finding.result) from error
     tell(1.0, "done")
     return finding.result
 
 
-def _stages(talk: Talk, finding: _Finding, recipe: Recipe, hand: bool, tell: ShowProgress) -> None:
+def _stages(talk: Talk, finding: _Finding, recipe: Recipe) -> None:
     """Everything after the pass by hand to the last motion; ends at the first that stops it."""
-    identity = talk.identity
+    identity, tell = talk.identity, finding.tell
     tell(0.1, "listening with the motors off")
     quiet = idle(talk)
     finding.add(
@@ -166,7 +168,7 @@ def _stages(talk: Talk, finding: _Finding, recipe: Recipe, hand: bool, tell: Sho
     with talk.braking_after(min(expiry_ms, recipe.rig.line.brake_after_ms)):
         tell(0.35, "pushes that grow until the blades move")
         talk.pushing = True
-        _push(talk, finding, quiet, recipe, hand=hand, tell=tell)
+        _push(talk, finding, quiet, recipe)
         if _pushes_sledge(identity):
             tell(0.85, "small pushes on the sledge")
             _push_sledge(talk, finding, recipe)
@@ -261,11 +263,9 @@ def _of_idle(found: Idle, identity: Identity) -> dict[str, object]:
     }
 
 
-def _push(
-    talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe, *, hand: bool, tell: ShowProgress
-) -> None:
+def _push(talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe) -> None:
     """Pushes on the blades: what moves them, which way, how the torque follows; then swings."""
-    identity = talk.identity
+    identity, hand = talk.identity, finding.by_hand
     axis = axis_of(talk, "opening", quiet.jitter_rad, identity.opening_resolution)
     found = search(talk, axis, alive=hand)
     fell = fallen(float(talk.heard(talk.mark() - 1)["opening"][0]), identity)
@@ -275,10 +275,10 @@ def _push(
     sensed = sense(talk, axis, found)
     finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand=hand))
     held = [
-        push(talk, axis, sign * HELD_SHARE * found.effort, GAIN_HOLD_S, hold=found.hold)
+        push(talk, axis, sign * HELD_SHARE * found.effort, GAIN_HOLD_S, found.hold)
         for sign in (1, -1)
     ]
-    tell(0.5, "swings, planned by what the last ones taught")
+    finding.tell(0.5, "swings, planned by what the last ones taught")
     lag_ticks = finding.result.facts["command_lag_ticks"]
     prior = Prior(
         (lag_ticks - 1.0 + FLAG_TO_DELAY_TICKS) * talk.tick_s,

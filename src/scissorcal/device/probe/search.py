@@ -132,7 +132,7 @@ def sense(talk: Talk, axis: Axis, found: Search) -> Sense:
         if not pushes or max(one.rate for one in pushes[-2:]) < CALM * axis.rate:
             factor = wanted
         pair = [
-            push(talk, wide, sign * min(factor * effort, axis.effort), seconds, hold=hold)
+            push(talk, wide, sign * min(factor * effort, axis.effort), seconds, hold)
             for sign in (1, -1)
         ]
         pushes += pair

@@ -73,7 +73,7 @@ def swings(
                 break
         for sign in (prior.stop, prior.stop) if prior.stop else (1, -1):
             effort, seconds = _planned(talk, axis, fit, sign * prior.breakaway_Nm, strongest, hold)
-            one = push(talk, wide, effort, seconds, hold=hold)
+            one = push(talk, wide, effort, seconds, hold)
             pushes.append(one)
             if not one.disturbed:
                 strongest = max(strongest, abs(effort))
