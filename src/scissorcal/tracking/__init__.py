@@ -5,47 +5,26 @@ Arrays in, arrays out: no files, no ports, no clocks. `PoseTracker` is the filte
 `scissorcal.workday.runs.track.track_plate` connect it to a workspace.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from scissorcal.tracking.clocks import ClockFit, ClockWatch, fit_clock
-    from scissorcal.tracking.follow import FollowedRow, PoseFollower
-    from scissorcal.tracking.judge import (
-        DelayFit,
-        TrackFigures,
-        measure_delay,
-        track_figures,
-        track_verdicts,
-    )
-    from scissorcal.tracking.plate_pose import pose_error
-    from scissorcal.tracking.rows import CameraPose, TipContact, TipContacts
-    from scissorcal.tracking.settings import (
-        CameraErrors,
-        ContactErrors,
-        ForceErrors,
-        PlateMotion,
-        TrackingSettings,
-        settings_of,
-    )
-    from scissorcal.tracking.tracker import Counts, Outcome, PoseEstimate, PoseTracker
-
-_HOMES = {
-    "clocks": ("ClockFit", "ClockWatch", "fit_clock"),
-    "follow": ("FollowedRow", "PoseFollower"),
-    "judge": ("DelayFit", "TrackFigures", "measure_delay", "track_figures", "track_verdicts"),
-    "plate_pose": ("pose_error",),
-    "rows": ("CameraPose", "TipContact", "TipContacts"),
-    "settings": (
-        "CameraErrors",
-        "ContactErrors",
-        "ForceErrors",
-        "PlateMotion",
-        "TrackingSettings",
-        "settings_of",
-    ),
-    "tracker": ("Counts", "Outcome", "PoseEstimate", "PoseTracker"),
-}
+from scissorcal.tracking.clocks import ClockFit, ClockWatch, fit_clock
+from scissorcal.tracking.follow import FollowedRow, PoseFollower
+from scissorcal.tracking.judge import (
+    DelayFit,
+    TrackFigures,
+    measure_delay,
+    track_figures,
+    track_verdicts,
+)
+from scissorcal.tracking.plate_pose import pose_error
+from scissorcal.tracking.rows import CameraPose, TipContact, TipContacts
+from scissorcal.tracking.settings import (
+    CameraErrors,
+    ContactErrors,
+    ForceErrors,
+    PlateMotion,
+    TrackingSettings,
+    settings_of,
+)
+from scissorcal.tracking.tracker import Counts, Outcome, PoseEstimate, PoseTracker
 
 __all__ = [
     "CameraErrors",
@@ -73,10 +52,3 @@ __all__ = [
     "track_figures",
     "track_verdicts",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    for home, names in _HOMES.items():
-        if name in names:
-            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
