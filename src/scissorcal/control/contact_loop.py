@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,8 +78,7 @@ class ContactLoop:
         )
 
 
-@dataclass(frozen=True)
-class ContactGains:
+class ContactGains(NamedTuple):
     """Damping along the normal and the force's integral, both 1/s, and the share of the force's
     error that is answered at once; ``HybridConfig``'s names."""
 

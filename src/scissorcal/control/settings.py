@@ -1,7 +1,8 @@
 """The servo's configuration of CONTROL: gains at every place of the path, limits, refusals."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,8 +44,7 @@ COUNTS = 4
 FORCE_STOP_FACTOR, FORCE_STOP_N = 2.0, 2.0
 
 
-@dataclass(frozen=True)
-class Material:
+class Material(NamedTuple):
     """What the tip presses on: its stiffness (N/m), its friction against the tip, and the most that
     a touch may peak at (N)."""
 
@@ -53,8 +53,7 @@ class Material:
     peak_N: float
 
 
-@dataclass(frozen=True)
-class Settings:
+class Settings(NamedTuple):
     """What a run of CONTROL is configured with, and the least and largest mass (kg) on its path."""
 
     config: ControlConfig

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,8 +142,7 @@ KINK_RAD = math.radians(10.0)
 """Turn of the normal within SPACING_M that no radius of 3 mm has."""
 
 
-@dataclass(frozen=True, eq=False)
-class ContourMap:
+class ContourMap(NamedTuple):
     """The contour over a stretch of the plate: places along it against the plate's x axis.
 
     ``x`` (n,) in m ascends; ``place`` (n,) in m counts along the contour. ``feet`` are its points.

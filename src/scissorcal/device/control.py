@@ -12,6 +12,7 @@ and Wittenmark, Computer-Controlled Systems, 1997, sections 2.3 and 3.2).
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +39,7 @@ INTEGRAL = 4
 """Place of the integral among the loop's states."""
 
 
-@dataclass(frozen=True)
-class Gains:
+class Gains(NamedTuple):
     """PID of one axis: effort per error, per rate error, per error and second."""
 
     kp: float

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 from scissorcal.device.control import (
     GAIN_MARGIN,
@@ -41,8 +42,7 @@ INTEGRALS = (1.25, 2.0, 4.0)
 LEAST_DELAY_S = 1e-4
 
 
-@dataclass(frozen=True)
-class Demand:
+class Demand(NamedTuple):
     """What a capture asks of an axis: it must not fall behind by ``error_limit``.
 
     ``rate`` and ``acceleration`` are the plan's largest, ``load`` is the effort that material may
@@ -55,8 +55,7 @@ class Demand:
     error_limit: float
 
 
-@dataclass(frozen=True)
-class Design:
+class Design(NamedTuple):
     """Gains for an axis, with its rate filter, and the margins that they leave."""
 
     axis: Axis

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import cycle
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -166,8 +167,7 @@ def press_openings(recipe: Recipe, identity: Identity) -> tuple[tuple[float, flo
     return tuple((place.bottom, place.top) for place in places)
 
 
-@dataclass(frozen=True)
-class _Cut:
+class _Cut(NamedTuple):
     """One stroke: where the pivot stands, and the openings between which it closes."""
 
     advance: float

@@ -9,9 +9,8 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,8 +54,7 @@ _QEMU = (
 )
 
 
-@dataclass(frozen=True)
-class StepCost:
+class StepCost(NamedTuple):
     """Work of one model: ns on this computer, executed instructions on a Cortex-M4F.
 
     ``loading`` is what decoding and integrating its tables takes, once. ``stroke`` has the mean

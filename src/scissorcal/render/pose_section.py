@@ -1,8 +1,9 @@
 """The section of a plate in space with the rig's plane, in which the blades meet."""
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from statistics import NormalDist
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,8 +16,7 @@ STEEPEST_RAD = np.radians(45.0)
 """Beyond, between the plate's axes and the rig's, a plate is not one that the blades can cut."""
 
 
-@dataclass(frozen=True, eq=False)
-class PoseSection:
+class PoseSection(NamedTuple):
     """What of a plate's pose reaches the torque.
 
     ``section`` is what the kernel takes. ``slopes`` (5, 6) are its numbers' derivatives by a
@@ -162,8 +162,7 @@ def _cross(axis: Array) -> Array:
 OPENINGS, CONTACTS = 24, 12
 
 
-@dataclass(frozen=True)
-class TorqueSpread:
+class TorqueSpread(NamedTuple):
     """What the pose's uncertainty does to the torque at one state of the rig.
 
     ``torque_Nm`` is the package's there, ``sd_Nm`` its standard deviation by the pose.

@@ -12,6 +12,7 @@ nothing. The shortest delay itself looks like an offset and cannot be seen: see
 import itertools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -88,8 +89,7 @@ class ClockFit:
         return 1e6 * self.drift_sd
 
 
-@dataclass(frozen=True)
-class Jump:
+class Jump(NamedTuple):
     """At ``host_s`` the clock jumped ahead by ``by_s`` (back, if negative)."""
 
     host_s: float

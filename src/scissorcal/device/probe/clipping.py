@@ -2,7 +2,7 @@
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,7 @@ CLIPPING = Check(
 )
 
 
-@dataclass(frozen=True)
-class Strike:
+class Strike(NamedTuple):
     """What one strike showed; ``told`` is False where it was braked or never arrived."""
 
     flagged: bool
@@ -149,8 +148,7 @@ HELD_S = 0.01
 LEAST_HELD = 40
 
 
-@dataclass(frozen=True)
-class Follow:
+class Follow(NamedTuple):
     """How the measured torque follows the commanded one: gain and lag (s), the answer's tick in."""
 
     gain: Estimate

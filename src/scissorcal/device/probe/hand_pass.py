@@ -5,7 +5,7 @@ zero show without any torque, so that a later push in the wrong direction accuse
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,8 +44,7 @@ OPENING_ZERO = Check(
 give. At an edge of 60 mm it is 1.5 mm at the tip."""
 
 
-@dataclass(frozen=True)
-class HandPass:
+class HandPass(NamedTuple):
     """Openings (rad) at the closed and the open stop, as two passes showed them if one was odd."""
 
     closed: tuple[float, ...]

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,8 +33,7 @@ class Push:
         return float(np.abs(self.places - self.places[0]).max())
 
 
-@dataclass(frozen=True)
-class Prior:
+class Prior(NamedTuple):
     """What is known before: the delay (s) as flags show it, and the torque that first moved.
 
     ``stop``: 1 (-1) where something carries the blades to their closed (open) stop, 0 else.

@@ -5,7 +5,7 @@ determined ends a probe as a verdict that fails does, without accusing anything.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from scissorcal.device.probe.idle import REST_RAD, Idle
 from scissorcal.device.probe.joint_values import LATE_S
@@ -39,8 +39,7 @@ INERTIA = Check(
 margin, which is what a gain margin of 2 allows."""
 
 
-@dataclass(frozen=True)
-class Words:
+class Words(NamedTuple):
     """The words for an axis: its name, what each sign does, and the remedies."""
 
     name: str
@@ -72,8 +71,7 @@ SLEDGE = Words(
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """Verdicts, and the sentence that ends the probe undetermined; empty where it goes on."""
 
     verdicts: tuple[Verdict, ...]

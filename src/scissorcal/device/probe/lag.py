@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,8 +33,7 @@ LOST_COMMANDS = Check("probe.line lost commands", f"{LINE}: share of commands", 
 """Share of commands. One in 200 lost lets two in a row go missing once a minute at 1 kHz."""
 
 
-@dataclass(frozen=True)
-class Lag:
+class Lag(NamedTuple):
     """``ticks``: from the state that a command answers to the first that shows it; empty where
     ENABLE never showed. ``lost`` of ``asked`` single commands did not arrive."""
 

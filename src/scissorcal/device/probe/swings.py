@@ -1,7 +1,7 @@
 """Planned swings: each is aimed by what the last ones taught, until the inertia is known."""
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,8 +38,7 @@ AIM_SHARE, WAY_SHARE, RATE_SHARE = 0.6, 0.8, 0.7
 """Of the bounds: what the model aims at, and what it may reach with the lightest blades."""
 
 
-@dataclass(frozen=True)
-class Swung:
+class Swung(NamedTuple):
     """All pushes of the blades, what the model says of them, and the strongest beside it."""
 
     pushes: tuple[Pushed, ...]

@@ -21,8 +21,8 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from types import FrameType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,8 +37,7 @@ WAITING_FRAMES = 256
 READ_BYTES = 4096
 
 
-@dataclass(frozen=True)
-class ServeReport:
+class ServeReport(NamedTuple):
     """How a served rig ended: ticks served, how often it stood still, whether it was unplugged."""
 
     ticks: int

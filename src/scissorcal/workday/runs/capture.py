@@ -176,8 +176,7 @@ def _capture_until(
     After each stroke the recording gets a mark with how far it is: the last one of an interrupted
     capture shows that the tolerance was not reached.
     """
-    from scissorcal.device.capture import open_writer, planned
-    from scissorcal.device.capture_by_parts import capture_by_parts
+    from scissorcal.device.capture import capture_by_parts, open_writer, planned
     from scissorcal.recording.until import UNTIL_MARK
     from scissorcal.workday.stock import seconds_at_rig
     from scissorcal.workday.until import Limits, UntilTolerance
