@@ -18,7 +18,7 @@ from scissorcal.device.trajectory import (
     refuse_without_motor,
 )
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed
 

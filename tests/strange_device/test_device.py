@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.paths import Reference
+from scissorcal.device import Reference
 from scissorcal.device.port_motion import open_motion
 from scissorcal.kernel import ServoConfig, StopReason
 

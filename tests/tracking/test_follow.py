@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from scissorcal.aliases import Array
 from scissorcal.errors import DeviceError
-from scissorcal.model.surface import Plane
+from scissorcal.model import Plane
 from scissorcal.tracking.follow import PoseFollower
 from scissorcal.tracking.plate_pose import pose_error
 from scissorcal.tracking.rows import CameraPose, TipContact
