@@ -202,7 +202,7 @@ class _Run:
             return
         self.share = foot.share
         place = self._contour.place_of(foot)
-        motion.send_contour(contour_at(foot, place, pose, lift=lift))
+        motion.send_contour(contour_at(foot, place, pose, lift))
 
     def _foot(self, motion: Motion, pose: PlatePose | None, now: float) -> Foot | None:
         """The contour below the tip, None (and a sentence) where the pose does not give it."""

@@ -104,7 +104,7 @@ def on_plate(surface: Surface, pose: PlatePose, x_plate: float, start: Array) ->
     return None
 
 
-def contour_at(foot: Foot, place: float, pose: PlatePose, *, lift: bool = False) -> Contour:
+def contour_at(foot: Foot, place: float, pose: PlatePose, lift: bool = False) -> Contour:
     """What the servo needs of a foot; ``place`` (m) is where it is along the contour."""
     reach = np.array((*foot.point, 0.0)) - pose.translation
     velocity = pose.velocity + np.cross(pose.turn_rate, reach)

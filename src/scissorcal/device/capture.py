@@ -107,7 +107,7 @@ def capture(
     if kind == "friction-advance":
         refuse_without_motor(session.identity)
     plan = None if hand else planned(session.recipe, session.identity, kind)
-    recorder = Recorder(writer, coverage_of(session.recipe, session.identity, kind, hand=hand))
+    recorder = Recorder(writer, coverage_of(session.recipe, session.identity, kind, hand))
     operator = session.operator
     with _motion_for(session, plan, _gains_for(session, kind, writer)) as motion:
         loader = Loader(motion, recorder, operator.confirm)

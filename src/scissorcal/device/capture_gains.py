@@ -321,7 +321,7 @@ def _designed(
     axis: Axis, demand: Demand, cutoffs: tuple[float, ...], name: str, lack: str, fall: float
 ) -> Design:
     try:
-        return design_gains(axis, demand, cutoffs, name, fall=fall)
+        return design_gains(axis, demand, cutoffs, name, fall)
     except DeviceError as error:
         raise DeviceError(f"{error} {lack}".rstrip()) from None
 

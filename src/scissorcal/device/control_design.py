@@ -68,7 +68,6 @@ def design_gains(
     demand: Demand,
     cutoffs_Hz: tuple[float, ...],
     name: str = "opening",
-    *,
     fall: float = 0.0,
 ) -> Design:
     """The gains, and one of ``cutoffs_Hz`` for the rate, that follow best with the stated margins.

@@ -61,7 +61,7 @@ class LockstepLink:
         self._nonce = 0
         self._closed = False
         answer = self._ask(
-            lambda nonce: Hello(nonce=nonce),
+            Hello,
             lambda reply, nonce: isinstance(reply, Identity) and reply.nonce_echo == nonce,
         )
         if not isinstance(answer, Identity):

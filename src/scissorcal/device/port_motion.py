@@ -23,7 +23,7 @@ from scissorcal.kernel import (
 
 
 def open_motion(
-    link: Link, config: ServoConfig, task: LoopTask = IDLE, *, every_s: float = BLOCK_S
+    link: Link, config: ServoConfig, task: LoopTask = IDLE, every_s: float = BLOCK_S
 ) -> Motion:
     """Start the servo on a link: in a separate process on a port, in this process in virtual time.
 

@@ -247,7 +247,7 @@ class Row16:
         scale = float(np.float32(math.ldexp(fraction, exponent)))
         return cls(float(np.float32(low - LOWEST * scale)), scale)
 
-    def numbers(self, values: ArrayLike, *, down: bool = False) -> NDArray[np.int16]:
+    def numbers(self, values: ArrayLike, down: bool = False) -> NDArray[np.int16]:
         """The whole numbers nearest to ``values``, or, with ``down``, not above them."""
         wanted = np.asarray(values, dtype=np.float64)
         if self.scale == 0.0:
@@ -265,7 +265,7 @@ class Row16:
 
     def rounded(self, values: ArrayLike, *, down: bool = False) -> Array:
         """The stored values nearest to ``values``, or, with ``down``, not above them."""
-        return self.values(self.numbers(values, down=down)).astype(np.float64)
+        return self.values(self.numbers(values, down)).astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -131,7 +131,7 @@ def render(
     watch = Watch(_travel(package), writer, operator.progress, how.seconds)
     task = LoopTask(tables, package.pieces or None)
     every_s = EVERY_S if follower else BLOCK_S
-    with open_motion(session.link, config, task, every_s=every_s) as motion:
+    with open_motion(session.link, config, task, every_s) as motion:
         watch.wanted = _prepare(motion, how.strokes, operator.confirm)
         motion.fresh_sheet(0.0)
         with follower or nullcontext():

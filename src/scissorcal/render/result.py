@@ -136,7 +136,7 @@ def render_verdicts(
     """
     return (
         _admitted(admission),
-        felt_verdict(admission, accepted=accepted),
+        felt_verdict(admission, accepted),
         *loop_verdicts("render", report, latency, tick_us),
         _passive(report.ledger),
         _motor_sense(report.ledger),
@@ -154,7 +154,7 @@ def _admitted(admission: Admission) -> Verdict:
     return ADMISSION.judge(share, why)
 
 
-def felt_verdict(admission: Admission, *, accepted: bool = False) -> Verdict:
+def felt_verdict(admission: Admission, accepted: bool = False) -> Verdict:
     """Whether what is felt of an admitted rendering is the package's torque, to the tolerance.
 
     Beyond it the check fails, or, where a person ``accepted`` that, decides nothing and states it.

@@ -36,7 +36,6 @@ def fit_joint(
     pushes: Sequence[Push],
     prior: Prior,
     noise_rad: float,
-    *,
     start: Array | None = None,
     modes: bool = True,
 ) -> JointFit:

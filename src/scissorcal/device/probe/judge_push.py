@@ -91,7 +91,7 @@ def judge_rest(found: Idle) -> Outcome:
     return Outcome((REST.not_evaluated(why, moved),), why)
 
 
-def judge_search(found: Search, axis: Axis, words: Words, *, hand: bool) -> Outcome:
+def judge_search(found: Search, axis: Axis, words: Words, hand: bool) -> Outcome:
     """Whether the axis moved both ways; ``hand``: a pass by hand has shown the encoder alive."""
     if found.stop or len(found.movers) == 2:
         return Outcome(())
@@ -122,9 +122,7 @@ def judge_search(found: Search, axis: Axis, words: Words, *, hand: bool) -> Outc
     return _open(check, why, words.scale * axis.effort)
 
 
-def judge_sense(
-    found: Search, sensed: Sense, words: Words, motor_sign: int, *, hand: bool
-) -> Outcome:
+def judge_sense(found: Search, sensed: Sense, words: Words, motor_sign: int, hand: bool) -> Outcome:
     """Which way the axis goes when it is pushed."""
     check = DIRECTION[words.name]
     share = 0.5 + 0.5 * sensed.votes / max(sensed.pairs, 1)

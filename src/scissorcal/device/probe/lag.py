@@ -104,7 +104,7 @@ def _toggled(talk: Talk) -> Stage[list[int]]:
             faulty = bool(state.flags & StateFlag.FAULT_LATCHED)
             disturbed = disturbed or faulty  # this computer was late, and the device braked
             state = yield answer._replace(clear=faulty)
-            found = _first(talk, begin, on=on)
+            found = _first(talk, begin, on)
             shown = found is not None
             if found is not None and not disturbed:
                 lags.append(found - asked)
@@ -143,7 +143,7 @@ def _shown(talk: Talk, begin: int) -> bool:
     return bool(np.any(heard & int(StateFlag.MOTOR_ENABLED | StateFlag.FAULT_LATCHED)))
 
 
-def _first(talk: Talk, begin: int, *, on: bool) -> int | None:
+def _first(talk: Talk, begin: int, on: bool) -> int | None:
     """Sequence of the first state since ``begin`` in which the motors are on, or off."""
     heard = talk.heard(begin)
     showing = ((heard["flags"] & int(StateFlag.MOTOR_ENABLED)) != 0) == on

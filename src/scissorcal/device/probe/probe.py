@@ -271,9 +271,9 @@ def _push(talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe) -> None:
     fell = fallen(float(talk.heard(talk.mark() - 1)["opening"][0]), identity)
     if fell is not None and hand and not found.stop:
         finding.take(Outcome((fell,), fell.why))
-    finding.take(judge_search(found, axis, BLADES, hand=hand))
+    finding.take(judge_search(found, axis, BLADES, hand))
     sensed = sense(talk, axis, found)
-    finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand=hand))
+    finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand))
     held = [
         push(talk, axis, sign * HELD_SHARE * found.effort, GAIN_HOLD_S, found.hold)
         for sign in (1, -1)
@@ -287,8 +287,8 @@ def _push(talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe) -> None:
         found.stop,
     )
     step = observed_step(talk.heard()["opening"])
-    facts = {"encoder_step_rad": step}
-    finding.add([judge_step(step, identity.opening_resolution)], facts=facts)
+    judged = [judge_step(step, identity.opening_resolution)]
+    finding.add(judged, facts={"encoder_step_rad": step})
     noise = math.hypot(quiet.jitter_rad, identity.opening_resolution / math.sqrt(12.0))
     swung = swings(talk, axis, (*found.pushes, *sensed.pushes, *held), prior, noise, found.hold)
     zero = finding.result.torque_zero_Nm

@@ -96,7 +96,7 @@ def _fitted(
     ``modes`` others are sought in any case.
     """
     with talk.paused():
-        fit = fit_joint(pushes, prior, noise_rad, start=start, modes=modes)
+        fit = fit_joint(pushes, prior, noise_rad, start, modes)
         if modes or (fit.misfit <= EXPLAINED and not fit.strange):
             return fit
         anew = fit_joint(pushes, prior, noise_rad, modes=False)
