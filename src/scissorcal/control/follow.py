@@ -16,11 +16,11 @@ from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.path_file import SurfacePoints
 from scissorcal.control.settings import (
     LIFT_M,
+    MUST_ASK,
     Material,
     Settings,
     control_settings,
     put_plate,
-    refuse_nobody,
 )
 from scissorcal.control.surface_path import (
     ContourMap,
@@ -38,7 +38,7 @@ from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import LoopTask, Motion, Samples
 from scissorcal.device.paths import PathBuilder, Reference
 from scissorcal.device.port_motion import open_motion
-from scissorcal.device.session import RigSession, is_simulator
+from scissorcal.device.session import RigSession, is_simulator, refuse_nobody
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import CONTROL_DTYPE, ConfigKey, ControlFlag
 from scissorcal.model.surface import Surface
@@ -92,7 +92,7 @@ def control(
     """
     link, recipe, identity = session.link, session.recipe, session.identity
     if not job.tracked:
-        refuse_nobody(session)
+        refuse_nobody(identity, session.operator.confirm, MUST_ASK)
     # Stiff ones, without material: sweeps of friction give up stiffness for damping. By the mean of
     # the delay, as the gains of contact are (decision 136).
     probed = Probed.of(session.probe)

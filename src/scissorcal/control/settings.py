@@ -17,7 +17,7 @@ from scissorcal.control.mechanics import (
 )
 from scissorcal.control.surface_path import Foot, TimedPath
 from scissorcal.device.motion import Motion
-from scissorcal.device.session import Confirm, RigSession, is_simulator
+from scissorcal.device.session import Confirm, RigSession, is_simulator, refuse_nobody
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, ControlConfig, HybridConfig, Identity
 from scissorcal.recipe.schema import Limits
@@ -255,6 +255,7 @@ def _largest_force(
 
 PLATE = 2.0
 """MATERIAL that puts a virtual rig's plate in."""
+MUST_ASK = "A person must be asked to put the plate in its place"
 REQUEST_FIRST = (
     "Put the plate in its place, below the blades, and keep hands off the handles and away from "
     "the blades: once the plate's pose is known, they open, move over the plate and press on it."
@@ -270,7 +271,7 @@ def ask_for_plate(session: RigSession) -> None:
 
     Nothing moves meanwhile. InputError where nobody can be asked.
     """
-    refuse_nobody(session)
+    refuse_nobody(session.identity, session.operator.confirm, MUST_ASK)
     if not session.simulated:
         assert session.operator.confirm is not None
         session.operator.confirm(REQUEST_FIRST)
@@ -284,12 +285,3 @@ def put_plate(motion: Motion, confirm: Confirm | None) -> None:
     assert confirm is not None
     with motion.paused():
         confirm(REQUEST)
-
-
-def refuse_nobody(session: RigSession) -> None:
-    """InputError where a person must be asked, and none can be."""
-    if not session.simulated and session.operator.confirm is None:
-        raise InputError(
-            "A person must be asked to put the plate in its place: pass a confirm callback that "
-            "shows a sentence and returns when that is done."
-        )

@@ -94,6 +94,14 @@ class RigSession:
         return is_simulator(self.identity)
 
 
+def refuse_nobody(identity: Identity, confirm: Confirm | None, why: str) -> None:
+    """Raise InputError, which begins with ``why``, where a real rig needs a person and has none."""
+    if confirm is None and not is_simulator(identity):
+        raise InputError(
+            f"{why}: pass a confirm callback that shows a sentence and returns when that is done."
+        )
+
+
 def rig_facts(identity: Identity, motor_sign: int, probe: ProbeResult | None) -> dict[str, Any]:
     """What a recording holds of its rig: the identity, a motor sign of -1, and the probe.
 
@@ -162,11 +170,8 @@ class Loader:
         self._recorder = recorder
         self._confirm = confirm
         self.simulated = is_simulator(motion.identity)
-        if not self.simulated and confirm is None:
-            raise InputError(
-                "This capture must ask a person to clear the blades and load material: pass a "
-                "confirm callback that shows a sentence and returns when that is done."
-            )
+        why = "This capture must ask a person to clear the blades and load material"
+        refuse_nobody(motion.identity, confirm, why)
 
     def clear(self, request: str) -> None:
         """Have everything taken out from between the blades."""

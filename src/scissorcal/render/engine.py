@@ -6,7 +6,7 @@ from pathlib import Path
 
 from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, LoopTask, Motion
 from scissorcal.device.port_motion import open_motion
-from scissorcal.device.session import Confirm, RigSession, is_simulator, rig_facts
+from scissorcal.device.session import Confirm, RigSession, is_simulator, refuse_nobody, rig_facts
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, PlateConfig, ServoConfig
@@ -248,11 +248,8 @@ def _refuse_impossible(session: RigSession, seconds: float) -> None:
         raise InputError(
             f"Rendering for {seconds:g} s is not possible: give a finite time above 0."
         )
-    if not session.simulated and session.operator.confirm is None:
-        raise InputError(
-            "Rendering must ask a person to clear the blades first: pass a confirm callback that "
-            "shows a sentence and returns when that is done."
-        )
+    why = "Rendering must ask a person to clear the blades first"
+    refuse_nobody(session.identity, session.operator.confirm, why)
 
 
 def _applied(package: ModelPackage, recipe: Limits, identity: Identity) -> AppliedLimits:

@@ -38,8 +38,9 @@ from scissorcal.device.session import (
     ShowProgress,
     identity_facts,
     is_simulator,
+    refuse_nobody,
 )
-from scissorcal.errors import DeviceError, InputError
+from scissorcal.errors import DeviceError
 from scissorcal.identity import digest
 from scissorcal.kernel import Capability, ConfigKey, Identity
 from scissorcal.recipe.schema import Recipe
@@ -123,11 +124,7 @@ def probe(session: RigSession, *, then: str = "", now: datetime | None = None) -
     """
     identity, recipe = session.identity, session.recipe
     confirm, tell = session.operator.confirm, session.operator.progress
-    if confirm is None and not is_simulator(identity):
-        raise InputError(
-            "The probe must ask a person to clear the blades first: pass a confirm callback that "
-            "shows a sentence and returns when that is done."
-        )
+    refuse_nobody(identity, confirm, "The probe must ask a person to clear the blades first")
     made = (now or datetime.now(UTC)).astimezone(UTC).isoformat(timespec="seconds")
     finding = _Finding(
         ProbeResult(session.name, identity_digest(identity), made, recipe.rig.motor_sign), tell
