@@ -17,7 +17,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -78,7 +77,8 @@ class ContactLoop:
         )
 
 
-class ContactGains(NamedTuple):
+@dataclass(frozen=True)
+class ContactGains:
     """Damping along the normal and the force's integral, both 1/s, and the share of the force's
     error that is answered at once; ``HybridConfig``'s names."""
 
