@@ -8,6 +8,7 @@ from .fields import MOST_SPEEDS as MOST_SPEEDS
 from .friction import AdvanceSettings as AdvanceSettings
 from .friction import FitFriction as FitFriction
 from .friction import FitFrictionAdvance as FitFrictionAdvance
+from .friction import as_first_named as as_first_named
 from .library import builtin_recipe as builtin_recipe
 from .library import recipe_names as recipe_names
 from .library import recipe_path as recipe_path
