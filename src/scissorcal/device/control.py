@@ -72,8 +72,7 @@ class Axis:
         return replace(self, rate_cutoff_Hz=rate_cutoff_Hz)
 
 
-@dataclass(frozen=True)
-class Margins:
+class Margins(NamedTuple):
     """How far a loop is from oscillation, at the worst inertia within its factor.
 
     ``gain`` is the least factor by which the loop's gain may change either way. Both are 0 where

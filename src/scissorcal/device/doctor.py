@@ -6,6 +6,7 @@ import select
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,8 +51,7 @@ class Measurements:
     realtime_priority: int
 
 
-@dataclass(frozen=True)
-class Examination:
+class Examination(NamedTuple):
     """Measurements and the verdicts on them."""
 
     measurements: Measurements

@@ -3,6 +3,7 @@
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, LoopTask, Motion
 from scissorcal.device.port_motion import open_motion
@@ -152,8 +153,7 @@ def render(
     return result
 
 
-@dataclass(frozen=True)
-class _Start:
+class _Start(NamedTuple):
     """What is known before any force: limits, admission, whether it is accepted, warnings."""
 
     limits: AppliedLimits
@@ -168,11 +168,11 @@ def _judged(
     """Compare the package with the rig; InputError where it cannot be rendered there."""
     identity = session.identity
     limits = _applied(package, session.recipe.limits, identity)
-    mismatch = find_mismatch(package, identity)
+    other_rig, notes = find_mismatch(package, identity)
     if not how.allow_mismatch:
         refuse_other_rig(package, identity)
     admission = admit_package(package, identity, rig, limits.torque_Nm)
-    warnings = package.warnings + mismatch.other_rig + mismatch.notes + _admitted(admission)
+    warnings = package.warnings + other_rig + notes + _admitted(admission)
     return _Start(limits, admission, how.accept_derated and admission.is_felt, warnings)
 
 

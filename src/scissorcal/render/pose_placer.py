@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -145,8 +145,7 @@ class PoseReport:
         )
 
 
-@dataclass(frozen=True)
-class _Judged:
+class _Judged(NamedTuple):
     """A section and, where it is not used, the kind of reason and a sentence."""
 
     placed: PoseSection | None
@@ -206,7 +205,7 @@ class PosePlacer:
         age = now - estimate.time
         judged = self._judge(estimate)
         if not judged.kind and age > STALE_S:
-            judged = replace(judged, kind="late", sentence=late_sentence(age))
+            judged = judged._replace(kind="late", sentence=late_sentence(age))
         section = judged.placed.section if judged.placed else Section(0.0, 0.0)
         motion.place(section, not judged.kind, age)
         if judged.placed and self._record:

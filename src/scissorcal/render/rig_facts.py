@@ -144,35 +144,26 @@ and changes forces by less than a hand tells apart (7 %)."""
 ALLOW = "--allow-mismatch"
 
 
-@dataclass(frozen=True)
-class Mismatch:
-    """How a device differs from the rig that a package is of.
+def find_mismatch(
+    package: ModelPackage, identity: Identity
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """How a device differs from the rig that a package is of: sentences.
 
-    ``other_rig`` are sentences for which a rendering is refused: handle radius, name, serial number
-    and limits. ``notes`` are only said.
-    """
-
-    other_rig: tuple[str, ...]
-    notes: tuple[str, ...]
-
-
-def find_mismatch(package: ModelPackage, identity: Identity) -> Mismatch:
-    """Compare a package with what a device states.
-
-    Raises InputError where the scene and the device have no opening in common, or nothing would be
-    felt.
+    The first are those for which a rendering is refused: handle radius, name, serial number and
+    limits; the second are only said. Raises InputError where the scene and the device have no
+    opening in common, or nothing would be felt.
     """
     _refuse_impossible(package, identity)
-    return Mismatch(_other_rig(package, identity), _notes(package, identity))
+    return _other_rig(package, identity), _notes(package, identity)
 
 
 def refuse_other_rig(package: ModelPackage, identity: Identity) -> None:
     """Raise InputError, with each difference by name, where a package is of another rig."""
-    found = find_mismatch(package, identity).other_rig
-    if found:
+    differences = find_mismatch(package, identity)[0]
+    if differences:
         raise InputError(
-            f"The package {package.manifest.name} is of another rig. {' '.join(found)} Capture, "
-            "fit and build a package on this rig, or render this one all the same with "
+            f"The package {package.manifest.name} is of another rig. {' '.join(differences)} "
+            "Capture, fit and build a package on this rig, or render this one all the same with "
             f"{ALLOW}."
         )
 

@@ -87,7 +87,6 @@ def idle(talk: Talk) -> Idle:
         swings = _swing(float(np.std(opening - slow)), largest_correlation(opening - slow))
         if not (np.ptp(slow) > REST_RAD or swings):
             break
-    not_finite = tuple(name for name in MEASURED if not np.isfinite(heard[name]).all())
     opening = heard["opening"][np.isfinite(heard["opening"])]
     if len(opening) == 0:
         opening = np.array([math.nan])
@@ -101,7 +100,7 @@ def idle(talk: Talk) -> Idle:
     return Idle(
         fault_stays=faults[0],
         encoder_fault=faults[1],
-        not_finite=not_finite,
+        not_finite=tuple(name for name in MEASURED if not np.isfinite(heard[name]).all()),
         opening_low=float(opening.min()),
         opening_high=float(opening.max()),
         moved_rad=float(np.ptp(slow)),
