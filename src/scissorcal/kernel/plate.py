@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -66,7 +66,8 @@ KNOWN_PLATE = PlateConfig()
 """Nothing of this is evaluated."""
 
 
-class Pull(NamedTuple):
+@dataclass(frozen=True)
+class Pull:
     """What the material pushes the plate with, by number of its section: N, N, N m and J."""
 
     edge_x: float
@@ -122,7 +123,7 @@ class PlacedModel:
             self._out,
             self._pull,
         )
-        pull = Pull(*(float(getattr(self._pull, name)) for name in Pull._fields))
+        pull = Pull(*(float(getattr(self._pull, field.name)) for field in fields(Pull)))
         return step_output(self._out), pull
 
     def torque(self, section: Section, opening: float, advance: float, crack: float) -> float:
