@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.control.contact_loop import ContactLoop
-from scissorcal.control.contours import Foot
+from scissorcal.control.surface_path import Foot
 from scissorcal.kernel import AxisFriction, Identity
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.friction import AxisLaw, FrictionLaw, angle_slope, friction_level

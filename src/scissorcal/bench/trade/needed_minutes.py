@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.bench.trade.case import Case
 from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.rig_record import identity_of
+from scissorcal.device.session import identity_of
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import ScissorcalError
 from scissorcal.recipe.schema import CaptureCut, CaptureFriction

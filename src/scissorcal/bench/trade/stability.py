@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.device.rig_record import identity_of
+from scissorcal.device.session import identity_of
 from scissorcal.kernel import ModelTables
 from scissorcal.model import FrictionLaw
 from scissorcal.model.friction import angle_factor

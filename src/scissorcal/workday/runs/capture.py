@@ -72,8 +72,8 @@ def capture_into(
     without an advance motor or without travel, before anything moves; MissingError where one until
     the tolerance lacks a fit that it builds on; and what the capture itself raises.
     """
-    from scissorcal.device.advance_trajectory import refuse_without_motor
     from scissorcal.device.capture import capture, open_writer, planned
+    from scissorcal.device.trajectory import refuse_without_motor
     from scissorcal.workday.engine import Engine
 
     _refuse_at_odds(kind, options)
@@ -176,8 +176,7 @@ def _capture_until(
     After each stroke the recording gets a mark with how far it is: the last one of an interrupted
     capture shows that the tolerance was not reached.
     """
-    from scissorcal.device.capture import open_writer, planned
-    from scissorcal.device.capture_by_parts import capture_by_parts
+    from scissorcal.device.capture import capture_by_parts, open_writer, planned
     from scissorcal.recording.until import UNTIL_MARK
     from scissorcal.workday.stock import seconds_at_rig
     from scissorcal.workday.until import Limits, UntilTolerance

@@ -98,13 +98,13 @@ class _ControlTask(RigTask["ControlResult"]):
     edge: "Edge"
 
     def prepare(self, session: "RigSession") -> None:
-        from scissorcal.control.plate_request import ask_for_plate
+        from scissorcal.control.settings import ask_for_plate
 
         if self.tracked:
             ask_for_plate(session)
 
     def open_writer(self, session: "RigSession", path: Path) -> "RecordingWriter":
-        from scissorcal.device.rig_record import rig_facts
+        from scissorcal.device.session import rig_facts
         from scissorcal.recording import Joint, RecordingFacts, RecordingWriter
 
         identity, sign = session.identity, session.recipe.rig.motor_sign

@@ -83,7 +83,7 @@ class _RenderTask(RigTask["RenderResult"]):
     stale: str
 
     def check(self, session: "RigSession") -> None:
-        from scissorcal.render.mismatch import refuse_other_rig
+        from scissorcal.render.rig_facts import refuse_other_rig
 
         if not self.options.allow_mismatch:
             refuse_other_rig(self.package, session.identity)

@@ -265,6 +265,6 @@ def _with_delay(recipe: "Recipe", camera_delay_ms: float | None) -> "Recipe":
 
 
 def _facts(link: "Link | None", recipe: "Recipe") -> dict[str, Any]:
-    from scissorcal.device.rig_record import rig_facts
+    from scissorcal.device.session import rig_facts
 
     return {} if link is None else rig_facts(link.identity, recipe.rig.motor_sign, None)

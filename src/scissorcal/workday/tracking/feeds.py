@@ -76,7 +76,7 @@ def live_feed(
 def idle_rig(session: "RigSession") -> AbstractContextManager["Motion"]:
     """Start the servo with the motors off: the rig only tells where it is."""
     from scissorcal.device.capture import servo_config
-    from scissorcal.device.open_motion import open_motion
+    from scissorcal.device.port_motion import open_motion
 
     return open_motion(session.link, servo_config(session.recipe, session.identity))
 

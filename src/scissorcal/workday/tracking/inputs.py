@@ -17,7 +17,7 @@ from scissorcal.workday.tracking.track_recorder import RecordedTrack, TrackAbout
 if TYPE_CHECKING:
     from scissorcal.device.link import Link
     from scissorcal.recipe.schema import Recipe
-    from scissorcal.tracking.contacts import TipContacts
+    from scissorcal.tracking.rows import TipContacts
     from scissorcal.workday.tracking.track_pictures import PoseFinder
 
 KnownPose = tuple[Array, Array, Array]
@@ -106,7 +106,7 @@ def track_facts(
 def tip_contacts(engine: Engine, recipe: "Recipe") -> "tuple[TipContacts, bool]":
     """Contacts of the upper blade's tip, and whether friction of the opening was fitted."""
     from scissorcal.model.blade_point import BladePoint
-    from scissorcal.tracking.contacts import TipContacts
+    from scissorcal.tracking.rows import TipContacts
     from scissorcal.workday.runs.cut import blade_edge
     from scissorcal.workday.runs.friction import axis_of_fit
 

@@ -15,7 +15,7 @@ from scissorcal.device.sim.plate_contact import plate_pose
 from scissorcal.device.sim.specimen import Specimen, TouchedPlate, load_specimen
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey
-from scissorcal.tracking.rotation import rotation_of, rotation_vector
+from scissorcal.tracking.plate_pose import rotation_of, rotation_vector
 from scissorcal.vision.live import Frame
 from scissorcal.vision.sim.optics import SimPose
 from scissorcal.vision.sim.scenes import LEVEL
