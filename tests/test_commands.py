@@ -13,7 +13,7 @@ from typer.core import TyperCommand, TyperGroup
 
 import scissorcal
 from scissorcal.cli.root import scissorcal_command
-from scissorcal.recipe.library import recipe_names
+from scissorcal.recipe.load import recipe_names
 from scissorcal.workday.steps import STEPS
 from tests.test_docs import ROOT
 

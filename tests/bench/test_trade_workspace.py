@@ -19,7 +19,7 @@ from scissorcal.bench.trade.study import Task
 from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, TOGETHER, Together
 from scissorcal.bench.trade.torque import WORST
 from scissorcal.errors import InputError, MissingError
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe.load import schemas_dir
 from scissorcal.report.twin import twin_text
 from scissorcal.workday.runs import bench
 from scissorcal.workday.runs.bench import TradeOutcome, TradeSettings, trade_workspace

@@ -16,7 +16,7 @@ import typer
 from scissorcal.cli.lazy import LazyGroup
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.root import run
-from scissorcal.recipe.library import builtin_recipe, schemas_dir
+from scissorcal.recipe.load import builtin_recipe, schemas_dir
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.sim.sim_camera import (
     SIM_LENS,

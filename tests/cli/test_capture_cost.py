@@ -10,9 +10,8 @@ from scissorcal.device.advance_trajectory import advance_plan
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.trajectory import Plan, friction_plan
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.load import parse_recipe
-from scissorcal.recipe.pace import CaptureKind, capture_cost, refuse_long
+from scissorcal.recipe.load import builtin_recipe, parse_recipe
+from scissorcal.recipe.requirements import CaptureKind, capture_cost, refuse_long
 from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.stock import nominal_identity
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from scissorcal.package import open_package
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe.load import schemas_dir
 from scissorcal.recording import write_recording
 from scissorcal.workday.workspace import Workspace
 from tests.calibration.truth import Stroke, Truth, make_recording

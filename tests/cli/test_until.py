@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scissorcal.recording import read_recording
-from scissorcal.recording.until import UNTIL_MARK, UntilMark
+from scissorcal.recording.header import UNTIL_MARK, UntilMark
 
 from .conftest import Cli
 

@@ -19,7 +19,7 @@ from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import ConfigKey
 from scissorcal.model.surface import Plane
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.tracking.plate_pose import PlatePose, fixed_pose, level_plate
 from tests.control.virtual import mechanics, points
 

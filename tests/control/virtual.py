@@ -23,7 +23,7 @@ from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.friction import FrictionLaw
 from scissorcal.model.mechanism import AxisLaw
 from scissorcal.model.surface import Plane, Surface
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recording.probe import Estimate, ProbeResult
 from scissorcal.tracking.plate_pose import PlatePose, PoseSource, fixed_pose, level_plate
 

@@ -1,6 +1,6 @@
 """Recipes of the library, with some keys changed; and short ones, for captures in tests."""
 
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 
 

@@ -15,8 +15,8 @@ from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.session import RigSession
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording
+from scissorcal.recording.header import UNTIL_MARK, UntilMark
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.until import UNTIL_MARK, UntilMark
 from tests.device.recipes import short
 
 RECIPE = short("paper-80gsm")

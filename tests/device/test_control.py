@@ -31,7 +31,7 @@ from scissorcal.device.paths import PathBuilder
 from scissorcal.device.slow_sliding import StribeckFall
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Identity
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recording.probe import Estimate, ProbeResult
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed

@@ -20,8 +20,8 @@ from scissorcal.device.trajectory import (
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.model.edge_points import edge_through
 from scissorcal.recipe.edge import Edge, StatedCurve
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.pace import TURN_ACCELERATION
+from scissorcal.recipe.load import builtin_recipe
+from scissorcal.recipe.requirements import TURN_ACCELERATION
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from scissorcal.device.unanswered import MOST_ENERGY_J, refuse_unanswered
 from scissorcal.errors import DeviceError
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.probe import Estimate
 from tests.device.recipes import changed

@@ -22,8 +22,7 @@ from scissorcal.identity import bytes_digest
 from scissorcal.inference.checkpoint import Walk, load_walks, save_walks
 from scissorcal.package.keys import holds, read_public_keys, signer
 from scissorcal.package.review import Review
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import load_recipe, parse_recipe
+from scissorcal.recipe.load import load_recipe, parse_recipe, recipe_path
 from scissorcal.recipe.plate_layers import plate_pieces, plate_sentence
 from scissorcal.recipe.plate_surface import probed_surface
 from scissorcal.recording import (

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from scissorcal.calibration import FitResult, FitSeries, FittedParameter
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 
 UNITS = {"response_force": "N", "response_exponent": "1", "fracture_energy": "J/m", "kappa": "1"}

@@ -14,8 +14,7 @@ from scissorcal.kernel.tables import Table
 from scissorcal.model.edge import Edge
 from scissorcal.model.edge_points import edge_through
 from scissorcal.package.tables import hermite
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe.load import parse_recipe, recipe_path
 from tests.model.golden_edges import golden
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design import SHEET, box, drawn, layer, recipe_of

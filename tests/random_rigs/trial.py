@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recording.probe import ProbeResult
 
 from .link import RigLink

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from scissorcal.calibration.result import FitResult
-from scissorcal.recipe.library import recipe_path
+from scissorcal.recipe.load import recipe_path
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report import RecordingSummary, build_report, sheet_from_mapping
 from scissorcal.verdicts import Verdict

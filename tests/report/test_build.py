@@ -16,7 +16,7 @@ from scissorcal.calibration.result import FitSeries, FittedParameter
 from scissorcal.errors import InputError, MissingError
 from scissorcal.package import Review
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe.load import schemas_dir
 from scissorcal.report import Fact, FactSheet, build_report, sign_page
 from scissorcal.report.signature_block import unsigned_digest
 from scissorcal.report.twin import schema_text

@@ -13,7 +13,7 @@ import pytest
 
 from scissorcal.calibration.edge.result import SeenPair
 from scissorcal.calibration.result import FitResult
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe.load import schemas_dir
 from scissorcal.recipe.requirements import GeometryKind
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report import Geometry, build_report

@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 
 from .parameters import Blades, Friction, Material, Mechanism, Motor, Rig, Sensors, Servo

@@ -34,7 +34,7 @@ ALLOWED = {
     "scissorcal.device.hand",
     "scissorcal.device.trajectory",
     "scissorcal.kernel",
-    "scissorcal.recipe.library",
+    "scissorcal.recipe.load",
     "scissorcal.recipe.schema",
     "scissorcal.recording",
 }

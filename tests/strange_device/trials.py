@@ -13,7 +13,7 @@ from scissorcal.device.recorder import unloaded_sentence
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError, ScissorcalError
 from scissorcal.package import ModelPackage
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
 from scissorcal.render import Rendering, render

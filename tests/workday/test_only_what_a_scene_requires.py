@@ -19,8 +19,7 @@ from scissorcal.calibration.cut.laws import allowed_laws
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.package import ModelPackage, build_package, open_package
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe.load import parse_recipe, recipe_path
 from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.plan import make_plan

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.device.sim.truth import average_torque
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.workday.demo.day import torque_error
 
 

@@ -8,11 +8,11 @@ import pytest
 from scissorcal.calibration.design import expected_band
 from scissorcal.device.parts import Part
 from scissorcal.package.scene_slopes import torque_knowledge
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Joint, Recording, Stroke
+from scissorcal.recording.header import UntilMark
 from scissorcal.recording.layout import empty_samples
-from scissorcal.recording.until import UntilMark
 from scissorcal.workday.stock import EXCITATION_S
 from scissorcal.workday.until import (
     NO_FIT,

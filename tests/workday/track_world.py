@@ -12,8 +12,7 @@ from scissorcal.device.motion import Motion
 from scissorcal.device.session import RigSession
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.surface import Plane
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import parse_recipe, read_text
+from scissorcal.recipe.load import parse_recipe, read_text, recipe_path
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.tracking.contacts import TipContacts

@@ -4,7 +4,7 @@ from scissorcal.device.paths import PathBuilder, SwingLimits, multisine
 from scissorcal.device.trajectory import Plan, Segment, StrokeList, opening_range, refuse_linear
 from scissorcal.errors import InputError
 from scissorcal.kernel import Capability, Identity
-from scissorcal.recipe.pace import ADVANCE_ACCELERATION, ADVANCE_SPEED, DWELL_S, SETTLE_S
+from scissorcal.recipe.requirements import ADVANCE_ACCELERATION, ADVANCE_SPEED, DWELL_S, SETTLE_S
 from scissorcal.recipe.schema import Recipe
 
 ADVANCE_MARGIN_M = 5e-3

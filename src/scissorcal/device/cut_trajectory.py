@@ -17,7 +17,7 @@ from scissorcal.device.trajectory import (
 )
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability, Identity
-from scissorcal.recipe.pace import (
+from scissorcal.recipe.requirements import (
     ADVANCE_ACCELERATION,
     ADVANCE_SPEED,
     DWELL_S,

@@ -10,8 +10,8 @@ from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.recorder import Recorder
 from scissorcal.kernel import Identity
 from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.header import UntilMark
 from scissorcal.recording.probe import UNKNOWN_REST, ProbeResult, RestFacts
-from scissorcal.recording.until import UntilMark
 
 
 class ShowProgress(Protocol):
@@ -53,7 +53,7 @@ class RigSession:
 
     >>> import numpy as np
     >>> from scissorcal.device.lockstep import LockstepLink
-    >>> from scissorcal.recipe.library import builtin_recipe
+    >>> from scissorcal.recipe.load import builtin_recipe
     >>> with LockstepLink("office-paper", np.random.default_rng(1)) as link:
     ...     RigSession(link, builtin_recipe("paper-80gsm")).name
     'scissorcal-sim office-paper'

@@ -9,9 +9,8 @@ from pydantic import Field, Strict, model_validator
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.drawing import Drawing, read_drawing
-from scissorcal.recipe.fields import Finite, Range, Thickness_mm
 from scissorcal.recipe.plate_surface import PlateSurface, PlateTracking, Touch
-from scissorcal.recipe.priors import Section
+from scissorcal.recipe.priors import Finite, Range, Section, Thickness_mm
 
 if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import Layer, LayerPiece, Outline

@@ -11,18 +11,19 @@ if TYPE_CHECKING:
         RecordingHeader,
         Stroke,
         StrokeKind,
+        read_header,
     )
-    from scissorcal.recording.header_reader import read_header
     from scissorcal.recording.importing import ImportOptions, import_table
     from scissorcal.recording.layout import SAMPLE_DTYPE
     from scissorcal.recording.reader import (
+        Recovered,
         content_hash,
         read_attachments,
         read_recording,
         read_telemetry,
+        recover,
     )
     from scissorcal.recording.recording import Recording
-    from scissorcal.recording.recovering import Recovered, recover
     from scissorcal.recording.scan import Attachment
     from scissorcal.recording.schema import RecordingFacts, recording_schema
     from scissorcal.recording.strokes import StrokeLabels, TurningPoints, label_strokes
@@ -62,13 +63,18 @@ __all__ = [
 
 _HOMES = {
     "exporting": ("export_channel", "export_table"),
-    "header": ("Joint", "Kind", "RecordingHeader", "Stroke", "StrokeKind"),
-    "header_reader": ("read_header",),
+    "header": ("Joint", "Kind", "RecordingHeader", "Stroke", "StrokeKind", "read_header"),
     "importing": ("ImportOptions", "import_table"),
     "layout": ("SAMPLE_DTYPE",),
-    "reader": ("content_hash", "read_attachments", "read_recording", "read_telemetry"),
+    "reader": (
+        "Recovered",
+        "content_hash",
+        "read_attachments",
+        "read_recording",
+        "read_telemetry",
+        "recover",
+    ),
     "recording": ("Recording",),
-    "recovering": ("Recovered", "recover"),
     "scan": ("Attachment",),
     "schema": ("RecordingFacts", "recording_schema"),
     "strokes": ("StrokeLabels", "TurningPoints", "label_strokes"),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.files import try_lock, unlock
 from scissorcal.foreign import open_foreign
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording.chunks import LARGEST_CHUNK, DamageError
@@ -95,8 +96,6 @@ class RecordingFollower:
         The lock is tried and given back at once, so ask seldom, and only where the file does not
         grow.
         """
-        from scissorcal.locks import try_lock, unlock
-
         free = try_lock(self._stream)
         if free:
             unlock(self._stream)

@@ -24,15 +24,15 @@ from scissorcal.recording.layout import MEASURED, empty_samples
 from scissorcal.recording.quantities import Quantity, describe, quantity, size_note
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
-from scissorcal.recording.resolution import (
+from scissorcal.recording.strokes import (
     GAP_FACTOR,
     MOST_NOISE_SHARE,
     NOISE_OF_STROKE,
     StrokeThreshold,
+    label_strokes,
     noise_of,
     stroke_threshold,
 )
-from scissorcal.recording.strokes import label_strokes
 from scissorcal.recording.summarising import gap_cost, gap_note
 from scissorcal.recording.table import Table, shortened
 from scissorcal.recording.table_file import read_table, refuse_no_table

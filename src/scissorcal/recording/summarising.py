@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.recording.layout import MEASURED, unit_of
 from scissorcal.recording.recording import Recording, Stroke
-from scissorcal.recording.resolution import (
+from scissorcal.recording.strokes import (
     EDGE_S,
     GAP_FACTOR,
     edge_samples,

@@ -1,20 +1,206 @@
 """Write a recording so that a killed capture loses at most 0.25 s."""
 
 import contextlib
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import IO, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.errors import DeviceError, ScissorcalError
+from scissorcal.errors import DeviceError, InputError, ScissorcalError, file_error
+from scissorcal.files import keep_name, lock
+from scissorcal.identity import VERSION
 from scissorcal.recording import layout
+from scissorcal.recording.header import METADATA_NAME, NOTE_NAME
+from scissorcal.recording.mcapfile import McapFile
 from scissorcal.recording.recording import STOP_MARK, Joint, Kind, Recording, Stroke
-from scissorcal.recording.samplefile import SampleFile, create_locked, explained, seal
-from scissorcal.recording.schema import RecordingFacts, describe, stroke_records
+from scissorcal.recording.schema import (
+    RecordingFacts,
+    RecordingMetadata,
+    describe,
+    stroke_records,
+    to_entries,
+)
 from scissorcal.recording.telemetry import TelemetryChannel
+
+FLUSH_SPAN_NS = 125_000_000
+"""Host time that samples wait in memory for their chunk: half of the promised 0.25 s, so that the
+promise holds for callers that append at least eight times a second."""
+
+CHUNK_BYTES = 64 * 1024
+"""A chunk is closed at this size even if the samples' clock does not advance (imports)."""
+
+
+class SampleFile:
+    """An MCAP file being written: the encoding only, not names, locks or renaming.
+
+    The metadata goes first and, at ``finish``, once more: MCAP has no checksum for it. Of several
+    copies the last sound one counts, so that :meth:`describe` may add to it.
+    """
+
+    def __init__(self, stream: IO[bytes], metadata: RecordingMetadata) -> None:
+        self._entries = to_entries(metadata)
+        self._mcap = McapFile(stream, f"scissorcal {VERSION}", CHUNK_BYTES)
+        self._mcap.add_metadata(METADATA_NAME, self._entries)
+        self._mcap.begin_channel(
+            layout.SCHEMA_NAME,
+            layout.SCHEMA_ENCODING,
+            layout.message_definition(metadata.joint_of_recording).encode(),
+            {f"unit.{f}": layout.unit_of(f, metadata.joint_of_recording) for f in layout.fields()},
+        )
+        self._mcap.flush()
+        self._flushed_at: int | None = None
+        self._newest_host_time = 0
+        self.sample_count = 0
+        self.holds_data = False
+
+    def append(self, samples: NDArray[np.void]) -> None:
+        """Add samples, shape (n,) with SAMPLE_DTYPE; close the chunk once it is 0.125 s old."""
+        if samples.dtype != layout.SAMPLE_DTYPE or samples.ndim != 1:
+            raise ValueError(
+                f"samples must have SAMPLE_DTYPE and one dimension, not {samples.dtype} "
+                f"with shape {samples.shape}"
+            )
+        if not len(samples):
+            return
+        self._mcap.add_samples(samples)
+        self.sample_count += len(samples)
+        self.holds_data = True
+        if self._flushed_at is None:
+            self._flushed_at = max(int(samples["host_time_ns"][0]), 0)
+        self._newest_host_time = max(int(samples["host_time_ns"][-1]), 0)
+        self.flush_if_due(self._newest_host_time)
+
+    def append_telemetry(
+        self, channel: TelemetryChannel, rows: NDArray[np.void], times_ns: NDArray[np.int64]
+    ) -> None:
+        """Add rows (n,) of another channel, with the host's times; written with the next chunk.
+
+        A recording without samples has chunks of its telemetry alone, as old.
+        """
+        if rows.dtype != channel.dtype or rows.shape != times_ns.shape:
+            raise ValueError(f"rows of {channel.topic} must have its dtype, and a time each")
+        if not len(rows):
+            return
+        self._mcap.add_telemetry(channel, rows, times_ns)
+        self.holds_data = True
+        if self._flushed_at is None:
+            self._flushed_at = max(int(times_ns[0]), 0)
+        if not self.sample_count:
+            self._newest_host_time = max(int(times_ns[-1]), 0)
+            self.flush_if_due(self._newest_host_time)
+
+    def describe(self, metadata: RecordingMetadata) -> None:
+        """Write the metadata anew, in the place of what was written before."""
+        self._entries = to_entries(metadata)
+        self._mark(METADATA_NAME, self._entries)
+
+    def flush_if_due(self, host_time_ns: int) -> None:
+        """Write the chunk out if its oldest sample is older than FLUSH_SPAN_NS by this clock."""
+        if self._flushed_at is None:
+            return
+        if abs(host_time_ns - self._flushed_at) >= FLUSH_SPAN_NS:
+            self._flush(host_time_ns)
+
+    def attach(self, name: str, data: bytes, media_type: str) -> None:
+        """Add a file, in its place among the samples."""
+        self._flush(self._newest_host_time)
+        self._mcap.attach(self._newest_host_time, name, media_type, data)
+        self._mcap.flush()
+        self.holds_data = True
+
+    def note(self, sentence: str) -> None:
+        """Add a sentence for the report, in its place among the samples."""
+        self._mark(NOTE_NAME, {"note": sentence})
+
+    def mark_sheet(self, sheet: int) -> None:
+        """Record that this sheet of material is loaded from the next sample on (-1: none)."""
+        self._mark(layout.SHEET_NAME, {"sheet": str(sheet)})
+
+    def mark(self, name: str, value: str) -> None:
+        """Add a fact about the samples so far, by name."""
+        self._mark(layout.MARK_NAME, {"name": name, "value": value})
+
+    def finish(self) -> None:
+        """Write what is left, the metadata again, the index and the footer; leave the file open."""
+        self._flush(self._newest_host_time)
+        self._mcap.add_metadata(METADATA_NAME, self._entries)
+        self._mcap.finish()
+
+    def _mark(self, name: str, entries: dict[str, str]) -> None:
+        self._flush(self._newest_host_time)
+        self._mcap.add_metadata(name, entries)
+        self._mcap.flush()
+
+    def _flush(self, host_time_ns: int) -> None:
+        self._mcap.flush()
+        if self._flushed_at is not None:
+            self._flushed_at = host_time_ns
+
+
+def create_locked(path: Path, part: Path) -> IO[bytes]:
+    """Create ``part``, which will become ``path``, and hold its lock until it is closed.
+
+    The lock ends with the process; where there are no locks, none is held. Raises InputError if
+    either name is taken or the folder cannot be written.
+    """
+    while True:
+        if path.exists():
+            raise InputError(f"{path} exists and is not overwritten. Choose another name.")
+        try:
+            stream = part.open("xb")
+        except FileExistsError:
+            raise InputError(
+                f"{part} exists: a capture of that name is running or was interrupted. Wait "
+                "until it ends; the next command recovers an interrupted one."
+            ) from None
+        except OSError as error:
+            raise InputError(
+                f"{part} cannot be created: {error.strerror}. Make the folder {path.parent} "
+                "first, or choose one that you may write to."
+            ) from error
+        lock(stream)
+        # A recovery may have renamed the empty file between its creation and the lock.
+        if is_same_file(part, stream):
+            return stream
+        stream.close()
+
+
+def is_same_file(path: Path, stream: IO[bytes]) -> bool:
+    """Whether ``path`` still names the open file."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(stream.fileno()))
+    except FileNotFoundError:
+        return False
+
+
+def seal(stream: IO[bytes], part: Path, path: Path) -> None:
+    """Flush the file to disk, rename it, and only then release the lock."""
+    if path.exists():
+        raise InputError(
+            f"{path} was created by another program during the capture and is not overwritten: "
+            f"the capture is kept as {part.name}. The next command recovers it under another name."
+        )
+    stream.flush()
+    os.fsync(stream.fileno())
+    if os.name == "nt":  # Windows renames no file that is open
+        stream.close()
+    part.rename(path)
+    keep_name(path.parent)
+    stream.close()
+
+
+@contextlib.contextmanager
+def explained(part: Path) -> Iterator[None]:
+    """Turn a write error into one that says what is kept."""
+    try:
+        yield
+    except OSError as error:
+        kept = f"Samples until then are kept in {part}; the next command recovers them."
+        raise file_error(error, part, kept) or error from None
 
 
 class RecordingWriter:

@@ -29,7 +29,7 @@ from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.trajectory import Plan, friction_plan
 from scissorcal.inference.curvature import likelihood_information
 from scissorcal.model.transforms import IDENTITY, LOG
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.workday.stock import nominal_identity
 
 RECIPE = builtin_recipe("paper-80gsm")

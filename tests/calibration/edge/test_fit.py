@@ -23,8 +23,7 @@ from scissorcal.calibration.edge.model import (
 from scissorcal.calibration.edge.result import BladeResult, FoundNick
 from scissorcal.errors import InputError
 from scissorcal.inference import SamplingStatus
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import load_recipe
+from scissorcal.recipe.load import load_recipe, recipe_path
 from scissorcal.vision.blade.borders import BorderPoints
 from scissorcal.vision.blade.measure import BladeMeasurement
 from scissorcal.vision.blade.silhouette import BladeParts

@@ -10,7 +10,7 @@ from scissorcal.device.probe.talk import StalledError, Talk
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, ConfigKey, decode
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recording.probe import Estimate
 from scissorcal.verdicts import Verdict
 from tests.strange_device import Faults, Person, StrangeDevice, VirtualPort, wire

@@ -11,7 +11,7 @@ from scissorcal.device.probe.probe import probe
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.device.sim.truth import varied
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recording.probe import Estimate, ProbeResult, probe_from_dict
 from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 

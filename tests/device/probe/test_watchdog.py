@@ -6,7 +6,7 @@ import pytest
 
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.session import Operator, RigSession
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.probe import ProbeResult
 from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort

@@ -10,7 +10,7 @@ import pytest
 from scissorcal.device.counting import count_recorded
 from scissorcal.device.session import Operator
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recording import read_recording
 from scissorcal.recording.probe import Estimate, ProbeResult
 from scissorcal.workday.options import SIM_RIG

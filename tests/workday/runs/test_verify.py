@@ -20,7 +20,7 @@ from scissorcal.calibration.store import load, save
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign.formats import RECORDS
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe.load import schemas_dir
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import VerifySettings
 from scissorcal.workday.plan import make_plan

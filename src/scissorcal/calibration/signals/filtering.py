@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.recording.resolution import noise_of, resolution_of
+from scissorcal.recording.strokes import noise_of, resolution_of
 
 BIN_S = 0.005
 HIGHEST = 0.4

@@ -8,7 +8,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.filtering import BIN_S
 from scissorcal.calibration.signals.segments import stretches
-from scissorcal.recording.resolution import edge_samples
+from scissorcal.recording.strokes import edge_samples
 
 HALF_AT = 0.365
 """Frequency times knot distance at which a quadratic B-spline passes half: sinc^3 = 1 / 2."""

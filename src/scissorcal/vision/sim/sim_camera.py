@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.recipe.library import specimen_path
+from scissorcal.recipe.load import specimen_path
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.sim.optics import Lens, Looks, SimPose, about, as_jpeg
 from scissorcal.vision.sim.photograph import PaintLayer, render
