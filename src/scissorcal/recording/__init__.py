@@ -11,8 +11,8 @@ if TYPE_CHECKING:
         RecordingHeader,
         Stroke,
         StrokeKind,
-        read_header,
     )
+    from scissorcal.recording.header_reader import read_header
     from scissorcal.recording.importing import ImportOptions, import_table
     from scissorcal.recording.layout import SAMPLE_DTYPE
     from scissorcal.recording.reader import (
@@ -63,7 +63,8 @@ __all__ = [
 
 _HOMES = {
     "exporting": ("export_channel", "export_table"),
-    "header": ("Joint", "Kind", "RecordingHeader", "Stroke", "StrokeKind", "read_header"),
+    "header": ("Joint", "Kind", "RecordingHeader", "Stroke", "StrokeKind"),
+    "header_reader": ("read_header",),
     "importing": ("ImportOptions", "import_table"),
     "layout": ("SAMPLE_DTYPE",),
     "reader": (

@@ -9,6 +9,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
 from scissorcal.errors import InputError
+from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.photo import photograph_scissors
 from scissorcal.vision.blade.profile import crossings, sampled, steepest
 from scissorcal.vision.blade.silhouette import silhouette
@@ -167,7 +168,7 @@ def test_a_drawn_pair_is_outlined_to_a_fraction_of_a_pixel(size, blur, noise, me
     light = (0.9 - 0.8 * coverage(curves, size, size)).astype(np.float32)
     picture = develop(light, Looks(1.0, softness_px=blur, noise=noise), np.random.default_rng(1))
     read = linear_light(picture[:, :, 1])
-    view = PlainView((0.0, 0.0, size - 1.0, size - 1.0))
+    view = PlainView.by_hand(size, size, BladePriors())
     shape = silhouette(read, view, "drawn", longest=min(size, 1000))
     tree = cKDTree(np.concatenate(curves))
     away = []

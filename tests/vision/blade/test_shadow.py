@@ -131,7 +131,7 @@ def test_the_lengths_of_both_blades_tell_the_tilt_between_their_tips():
 
 def test_a_plain_view_maps_there_and_back_and_keeps_lines_straight():
     view = PlainView.by_hand(816, 612, BladePriors(), 1e-4)
-    view = view.leaning(np.array([0.1, -0.06, 0.004, -0.003]), view.lean_covariance)
+    view = view.leaning(np.array([0.1, -0.06, 0.004, -0.003]), view.covariance[:4, :4])
     pixels = np.random.default_rng(1).uniform(0.0, 600.0, (50, 2))
     np.testing.assert_allclose(view.to_pixels(view.to_sheet(pixels)), pixels, atol=1e-9)
     line = view.to_sheet(np.column_stack([np.linspace(50, 700, 30), np.linspace(80, 500, 30)]))

@@ -139,7 +139,7 @@ def recorded_rig(captures: Path, fits: Mapping[str, Any]) -> "RigRecord | None":
     """
     from scissorcal.device.rig_record import identity_of
     from scissorcal.package.manifest import RigRecord
-    from scissorcal.recording.header import read_header
+    from scissorcal.recording.header_reader import read_header
 
     sources = [name for what in ("friction", "cut") if fits[what] for name in fits[what].sources]
     for source in sources:
