@@ -108,10 +108,10 @@ def reading(path: Path | str, kind: Format, remedy: str = "") -> Iterator[None]:
     except ScissorcalError:
         raise
     except Exception as error:
-        raise foreign_error(error, path, kind, remedy) from error
+        raise _foreign_error(error, path, kind, remedy) from error
 
 
-def foreign_error(
+def _foreign_error(
     error: Exception, path: Path | str, kind: Format, remedy: str = ""
 ) -> ScissorcalError:
     """The sentence on what a parser raised."""

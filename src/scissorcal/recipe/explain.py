@@ -7,7 +7,6 @@ import tomllib
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -50,26 +49,21 @@ _MOST_COMPARED = 500
 """Unknown keys whose likely meaning is looked for; a recipe has fewer keys."""
 
 
-@dataclass(frozen=True)
-class Mistakes:
-    """Sentences in the order of the file, at most ``MOST_MISTAKES``, and how many there are."""
-
-    sentences: tuple[str, ...]
-    count: int
-
-
 def explain(
     error: ValidationError | None,
     unlikely: Sequence[Unlikely],
     document: Mapping[str, Any],
     text: str,
     model: type[BaseModel],
-) -> Mistakes:
+) -> tuple[tuple[str, ...], int]:
     """Turn what pydantic found, and ``unlikely`` numbers, into sentences, each with its line.
 
     A key that was written under another name (a wrong unit, a typo) is one mistake, not two: the
     name that stands there is reported, the name that is therefore missing is not. An unlikely
     number that breaks a rule is one mistake, too: the rule, with the likely slip.
+
+    Returns sentences in the order of the file, at most ``MOST_MISTAKES``, and how many mistakes
+    there are.
     """
     details = error.errors(include_url=False) if error is not None else []
     unknown = [_path(item) for item in details if item["type"] == "extra_forbidden"]
@@ -87,7 +81,7 @@ def explain(
     mistakes = [*((detail.path, detail.told) for detail in alone), *mistakes][:MOST_MISTAKES]
     lines = key_lines(text, [_given(document, path) for path, _ in mistakes])
     ordered = sorted(zip(lines, mistakes, strict=True), key=lambda pair: pair[0] or 0)
-    return Mistakes(
+    return (
         tuple(
             f"line {line}, {sentence}" if path and line else sentence
             for line, (path, sentence) in ordered

@@ -5,16 +5,15 @@ import json
 import sys
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign import read_foreign_text
 from scissorcal.foreign.formats import RECIPE, Format
-from scissorcal.recipe.explain import Mistakes, broken_statement, explain, key_lines
+from scissorcal.recipe.explain import broken_statement, explain, key_lines
 from scissorcal.recipe.priors import AnyPrior
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recipe.unlikely import Unlikely, unlikely_numbers
@@ -70,7 +69,7 @@ def _checked(
             return checked
     except ValidationError as raised:
         error = raised
-    raise InputError(_message(source, explain(error, unlikely, document, text, model)))
+    raise InputError(_message(source, *explain(error, unlikely, document, text, model)))
 
 
 def read_text(path: Path) -> str:
@@ -127,13 +126,13 @@ def _syntax_hint(line: str, reason: str) -> str:
     return ""
 
 
-def _message(source: str, mistakes: Mistakes) -> str:
-    if mistakes.count == 1:
-        return f"{source}, {mistakes.sentences[0]}"
-    lines = "".join(f"\n  {sentence}" for sentence in mistakes.sentences)
-    shown = len(mistakes.sentences)
-    of_them = f"; {shown} of them" if shown < mistakes.count else ""
-    return f"{source} has {mistakes.count} mistakes{of_them}:{lines}"
+def _message(source: str, sentences: tuple[str, ...], count: int) -> str:
+    if count == 1:
+        return f"{source}, {sentences[0]}"
+    lines = "".join(f"\n  {sentence}" for sentence in sentences)
+    shown = len(sentences)
+    of_them = f"; {shown} of them" if shown < count else ""
+    return f"{source} has {count} mistakes{of_them}:{lines}"
 
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -215,8 +214,7 @@ def _named(folder: Path, name: str, what: str) -> Path:
     raise InputError(f'There is no {what} called "{name}"; there are: {", ".join(names)}.{hint}')
 
 
-@dataclass(frozen=True)
-class Setting:
+class Setting(NamedTuple):
     """One key of a recipe.
 
     ``table`` are the names of the tables that it stands in, ``value`` is plain (a prior is a
@@ -281,7 +279,7 @@ def with_designed_captures(recipe: Recipe, text: str) -> str:
     settings = recipe_settings(planned, text, defaults=False)
     return as_toml(
         tuple(
-            replace(setting, origin="designed") if setting.table[:1] == ("capture",) else setting
+            setting._replace(origin="designed") if setting.table[:1] == ("capture",) else setting
             for setting in settings
         )
     )

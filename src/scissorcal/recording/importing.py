@@ -254,7 +254,7 @@ def _clock_goes_on(table: Table, factor: float) -> tuple[Table, list[str]]:
         f"The clock begins at {begins} again at {_listed(table, places)}, after {length}: it was "
         "continued."
     )
-    columns = {**table.columns, "time": replace(clock, values=values)}
+    columns = {**table.columns, "time": clock._replace(values=values)}
     return replace(table, columns=columns), [sentence]
 
 

@@ -6,15 +6,12 @@ no padding). The schema is a plain message definition, so viewers of CDR plot a 
 a plug-in and without ROS.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.recording.header import Joint
-
-if TYPE_CHECKING:
-    pass
 
 PROFILE = "scissorcal"
 TOPIC = "/scissorcal/sample"
@@ -81,21 +78,32 @@ command's departure, 0 where no command was sent.
 MEASURED = tuple(channel.name for channel in SAMPLE if channel.measured)
 """Channels with a measured or commanded number."""
 
-MESSAGE_DTYPE = np.dtype(
-    [
-        ("opcode", "u1"),
-        ("length", "<u8"),
-        ("channel", "<u2"),
-        ("sequence", "<u4"),
-        ("log_time", "<u8"),
-        ("publish_time", "<u8"),
-        ("header", "V4"),
-        ("sample", SAMPLE_DTYPE),
-    ]
-)
-"""A whole message record inside a chunk, so that NumPy reads a run of them in one sweep."""
 
-_CDR_TYPES = {"<u4": "uint32", "<i4": "int32", "<i8": "int64", "<f8": "float64"}
+def message_dtype(row: np.dtype[Any]) -> np.dtype[Any]:
+    """A whole message record inside a chunk, so that NumPy reads a run of them in one sweep."""
+    return np.dtype(
+        [
+            ("opcode", "u1"),
+            ("length", "<u8"),
+            ("channel", "<u2"),
+            ("sequence", "<u4"),
+            ("log_time", "<u8"),
+            ("publish_time", "<u8"),
+            ("cdr_header", "S4"),
+            ("row", row),
+        ]
+    )
+
+
+MESSAGE_DTYPE = message_dtype(SAMPLE_DTYPE)
+
+CDR_TYPES = {
+    "<u4": "uint32",
+    "<i4": "int32",
+    "<i8": "int64",
+    "<f4": "float32",
+    "<f8": "float64",
+}
 _CHANNELS = {channel.name: channel for channel in SAMPLE}
 
 
@@ -124,7 +132,7 @@ def column_name(field: str, joint: Joint) -> str:
 def message_definition(joint: Joint) -> str:
     """Return the schema's text: one line per field with its type, unit and meaning."""
     return "".join(
-        f"{_CDR_TYPES[channel.dtype]} {channel.name}  "
+        f"{CDR_TYPES[channel.dtype]} {channel.name}  "
         f"# [{unit_of(channel.name, joint) or '-'}] {channel.meaning}\n"
         for channel in SAMPLE
     )

@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -47,8 +46,7 @@ LONGEST_UNIT = 60
 COUNTS = ("count", "counts", "tick", "ticks", "lsb", "raw")
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(NamedTuple):
     """How one channel's column becomes SI: multiply by ``factor``; ``sentence`` describes it."""
 
     factor: float

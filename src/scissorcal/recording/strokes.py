@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,8 +35,7 @@ FEWEST_SAMPLES = 20
 """Samples that a piece must exceed for a 4th-order filter and a window of one knot to fit in."""
 
 
-@dataclass(frozen=True)
-class StrokeThreshold:
+class StrokeThreshold(NamedTuple):
     """Least travel of a stroke [rad, or m], and in words what decided it."""
 
     travel: float
@@ -130,8 +129,7 @@ REST_KEPT_S = 0.05
 """Rest that stays with a stroke at either end, so that no acceleration phase is cut off."""
 
 
-@dataclass(frozen=True)
-class StrokeLabels:
+class StrokeLabels(NamedTuple):
     """Strokes of a motion and, for each sample, the stroke it belongs to (-1: none), shape (N,)."""
 
     strokes: tuple[Stroke, ...]

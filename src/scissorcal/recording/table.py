@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,7 @@ SHOWN = 60
 """Characters of a heading or a line that a sentence shows."""
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """One column with its heading as it stands in the file, shape (N,), not yet converted."""
 
     heading: str

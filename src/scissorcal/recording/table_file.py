@@ -97,7 +97,7 @@ def read_parquet(path: Path, wanted: Wanted) -> Table:
     }
     numbers = sorted(set(chosen.values()))
     options = {"numbers": numbers, "path": str(path)}
-    read = parse_isolated(f"{__name__}:load_columns", data, path, PARQUET, **options)
+    read = parse_isolated(f"{__name__}:_load_columns", data, path, PARQUET, **options)
     columns = {}
     for channel, number in chosen.items():
         heading, values = read[numbers.index(number)]
@@ -109,17 +109,17 @@ def parquet_headings(path: Path, data: bytes | None = None) -> list[str]:
     """The names of a Parquet file's columns. Raises InputError as `read_parquet` does."""
     require_pyarrow()
     data = read_foreign(path, PARQUET) if data is None else data
-    headings: list[str] = parse_isolated(f"{__name__}:load_headings", data, path, PARQUET)
+    headings: list[str] = parse_isolated(f"{__name__}:_load_headings", data, path, PARQUET)
     return headings
 
 
-def load_headings(data: bytes) -> list[str]:
+def _load_headings(data: bytes) -> list[str]:
     """The names of the columns; called in a child process."""
     pa, pq = require_pyarrow()
     return list(pq.read_schema(pa.BufferReader(data)).names)
 
 
-def load_columns(data: bytes, numbers: list[int], path: str) -> list[tuple[str, Any]]:
+def _load_columns(data: bytes, numbers: list[int], path: str) -> list[tuple[str, Any]]:
     """Heading, with the unit of a time, and values of columns; called in a child process."""
     pa, pq = require_pyarrow()
     pa.set_cpu_count(1)
@@ -165,7 +165,7 @@ def _read_mat(path: Path, wanted: Wanted) -> Table:
     versions run in a child process.
     """
     data = read_foreign(path, MATLAB)
-    variables = parse_isolated(f"{__name__}:load_variables", data, path, MATLAB)
+    variables = parse_isolated(f"{__name__}:_load_variables", data, path, MATLAB)
     columns = {channel: _column(path, variables, name, channel) for channel, name in wanted.items()}
     scalars = {name: float(v.ravel()[0]) for name, v in variables.items() if v.size == 1}
     return Table(path, columns, scalars)
@@ -205,7 +205,7 @@ def _flat(variables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
                 yield prefix + name, array
 
 
-def load_variables(data: bytes) -> dict[str, Any]:
+def _load_variables(data: bytes) -> dict[str, Any]:
     """The real numeric arrays of a MATLAB file by name; called in a child process."""
     load = _load_hdf5 if data.startswith(b"MATLAB 7.3") else _load_version_5
     return dict(_flat(load(data)))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_CDR_TYPES = {"<u4": "uint32", "<i4": "int32", "<f4": "float32", "<f8": "float64"}
+from scissorcal.recording import layout
 
 
 @dataclass(frozen=True)
@@ -37,18 +37,7 @@ class TelemetryChannel:
     @cached_property
     def message_dtype(self) -> np.dtype[Any]:
         """Of a whole message record inside a chunk."""
-        return np.dtype(
-            [
-                ("opcode", "u1"),
-                ("length", "<u8"),
-                ("channel", "<u2"),
-                ("sequence", "<u4"),
-                ("log_time", "<u8"),
-                ("publish_time", "<u8"),
-                ("cdr_header", "S4"),
-                ("row", self.dtype),
-            ]
-        )
+        return layout.message_dtype(self.dtype)
 
     @property
     def definition(self) -> str:
@@ -200,7 +189,7 @@ def _cdr_type(kind: str) -> str:
     'float64[3]'
     """
     base, shape = np.dtype(kind).base, np.dtype(kind).shape
-    return _CDR_TYPES[base.str] + (f"[{shape[0]}]" if shape else "")
+    return layout.CDR_TYPES[base.str] + (f"[{shape[0]}]" if shape else "")
 
 
 def rows_of(channel: TelemetryChannel, messages: NDArray[np.void]) -> NDArray[np.void]:

@@ -3,6 +3,7 @@
 import contextlib
 import os
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
@@ -42,16 +43,17 @@ class SampleFile:
     """
 
     def __init__(self, stream: IO[bytes], metadata: RecordingMetadata) -> None:
-        self._entries = to_entries(metadata)
-        self._mcap = McapFile(stream, f"scissorcal {VERSION}", CHUNK_BYTES)
-        self._mcap.add_metadata(METADATA_NAME, self._entries)
-        self._mcap.begin_channel(
-            layout.SCHEMA_NAME,
-            layout.SCHEMA_ENCODING,
-            layout.message_definition(metadata.joint_of_recording).encode(),
-            {f"unit.{f}": layout.unit_of(f, metadata.joint_of_recording) for f in layout.fields()},
-        )
-        self._mcap.flush()
+        self._entries, joint = to_entries(metadata), metadata.joint_of_recording
+        with self._writing():
+            self._mcap = McapFile(stream, f"scissorcal {VERSION}", CHUNK_BYTES)
+            self._mcap.add_metadata(METADATA_NAME, self._entries)
+            self._mcap.begin_channel(
+                layout.SCHEMA_NAME,
+                layout.SCHEMA_ENCODING,
+                layout.message_definition(joint).encode(),
+                {f"unit.{name}": layout.unit_of(name, joint) for name in layout.fields()},
+            )
+            self._mcap.flush()
         self._flushed_at: int | None = None
         self._newest_host_time = 0
         self.sample_count = 0
@@ -66,13 +68,14 @@ class SampleFile:
             )
         if not len(samples):
             return
-        self._mcap.add_samples(samples)
+        with self._writing():
+            self._mcap.add_samples(samples)
         self.sample_count += len(samples)
         self.holds_data = True
         if self._flushed_at is None:
             self._flushed_at = max(int(samples["host_time_ns"][0]), 0)
         self._newest_host_time = max(int(samples["host_time_ns"][-1]), 0)
-        self.flush_if_due(self._newest_host_time)
+        self.poll(self._newest_host_time)
 
     def append_telemetry(
         self, channel: TelemetryChannel, rows: NDArray[np.void], times_ns: NDArray[np.int64]
@@ -85,21 +88,25 @@ class SampleFile:
             raise ValueError(f"rows of {channel.topic} must have its dtype, and a time each")
         if not len(rows):
             return
-        self._mcap.add_telemetry(channel, rows, times_ns)
+        with self._writing():
+            self._mcap.add_telemetry(channel, rows, times_ns)
         self.holds_data = True
         if self._flushed_at is None:
             self._flushed_at = max(int(times_ns[0]), 0)
         if not self.sample_count:
             self._newest_host_time = max(int(times_ns[-1]), 0)
-            self.flush_if_due(self._newest_host_time)
+            self.poll(self._newest_host_time)
 
     def describe(self, metadata: RecordingMetadata) -> None:
         """Write the metadata anew, in the place of what was written before."""
         self._entries = to_entries(metadata)
         self._mark(METADATA_NAME, self._entries)
 
-    def flush_if_due(self, host_time_ns: int) -> None:
-        """Write the chunk out if its oldest sample is older than FLUSH_SPAN_NS by this clock."""
+    def poll(self, host_time_ns: int) -> None:
+        """Write the chunk out if its oldest sample is older than FLUSH_SPAN_NS by this clock.
+
+        Call it where no sample arrives; :meth:`append` does the same.
+        """
         if self._flushed_at is None:
             return
         if abs(host_time_ns - self._flushed_at) >= FLUSH_SPAN_NS:
@@ -107,9 +114,10 @@ class SampleFile:
 
     def attach(self, name: str, data: bytes, media_type: str) -> None:
         """Add a file, in its place among the samples."""
+        with self._writing():
+            self._mcap.flush()
+            self._mcap.attach(self._newest_host_time, name, media_type, data)
         self._flush(self._newest_host_time)
-        self._mcap.attach(self._newest_host_time, name, media_type, data)
-        self._mcap.flush()
         self.holds_data = True
 
     def note(self, sentence: str) -> None:
@@ -126,19 +134,26 @@ class SampleFile:
 
     def finish(self) -> None:
         """Write what is left, the metadata again, the index and the footer; leave the file open."""
-        self._flush(self._newest_host_time)
-        self._mcap.add_metadata(METADATA_NAME, self._entries)
-        self._mcap.finish()
+        with self._writing():
+            self._mcap.flush()
+            self._mcap.add_metadata(METADATA_NAME, self._entries)
+            self._mcap.finish()
 
     def _mark(self, name: str, entries: dict[str, str]) -> None:
+        with self._writing():
+            self._mcap.flush()
+            self._mcap.add_metadata(name, entries)
         self._flush(self._newest_host_time)
-        self._mcap.add_metadata(name, entries)
-        self._mcap.flush()
 
     def _flush(self, host_time_ns: int) -> None:
-        self._mcap.flush()
+        with self._writing():
+            self._mcap.flush()
         if self._flushed_at is not None:
             self._flushed_at = host_time_ns
+
+    def _writing(self) -> AbstractContextManager[None]:
+        """Stands around whatever may write; a writer that keeps the file turns its errors."""
+        return contextlib.nullcontext()
 
 
 def create_locked(path: Path, part: Path) -> IO[bytes]:
@@ -203,7 +218,7 @@ def explained(part: Path) -> Iterator[None]:
         raise file_error(error, part, kept) or error from None
 
 
-class RecordingWriter:
+class RecordingWriter(SampleFile):
     """Writes ``<path>.part`` while it runs, and renames it to ``path`` at ``close``.
 
     An unfinished capture is recognised by its name, and by a lock whether its process still runs.
@@ -233,25 +248,7 @@ class RecordingWriter:
         self._metadata = describe(kind, joint, facts)
         self._stream = create_locked(self.path, self.part)
         self._failed = False
-        with self._writing():
-            self._file = SampleFile(self._stream, self._metadata)
-
-    @property
-    def sample_count(self) -> int:
-        """Samples appended so far."""
-        return self._file.sample_count
-
-    def append(self, samples: NDArray[np.void]) -> None:
-        """Add samples, shape (n,) with SAMPLE_DTYPE, in the order of time."""
-        with self._writing():
-            self._file.append(samples)
-
-    def append_telemetry(
-        self, channel: TelemetryChannel, rows: NDArray[np.void], times_ns: NDArray[np.int64]
-    ) -> None:
-        """Add rows of another channel, shape (n,), each with a time of the host's clock in ns."""
-        with self._writing():
-            self._file.append_telemetry(channel, rows, times_ns)
+        super().__init__(self._stream, self._metadata)
 
     def state_strokes(self, strokes: tuple[Stroke, ...]) -> None:
         """State all strokes anew, where they are chosen while the capture runs.
@@ -259,37 +256,7 @@ class RecordingWriter:
         Call it before samples of a new stroke are appended, so that a killed capture has it too.
         """
         self._metadata = self._metadata.model_copy(update={"strokes": stroke_records(strokes)})
-        with self._writing():
-            self._file.describe(self._metadata)
-
-    def poll(self, host_time_ns: int) -> None:
-        """Write out buffered samples if due by this clock, where no sample arrives."""
-        with self._writing():
-            self._file.flush_if_due(host_time_ns)
-
-    def attach(self, name: str, data: bytes, media_type: str) -> None:
-        """Add a file (a photograph, a calibration), kept byte for byte."""
-        with self._writing():
-            self._file.attach(name, data, media_type)
-
-    def note(self, sentence: str) -> None:
-        """Add a sentence for the report; it survives a killed capture."""
-        with self._writing():
-            self._file.note(sentence)
-
-    def mark(self, name: str, value: str) -> None:
-        """Add a fact about the samples so far, as ``Recording.marks`` has them."""
-        with self._writing():
-            self._file.mark(name, value)
-
-    def mark_sheet(self, sheet: int) -> None:
-        """Record that this sheet of material is loaded from the next sample on (-1: none).
-
-        Only strokes that are found from the motion (``min_travel``) read this; planned strokes
-        carry their sheet themselves.
-        """
-        with self._writing():
-            self._file.mark_sheet(sheet)
+        self.describe(self._metadata)
 
     def close(self) -> Path:
         """Finish the file, rename it and return its path; a second call does nothing."""
@@ -300,7 +267,7 @@ class RecordingWriter:
             )
         if not self._stream.closed:
             with self._writing():
-                self._file.finish()
+                self.finish()
                 seal(self._stream, self.part, self.path)
         return self.path
 
@@ -317,7 +284,7 @@ class RecordingWriter:
             return
         if error is None:
             self.close()
-        elif not self._file.holds_data:
+        elif not self.holds_data:
             self._stream.close()
             self.part.unlink()
         else:

@@ -118,7 +118,7 @@ def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True)
 def picture_size(path: Path) -> tuple[int, int]:
     """Width and height in pixels by the header alone; raises InputError as `read_photo` does."""
     data = read_foreign(path, PHOTOGRAPH)
-    size = parse_isolated(f"{__name__}:decode_size", data, path, PHOTOGRAPH, path=str(path))
+    size = parse_isolated(f"{__name__}:_decode_size", data, path, PHOTOGRAPH, path=str(path))
     return size[0], size[1]
 
 
@@ -151,7 +151,7 @@ def decode(data: bytes, path: str, max_pixels: int, colour: bool) -> dict[str, A
         return _photo(path, opened, max_pixels, colour)
 
 
-def decode_size(data: bytes, path: str) -> list[int]:
+def _decode_size(data: bytes, path: str) -> list[int]:
     """Width and height in pixels, as the header states them."""
     with _opened(data, path) as opened:
         return list(opened.size)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +18,7 @@ SHARP = 1.4
 _ROUNDS = 20
 
 
-@dataclass(frozen=True)
-class SeenBorders:
+class SeenBorders(NamedTuple):
     """A blade's borders in the picture; ``hole`` is None where no hole shows the pivot."""
 
     edge: BorderPoints
@@ -26,8 +26,7 @@ class SeenBorders:
     hole: BorderPoints | None
 
 
-@dataclass(frozen=True)
-class BladeFrame:
+class BladeFrame(NamedTuple):
     """A blade's frame on the sheet: ``pivot``, unit vectors ``axis`` and ``up``, hole radius."""
 
     pivot: Array

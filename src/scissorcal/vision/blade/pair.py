@@ -4,9 +4,9 @@ The end of each blade's metal is told from the end of its shadow.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import hypot
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import cv2
 import numpy as np
@@ -43,8 +43,7 @@ SEARCH = 0.1
 _STEP = 1e-4
 
 
-@dataclass(frozen=True)
-class PairLengths:
+class PairLengths(NamedTuple):
     """The lengths of a pair's blades, in the order of its measurements, and how unlike they are.
 
     ``seen`` are lengths in the picture (pixels of the sheet without tilt), or on the mat.

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,8 +37,7 @@ _MOST_ARROWS = 120
 _ARROW_PX = 30.0
 
 
-@dataclass(frozen=True)
-class NickMark:
+class NickMark(NamedTuple):
     """A nick to be shown: where along the edge, and what to write beside it."""
 
     station: float

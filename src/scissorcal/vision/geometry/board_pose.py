@@ -1,6 +1,7 @@
 """The pose of a flat target before a camera: both solutions of a plane, and their covariance."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -136,8 +137,7 @@ def locate_board(
     )
 
 
-@dataclass(frozen=True)
-class _Refined:
+class _Refined(NamedTuple):
     """``pose`` (6,) as rotation vector and translation, ``slope`` (2 n, 15) of pixels by pose and
     camera, ``square`` the sum of squared residuals of the corners used."""
 

@@ -4,6 +4,7 @@ With it, the plate's pose in one picture: what is new in that picture, and what 
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,8 +57,7 @@ MOST_OF_A_VIEW = 0.25
 single corners that are wrong, but the stance that was stated: then none is left out."""
 
 
-@dataclass(frozen=True)
-class CardView:
+class CardView(NamedTuple):
     """The card in one picture, and the rig's stance: ``advance_m`` and, for a card on a moving
     blade, that blade's angle ``blade_angle_rad`` (zero for a card on the carriage)."""
 
