@@ -13,7 +13,7 @@ import pytest
 
 from scissorcal.cli.root import run
 from scissorcal.recording import read_telemetry
-from scissorcal.recording.telemetry import CONTROL
+from scissorcal.recording.layout import CONTROL
 from tests.test_imports import LEAVES, MAY_IMPORT
 
 ROOT = Path(__file__).parents[1]

@@ -7,7 +7,7 @@ import pytest
 
 from scissorcal.errors import DeviceError
 from scissorcal.recording import read_recording, read_telemetry
-from scissorcal.recording.telemetry import FRAME, PICTURE, POSE
+from scissorcal.recording.layout import FRAME, PICTURE, POSE
 from scissorcal.vision.live import Frame
 from scissorcal.workday.options import SIM_RIG, CaptureOptions, FitOptions
 from scissorcal.workday.runs.capture import capture_into

@@ -16,7 +16,7 @@ from scissorcal.calibration.plate.track_lines import TrackHead, TrackPose, Track
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import read_recording, read_telemetry
-from scissorcal.recording.telemetry import FRAME, PICTURE, POSE
+from scissorcal.recording.layout import FRAME, PICTURE, POSE
 from scissorcal.vision.geometry.pose import Pose, difference
 from scissorcal.vision.live import Frame
 from scissorcal.vision.sim import SimPose, chained

@@ -14,7 +14,7 @@ from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import CONTROL_DTYPE, ControlFlag, HybridFlag, Mode
 from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
 from scissorcal.recording import Joint, RecordingWriter, read_recording, read_telemetry
-from scissorcal.recording.telemetry import CONTROL
+from scissorcal.recording.layout import CONTROL
 from scissorcal.tracking.plate_pose import PlatePose
 from scissorcal.verdicts import failed
 from tests.control.virtual import go, points, posed, prepare, rms, seen, specimen

@@ -34,9 +34,8 @@ from scissorcal.recording import (
 from scissorcal.recording import (
     read_header as read_recording_header,
 )
-from scissorcal.recording.recording import Recording
-from scissorcal.recording.summarising import summary
-from scissorcal.recording.telemetry import PICTURE
+from scissorcal.recording.layout import PICTURE
+from scissorcal.recording.recording import Recording, summary
 from scissorcal.vision.camera_files import read_camera_file, write_camera_file
 from scissorcal.vision.photo import read_photo
 from scissorcal.vision.stances import read_stances

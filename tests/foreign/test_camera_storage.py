@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.foreign.text_tree import parse_xml, parse_yaml
+from scissorcal.foreign.reading import parse_xml, parse_yaml
 from scissorcal.vision.camera_files import read_camera_file
 from scissorcal.vision.camera_files.keys import matrix_of, number_of
 

@@ -22,7 +22,7 @@ from scissorcal.recording.faulty_values import (
     overflows,
 )
 from scissorcal.recording.layout import empty_samples
-from scissorcal.recording.quantities import size_note
+from scissorcal.recording.table import size_note
 from tests.recording.logs import imported
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "logs"

@@ -17,8 +17,8 @@ from scissorcal.control.path_file import read_path
 from scissorcal.errors import InputError
 from scissorcal.foreign import Format, open_foreign, parse_json, read_foreign, reading
 from scissorcal.package import open_package
-from scissorcal.recipe.drawing import read_drawing
 from scissorcal.recipe.load import load_recipe, parse_recipe
+from scissorcal.recipe.plate_layers import read_drawing
 from scissorcal.recipe.plate_surface import probed_surface
 from scissorcal.recording import import_table, read_header, read_recording
 from scissorcal.recording.chunks import run_end

@@ -12,8 +12,8 @@ import pytest
 
 from scissorcal.prototype.rig_feed import COLUMNS, Look, QUIET_s, RigFeed
 from scissorcal.recording.following import RecordingFollower
+from scissorcal.recording.layout import POSE
 from scissorcal.recording.reader import recover
-from scissorcal.recording.telemetry import POSE
 from scissorcal.recording.writer import create_locked
 from tests.guard import GUARD_S
 

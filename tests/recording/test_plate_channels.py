@@ -20,7 +20,7 @@ from scissorcal.recording import (
     summary,
 )
 from scissorcal.recording.exporting import channel_columns
-from scissorcal.recording.telemetry import (
+from scissorcal.recording.layout import (
     CHANNELS,
     FRAME,
     PICTURE,

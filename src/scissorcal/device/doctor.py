@@ -15,7 +15,7 @@ from scissorcal.device.link import PortLink
 from scissorcal.device.timing import Percentiles
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, State
-from scissorcal.recording.summarising import missing_frames
+from scissorcal.recording.recording import missing_frames
 from scissorcal.verdicts import Verdict
 
 ROUND_TRIPS = 100

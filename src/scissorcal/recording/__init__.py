@@ -23,11 +23,10 @@ if TYPE_CHECKING:
         read_telemetry,
         recover,
     )
-    from scissorcal.recording.recording import Recording
+    from scissorcal.recording.recording import Recording, RecordingSummary, summary
     from scissorcal.recording.scan import Attachment
     from scissorcal.recording.schema import RecordingFacts, recording_schema
     from scissorcal.recording.strokes import StrokeLabels, TurningPoints, label_strokes
-    from scissorcal.recording.summarising import RecordingSummary, summary
     from scissorcal.recording.writer import RecordingWriter, write_recording
 
 __all__ = [

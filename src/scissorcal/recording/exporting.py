@@ -12,11 +12,11 @@ from scissorcal.errors import InputError, file_error
 from scissorcal.files import replacing
 from scissorcal.recipe.euler_angles import euler_deg, singular_within_deg
 from scissorcal.recording.header import METADATA_NAME
+from scissorcal.recording.layout import CHANNELS, TelemetryChannel
 from scissorcal.recording.recording import Recording, columns
 from scissorcal.recording.scan import scan_file
 from scissorcal.recording.schema import RecordingFacts, describe
 from scissorcal.recording.table_file import require_pyarrow
-from scissorcal.recording.telemetry import CHANNELS, TelemetryChannel
 
 
 def export_table(recording: Recording, path: str | Path, *, overwrite: bool = False) -> Path:

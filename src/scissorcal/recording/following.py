@@ -17,9 +17,9 @@ from scissorcal.foreign import open_foreign
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording.chunks import LARGEST_CHUNK, DamageError
 from scissorcal.recording.header import HEAD, MAGIC
+from scissorcal.recording.layout import TelemetryChannel, rows_of
 from scissorcal.recording.scan import Telemetry, Walk, samples_among
 from scissorcal.recording.schema import RecordingMetadata
-from scissorcal.recording.telemetry import TelemetryChannel, rows_of
 
 MOST_RECORD_BYTES = 64_000_000
 """Of a record that is read whole; a longer one (a file kept within) is passed over unread."""

@@ -21,9 +21,8 @@ from scissorcal.recording.faulty_values import (
     overflows,
 )
 from scissorcal.recording.layout import MEASURED, empty_samples
-from scissorcal.recording.quantities import Quantity, describe, quantity, size_note
 from scissorcal.recording.reader import content_hash
-from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
+from scissorcal.recording.recording import Joint, Kind, Recording, Stroke, gap_cost, gap_note
 from scissorcal.recording.strokes import (
     GAP_FACTOR,
     MOST_NOISE_SHARE,
@@ -33,8 +32,7 @@ from scissorcal.recording.strokes import (
     noise_of,
     stroke_threshold,
 )
-from scissorcal.recording.summarising import gap_cost, gap_note
-from scissorcal.recording.table import Table, shortened
+from scissorcal.recording.table import Quantity, Table, describe, quantity, shortened, size_note
 from scissorcal.recording.table_file import read_table, refuse_no_table
 
 MOST_PLACES = 3

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from scissorcal.recording import layout
 from scissorcal.recording.header import HEAD, MAGIC, SAMPLE_CHANNEL
-from scissorcal.recording.telemetry import TelemetryChannel
+from scissorcal.recording.layout import TelemetryChannel
 
 _CHANNEL = SAMPLE_CHANNEL
 _COMPRESSION = "zstd"

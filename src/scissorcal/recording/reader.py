@@ -14,11 +14,10 @@ from scissorcal.foreign import open_foreign, reading, refuse_unless_regular
 from scissorcal.foreign.formats import ANY, RECORDING
 from scissorcal.identity import file_digest
 from scissorcal.recording import layout
-from scissorcal.recording.recording import Recording, Stroke
+from scissorcal.recording.layout import TelemetryChannel
+from scissorcal.recording.recording import Recording, Stroke, gap_note
 from scissorcal.recording.scan import Attachment, Mark, Note, Scan, Sheet, Telemetry, scan_file
 from scissorcal.recording.strokes import label_strokes
-from scissorcal.recording.summarising import gap_note
-from scissorcal.recording.telemetry import TelemetryChannel
 from scissorcal.recording.writer import SampleFile, explained, is_same_file, seal
 
 

@@ -26,8 +26,8 @@ from scissorcal.recording.chunks import (
     run_end,
 )
 from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
+from scissorcal.recording.layout import CHANNELS, TelemetryChannel, rows_of
 from scissorcal.recording.schema import RecordingMetadata, from_entries
-from scissorcal.recording.telemetry import CHANNELS, TelemetryChannel, rows_of
 
 LARGEST_RATIO = 100
 """Unpacked bytes for each byte of a file, beyond one chunk: samples of a rig at rest, without any

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.recording.recording import Joint, Stroke, StrokeKind
+from scissorcal.recording.header import Joint, Stroke, StrokeKind
 
 STEADY_STEP, NEAR_WHOLE, SAME = 0.9, 0.05, 1e-9
 

@@ -16,6 +16,7 @@ from scissorcal.files import keep_name, lock
 from scissorcal.identity import VERSION
 from scissorcal.recording import layout
 from scissorcal.recording.header import METADATA_NAME, NOTE_NAME
+from scissorcal.recording.layout import TelemetryChannel
 from scissorcal.recording.mcapfile import McapFile
 from scissorcal.recording.recording import STOP_MARK, Joint, Kind, Recording, Stroke
 from scissorcal.recording.schema import (
@@ -25,7 +26,6 @@ from scissorcal.recording.schema import (
     stroke_records,
     to_entries,
 )
-from scissorcal.recording.telemetry import TelemetryChannel
 
 FLUSH_SPAN_NS = 125_000_000
 """Host time that samples wait in memory for their chunk: half of the promised 0.25 s, so that the

@@ -16,7 +16,7 @@ from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError, InputError, MissingError
 from scissorcal.kernel import Capability
 from scissorcal.recording import read_attachments, read_recording, read_telemetry
-from scissorcal.recording.telemetry import CONTROL
+from scissorcal.recording.layout import CONTROL
 from scissorcal.verdicts import failed
 from scissorcal.workday.options import (
     SIM_RIG,

@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.foreign.text_tree import TYPE_KEY
+from scissorcal.foreign.reading import TYPE_KEY
 from scissorcal.vision.camera_files import vocabulary as words
 
 Distortion = Literal["none", "plumb_bob", "rational_polynomial"]
