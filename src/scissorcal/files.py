@@ -109,9 +109,9 @@ def left_over(folder: Path) -> tuple[Path, ...]:
     return tuple(
         part
         for part in sorted(folder.glob("*.part"))
-        if (found := _PART.search(part.name))
-        and found["host"] == _host()
-        and not is_running(int(found["pid"]))
+        if (name := _PART.search(part.name))
+        and name["host"] == _host()
+        and not is_running(int(name["pid"]))
     )
 
 

@@ -45,8 +45,8 @@ class Child:
     """A child process that parses; ``alive`` until it died or was closed."""
 
     def __init__(self) -> None:
-        own = str(Path(__file__).parents[2])
-        paths = [own, *(path for path in sys.path if path and path != own)]
+        source = str(Path(__file__).parents[2])
+        paths = [source, *(path for path in sys.path if path and path != source)]
         environment = {**os.environ, **_QUIET}
         try:
             self._process = subprocess.Popen(
@@ -174,7 +174,7 @@ def _why(code: int, late: bool, kind: Format) -> str:
         return f"its parser took more than {kind.processor_s} s of processor time."
     if code in (-getattr(signal, "SIGKILL", 0), 137):
         return "its parser was ended by the system, as it is where memory runs out."
-    name = next((one.name for one in signal.Signals if one.value == -code), f"exit code {code}")
+    name = next((s.name for s in signal.Signals if s.value == -code), f"exit code {code}")
     return f"its parser crashed ({name})."
 
 

@@ -50,13 +50,13 @@ def read_frame(read_into: Callable[[memoryview], int | None], most_bytes: int) -
         raise FrameError("no frame")
     try:
         tree, sizes = json.loads(bytes(_exactly(read_into, size)))
-        if len(sizes) != count or not all(isinstance(one, int) and one >= 0 for one in sizes):
+        if len(sizes) != count or not all(isinstance(size, int) and size >= 0 for size in sizes):
             raise FrameError("blocks without lengths")
     except (ValueError, TypeError, RecursionError) as error:
         raise FrameError("no head") from error
     if sum(sizes) > most_bytes:
         raise MemoryError(f"{sum(sizes)} bytes")
-    blocks = [_exactly(read_into, one) for one in sizes]
+    blocks = [_exactly(read_into, size) for size in sizes]
     try:
         return _unpacked(tree, blocks)
     except (ValueError, TypeError, IndexError, KeyError) as error:
@@ -70,9 +70,9 @@ def _packed(value: Any, blocks: list[Any]) -> Any:
         blocks.append(value)
         return {"bytes": len(blocks) - 1}
     if isinstance(value, list | tuple):
-        return [_packed(one, blocks) for one in value]
+        return [_packed(item, blocks) for item in value]
     if isinstance(value, dict) and all(isinstance(key, str) for key in value):
-        return {"dict": {key: _packed(one, blocks) for key, one in value.items()}}
+        return {"dict": {key: _packed(item, blocks) for key, item in value.items()}}
     if getattr(getattr(value, "dtype", None), "kind", "?") in _NUMERIC:
         return _packed_array(value, blocks)
     raise TypeError(f"{type(value).__name__} is no plain value")
@@ -89,12 +89,12 @@ def _packed_array(value: "NDArray[Any] | np.generic", blocks: list[Any]) -> Any:
 
 def _unpacked(tree: Any, blocks: list[memoryview]) -> Any:
     if isinstance(tree, list):
-        return [_unpacked(one, blocks) for one in tree]
+        return [_unpacked(item, blocks) for item in tree]
     if not isinstance(tree, dict):
         return tree
     ((kind, content),) = tree.items()
     if kind == "dict":
-        return {key: _unpacked(one, blocks) for key, one in content.items()}
+        return {key: _unpacked(item, blocks) for key, item in content.items()}
     if kind == "bytes":
         return bytes(blocks[content])
     return _unpacked_array(content, blocks)

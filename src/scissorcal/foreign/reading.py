@@ -277,15 +277,15 @@ def _tree(node: Any, level: int) -> Tree:
     if isinstance(node, yaml.ScalarNode):
         return str(node.value)
     if isinstance(node, yaml.SequenceNode):
-        return [_tree(one, level + 1) for one in node.value]
-    found: dict[str, Any] = {}
+        return [_tree(item, level + 1) for item in node.value]
+    mapping: dict[str, Any] = {}
     tag = str(node.tag).rpartition(":")[2]
     if tag != "map":
-        found[TYPE_KEY] = tag
+        mapping[TYPE_KEY] = tag
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):
             raise yaml.YAMLError("a key that is not text")
-        if str(key.value) in found:
+        if str(key.value) in mapping:
             raise yaml.YAMLError(f"{str(key.value)[:40]} stands there twice")
-        found[str(key.value)] = _tree(value, level + 1)
-    return found
+        mapping[str(key.value)] = _tree(value, level + 1)
+    return mapping

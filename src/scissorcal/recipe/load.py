@@ -299,7 +299,7 @@ def _walk(
             continue
         plain = value.model_dump() if isinstance(value, BaseModel) else value
         if isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
-            plain = [one.model_dump(exclude_none=True, exclude_unset=True) for one in value]
+            plain = [item.model_dump(exclude_none=True, exclude_unset=True) for item in value]
         yield table, name, plain, stated, field.description or ""
     for name, value, stated in inner:
         yield from _walk(value, (*table, name), stated)

@@ -27,7 +27,7 @@ class Drawing:
 
     def shape(self, name: str | None) -> Outline:
         """The shape with this id, or the only one; ValueError, a sentence, where there is none."""
-        named = [one for one, _ in self.shapes if one]
+        named = [identity for identity, _ in self.shapes if identity]
         listed = ", ".join(named[:20]) or "none has an id"
         if name is None:
             if len(self.shapes) != 1:
@@ -36,13 +36,13 @@ class Drawing:
                     f"(there are: {listed})"
                 )
             return self.shapes[0][1]
-        found = [outline for one, outline in self.shapes if one == name]
-        if len(found) != 1:
-            count = "no" if not found else str(len(found))
+        matches = [outline for identity, outline in self.shapes if identity == name]
+        if len(matches) != 1:
+            count = "no" if not matches else str(len(matches))
             raise ValueError(
                 f'{self.path.name} has {count} shapes with id "{name}" (there are: {listed})'
             )
-        return found[0]
+        return matches[0]
 
 
 def read_drawing(path: Path) -> Drawing:
@@ -232,8 +232,8 @@ def refuse_impossible_layers(plate: Plate, plate_pose: str, joint: str) -> None:
         raise ValueError(
             'plate.layers need blades, and rig.joint = "linear" has none: remove the layers'
         )
-    written = [c for one in layers for p in one.parts for c in p.outline_mm or ()]
-    written += [corner for one in layers for hole in one.holes_mm for corner in hole]
+    written = [c for layer in layers for p in layer.parts for c in p.outline_mm or ()]
+    written += [corner for layer in layers for hole in layer.holes_mm for corner in hole]
     if len(written) > MOST_CORNERS:
         raise ValueError(
             f"plate.layers have {len(written)} corners, and a recipe holds {MOST_CORNERS}: draw "
@@ -296,13 +296,13 @@ def plate_sentence(
     )
     if thick != [thickness_mm]:
         sentence += (
-            f" Layers of {', '.join(f'{one:g}' for one in thick)} mm rest on an assumption: "
+            f" Layers of {', '.join(f'{height:g}' for height in thick)} mm rest on an assumption: "
             "response and fracture energy proportional to the thickness."
         )
     if ratios != [1.0]:
         sentence += (
-            f" Toughness ratios of {', '.join(f'{one:g}' for one in ratios)} are declared in the "
-            "recipe, not measured."
+            f" Toughness ratios of {', '.join(f'{ratio:g}' for ratio in ratios)} are declared in "
+            "the recipe, not measured."
         )
     return sentence
 

@@ -74,11 +74,10 @@ _HOMES = {
         "read_telemetry",
         "recover",
     ),
-    "recording": ("Recording",),
+    "recording": ("Recording", "RecordingSummary", "summary"),
     "scan": ("Attachment",),
     "schema": ("RecordingFacts", "recording_schema"),
     "strokes": ("StrokeLabels", "TurningPoints", "label_strokes"),
-    "summarising": ("RecordingSummary", "summary"),
     "writer": ("RecordingWriter", "write_recording"),
 }
 

@@ -141,11 +141,6 @@ def message_definition(joint: Joint) -> str:
     )
 
 
-def fields() -> tuple[str, ...]:
-    """Return the names of SAMPLE_DTYPE's fields, in order."""
-    return tuple(_CHANNELS)
-
-
 def empty_samples(count: int = 0) -> NDArray[np.void]:
     """Return ``count`` samples of zeros that belong to no stroke, shape (count,)."""
     samples: NDArray[np.void] = np.zeros(count, dtype=SAMPLE_DTYPE)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.errors import needs_extra
 from scissorcal.recording.header import Joint, Kind, Stroke, StrokeKind
-from scissorcal.recording.layout import MEASURED, SAMPLE_DTYPE, column_name, fields, unit_of
+from scissorcal.recording.layout import MEASURED, SAMPLE, SAMPLE_DTYPE, column_name, unit_of
 from scissorcal.recording.strokes import EDGE_S, GAP_FACTOR, edge_samples, is_short, long_enough
 
 if TYPE_CHECKING:
@@ -115,10 +115,10 @@ def columns(recording: Recording) -> dict[str, NDArray[Any]]:
     ['device_time_us', 'time_s', 'opening_rad']
     """
     by_name: dict[str, NDArray[Any]] = {}
-    for channel in fields():
-        name = column_name(channel, recording.joint)
-        by_name[name] = np.ascontiguousarray(recording.samples[channel])
-        if channel == "device_time_us":
+    for channel in SAMPLE:
+        name = column_name(channel.name, recording.joint)
+        by_name[name] = np.ascontiguousarray(recording.samples[channel.name])
+        if channel.name == "device_time_us":
             by_name["time_s"] = recording.device_time_s
     return by_name
 

@@ -77,14 +77,14 @@ def find_column(path: Path, headings: Sequence[str], column: str | int, channel:
     if isinstance(column, str):
         for simplify in (str.strip, _plain, _without_unit):
             wanted = simplify(column)
-            found = [i for i, heading in enumerate(headings) if simplify(heading) == wanted]
-            if len(found) > 1:
+            places = [i for i, heading in enumerate(headings) if simplify(heading) == wanted]
+            if len(places) > 1:
                 raise InputError(
-                    f"{path} has {len(found)} columns called {column!r}. Name the one for "
-                    f"{channel} by its number, from 0: {', '.join(map(str, found))}."
+                    f"{path} has {len(places)} columns called {column!r}. Name the one for "
+                    f"{channel} by its number, from 0: {', '.join(map(str, places))}."
                 )
-            if found:
-                return found[0]
+            if places:
+                return places[0]
     number = column if isinstance(column, int) else column_of(column)
     if isinstance(number, int):
         if 0 <= number < len(headings):

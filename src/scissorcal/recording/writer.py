@@ -51,7 +51,10 @@ class SampleFile:
                 layout.SCHEMA_NAME,
                 layout.SCHEMA_ENCODING,
                 layout.message_definition(joint).encode(),
-                {f"unit.{name}": layout.unit_of(name, joint) for name in layout.fields()},
+                {
+                    f"unit.{field.name}": layout.unit_of(field.name, joint)
+                    for field in layout.SAMPLE
+                },
             )
             self._mcap.flush()
         self._flushed_at: int | None = None

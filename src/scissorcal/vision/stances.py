@@ -37,21 +37,21 @@ def read_stances(path: Path) -> Stances:
                 f"{path} needs a first line 'file,advance_mm,opening_deg' and a line for each "
                 "photograph below it."
             )
-        found: dict[str, tuple[float, float]] = {}
+        stances: dict[str, tuple[float, float]] = {}
         for row in rows:
             if not any(cell.strip() for cell in row):
                 continue
             where = f"{path}, line {rows.line_num}"
             name, stance = _stance(row, head, where)
-            if found.setdefault(name, stance) != stance:
+            if stances.setdefault(name, stance) != stance:
                 raise InputError(f"{where}: {name} has another stance above. Keep the right one.")
     except csv.Error as error:
         raise InputError(
             f"{path}, line {rows.line_num}: this is no line of CSV ({error}). {STANCES.remedy}"
         ) from None
-    if not found:
+    if not stances:
         raise InputError(f"{path} has no line below its first. {STANCES.remedy}")
-    return found
+    return stances
 
 
 def _stance(row: list[str], head: list[str], where: str) -> tuple[str, tuple[float, float]]:
