@@ -37,11 +37,11 @@ _PROGRAM = (
 )
 
 
-class DiedError(Exception):
+class _DiedError(Exception):
     """The child ended or was ended; the message is a sentence on why."""
 
 
-class Child:
+class _Child:
     """A child process that parses; ``alive`` until it died or was closed."""
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class Child:
     def ask(
         self, function: str, data: bytes, options: dict[str, Any], kind: Format
     ) -> dict[str, Any]:
-        """The answer to one request; DiedError where none came."""
+        """The answer to one request; _DiedError where none came."""
         limits = {"memory": kind.memory_bytes, "processor_s": kind.processor_s}
         request = {"function": function, "options": options, "limits": limits, "data": data}
         try:
@@ -93,16 +93,16 @@ class Child:
                 answer = self._receive(kind.memory_bytes)
         except (EOFError, FrameError, OSError):
             code = self._end()
-            raise DiedError(_why(code, watch.late, kind)) from None
+            raise _DiedError(_why(code, watch.late, kind)) from None
         except MemoryError:
             self._end()
-            raise DiedError(f"it unpacks to {kind.memory}.") from None
+            raise _DiedError(f"it unpacks to {kind.memory}.") from None
         except BaseException:  # such as Ctrl-C: what the child still sends is nobody's answer
             self._end()
             raise
         if not isinstance(answer, dict):
             self._end()
-            raise DiedError("its parser gave no answer.")
+            raise _DiedError("its parser gave no answer.")
         if answer.pop("held", 0) > MOST_HELD_BYTES:
             self.close()
         return answer
@@ -201,10 +201,10 @@ def parse_isolated(
 
     Raises ScissorcalError where no child process can be started, which is not the file's fault.
     """
-    child = _waiting() or Child()
+    child = _waiting() or _Child()
     try:
         answer = child.ask(function, data, options, kind)
-    except DiedError as death:
+    except _DiedError as death:
         raise InputError(f"{path} is damaged: {death} {kind.remedy}") from None
     finally:
         if child.alive:
@@ -214,7 +214,7 @@ def parse_isolated(
     raise _reported(answer, path, kind)
 
 
-def idle_children() -> tuple[Child, ...]:
+def idle_children() -> tuple[_Child, ...]:
     """The children that wait for a file."""
     return tuple(_idle)
 
@@ -225,7 +225,7 @@ def close_children() -> None:
         _idle.pop().close()
 
 
-def _waiting() -> Child | None:
+def _waiting() -> _Child | None:
     """A child that waits for a file; None where there is none, or all have ended meanwhile."""
     while _idle:
         try:
@@ -250,7 +250,7 @@ def _reported(answer: dict[str, Any], path: Path | str, kind: Format) -> Scissor
     return InputError(f"{path} is not {kind.name}, or it is damaged ({said}). {kind.remedy}")
 
 
-_idle: list[Child] = []
+_idle: list[_Child] = []
 
 
 def _forget_all() -> None:

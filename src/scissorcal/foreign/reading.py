@@ -54,7 +54,7 @@ def open_foreign(path: Path, kind: Format) -> Iterator[IO[bytes]]:
         _refuse_irregular(path, facts)
         refuse_other_kind(file, path, kind.name, kind.holds)
         if facts.st_size > kind.most_bytes:
-            raise InputError(too_large(path, kind))
+            raise InputError(_too_large(path, kind))
         yield file
     finally:
         file.close()
@@ -142,7 +142,7 @@ def refuse_unless_regular(path: Path, kind: Format) -> None:
         return
 
 
-def too_large(path: Path | str, kind: Format) -> str:
+def _too_large(path: Path | str, kind: Format) -> str:
     """The sentence on a file of more bytes than its format has."""
     return (
         f"{path} has more than {kind.most_bytes / 1e6:g} MB, too much for {kind.name}: is it "

@@ -101,10 +101,10 @@ def _mistake(
         return path, _unknown(path, meant.get(path), item["input"], model)
     if item["type"] == "value_error":
         return _broken_rule(path, item)
-    return path, f"{dotted(path)}: {_wrong_value(item, _fields(model, path))}"
+    return path, f"{_dotted(path)}: {_wrong_value(item, _fields(model, path))}"
 
 
-def dotted(path: Path) -> str:
+def _dotted(path: Path) -> str:
     """Write a path as people do: ``scene.contact_mm[1]``."""
     words = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
     return _short(words.lstrip("."))
@@ -125,11 +125,11 @@ def _given(document: Any, path: Path) -> Path:
 
 
 def _missing(path: Path) -> str:
-    table = dotted(path[:-1])
+    table = _dotted(path[:-1])
     if isinstance(path[-1], int):
         return f"{table}: the list is too short; it needs {path[-1] + 1} numbers or more."
     where = f"in [{table}]" if table else "at the top of the file"
-    return f"{dotted(path)} is missing: add {path[-1]} {where}."
+    return f"{_dotted(path)} is missing: add {path[-1]} {where}."
 
 
 def _broken_rule(path: Path, item: Any) -> tuple[Path, str]:
@@ -139,9 +139,9 @@ def _broken_rule(path: Path, item: Any) -> tuple[Path, str]:
         inner = tuple(word.strip("(),:;").split("."))
         if (path or len(inner) > 1) and _given(item["input"], inner) == inner:
             place = (*path, *inner)
-            spoken = reason if word.startswith(dotted(place)) else f"{dotted(place)}: {reason}"
+            spoken = reason if word.startswith(_dotted(place)) else f"{_dotted(place)}: {reason}"
             return place, f"{spoken}."
-    return path, f"{dotted(path)}: {reason}." if path else f"{reason}."
+    return path, f"{_dotted(path)}: {reason}." if path else f"{reason}."
 
 
 def _wrong_value(item: Any, fields: Sequence[str]) -> str:
@@ -191,7 +191,7 @@ def _choices(given: Any, expected: str) -> str:
 
 
 def _unknown(path: Path, meant: str | None, value: Any, model: type[BaseModel]) -> str:
-    key, place = str(path[-1]), dotted(path)
+    key, place = str(path[-1]), _dotted(path)
     if meant is None:
         fields = _fields(model, path[:-1])
         allowed = ", ".join(fields) if fields else "nothing"
@@ -206,7 +206,7 @@ def _elsewhere(key: str, path: Path, model: type[BaseModel]) -> str:
     homes = [table for table in homes if table != path[:-1]]
     if len(homes) != 1:
         return ""
-    return f" It belongs {'in [' + dotted(homes[0]) + ']' if homes[0] else 'at the top'}."
+    return f" It belongs {'in [' + _dotted(homes[0]) + ']' if homes[0] else 'at the top'}."
 
 
 def _suggest(path: Path, model: type[BaseModel], document: Any) -> str | None:

@@ -233,11 +233,6 @@ class Setting(NamedTuple):
         """The key with its tables, as messages name it."""
         return ".".join((*self.table, self.name))
 
-    @property
-    def toml(self) -> str:
-        """The key and its value as a statement of TOML; one that sets nothing is a comment."""
-        return f"{self.name} = {_toml(self.value)}" if self.value is not None else f"# {self.name}"
-
 
 def recipe_settings(recipe: Recipe, text: str, *, defaults: bool = True) -> tuple[Setting, ...]:
     """Settings of ``recipe``, which was read from ``text``, in the order of the schema.
@@ -265,7 +260,10 @@ def as_toml(settings: tuple[Setting, ...]) -> str:
         if setting.table != table:
             table = setting.table
             lines += ["", f"[{'.'.join(table)}]"]
-        lines.append(f"{setting.toml}  # {setting.origin}")
+        # what sets nothing is a comment
+        value, name = setting.value, setting.name
+        statement = f"# {name}" if value is None else f"{name} = {_toml(value)}"
+        lines.append(f"{statement}  # {setting.origin}")
     return "\n".join(lines) + "\n"
 
 

@@ -30,8 +30,8 @@ class Requirement:
 class Requirements:
     """Everything that follows from a scene, in the order in which it is done.
 
-    ``captures`` are of the rig, ``photographs`` of its geometry; ``geometry`` is fitted to the
-    latter, ``fits`` to the former. ``left_out`` names what is neither asked for, nor fitted, nor
+    ``captures`` are of the rig, and ``fits`` are fitted to them; of ``geometry`` photographs are
+    taken, and it is fitted to these. ``left_out`` names what is neither asked for, nor fitted, nor
     shipped.
     """
 
@@ -39,7 +39,6 @@ class Requirements:
     fits: tuple[Requirement, ...]
     tables: tuple[Requirement, ...]
     left_out: tuple[Requirement, ...]
-    photographs: tuple[Requirement, ...] = ()
     geometry: tuple[Requirement, ...] = ()
 
     def needs_capture(self, name: CaptureKind) -> bool:
@@ -117,7 +116,6 @@ def requirements(recipe: Recipe) -> Requirements:
         ),
         tables=tuple(tables),
         left_out=tuple(left_out),
-        photographs=geometry,
         geometry=geometry,
     )
 

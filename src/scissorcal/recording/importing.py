@@ -32,7 +32,15 @@ from scissorcal.recording.strokes import (
     noise_of,
     stroke_threshold,
 )
-from scissorcal.recording.table import Quantity, Table, describe, quantity, shortened, size_note
+from scissorcal.recording.table import (
+    Column,
+    Quantity,
+    Table,
+    describe,
+    quantity,
+    shortened,
+    size_note,
+)
 from scissorcal.recording.table_file import read_table, refuse_no_table
 
 MOST_PLACES = 3
@@ -252,8 +260,8 @@ def _clock_goes_on(table: Table, factor: float) -> tuple[Table, list[str]]:
         f"The clock begins at {begins} again at {_listed(table, places)}, after {length}: it was "
         "continued."
     )
-    columns = {**table.columns, "time": clock._replace(values=values)}
-    return replace(table, columns=columns), [sentence]
+    continued_time = {"time": Column(clock.heading, values)}
+    return replace(table, columns={**table.columns, **continued_time}), [sentence]
 
 
 def _opening_goes_on(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:

@@ -81,15 +81,15 @@ def content_hash(path: str | Path) -> str:
 
 def _label(samples: NDArray[np.void], min_travel: float, scan: Scan) -> tuple[Stroke, ...]:
     """Find strokes from the motion, mark the samples, and give each stroke its sheet."""
-    sheet = np.full(len(samples), -1)
+    sheets = np.full(len(samples), -1)
     at = 0
     for event in scan.events:
         if isinstance(event, np.ndarray):
             at += len(event)
         elif isinstance(event, Sheet):
-            sheet[at:] = event.number
+            sheets[at:] = event.number
     time = samples["device_time_us"] * 1e-6
-    labels = label_strokes(samples["opening"], time, min_travel, sheet=sheet)
+    labels = label_strokes(samples["opening"], time, min_travel, sheet=sheets)
     samples["stroke"] = labels.stroke_of_sample
     return labels.strokes
 

@@ -233,12 +233,8 @@ def find_gaps(samples: NDArray[np.void]) -> Gaps:
     worst = int(np.argmax(lost))
     time = samples["device_time_us"]
     longest = int(lost[worst])
-    return Gaps(
-        places=int(np.count_nonzero(lost)),
-        missing=int(lost.sum()),
-        longest=longest,
-        longest_at_s=float(time[worst] - time[0]) * 1e-6 if longest else 0.0,
-    )
+    at_s = float(time[worst] - time[0]) * 1e-6 if longest else 0.0
+    return Gaps(int(np.count_nonzero(lost)), int(lost.sum()), longest, at_s)
 
 
 def missing_frames(sequence: NDArray[np.integer[Any]]) -> NDArray[np.int64]:

@@ -114,10 +114,10 @@ def _plain(heading: str) -> str:
     return " ".join(heading.split()).casefold()
 
 
-def in_brackets(heading: str) -> tuple[str, str] | None:
+def _in_brackets(heading: str) -> tuple[str, str] | None:
     """A heading that ends in brackets, without them, and what stands in them; None for others.
 
-    >>> in_brackets("angle (front) [deg] "), in_brackets("angle")
+    >>> _in_brackets("angle (front) [deg] "), _in_brackets("angle")
     (('angle (front) ', 'deg'), None)
     """
     text = heading.rstrip()
@@ -130,7 +130,7 @@ def in_brackets(heading: str) -> tuple[str, str] | None:
 
 
 def _without_unit(heading: str) -> str:
-    parts = in_brackets(heading)
+    parts = _in_brackets(heading)
     return _plain(parts[0] if parts else heading)
 
 
@@ -302,7 +302,7 @@ def _contradiction(table: Table, channel: str, heading: str | None, stated: str 
 
 def _unit_in(heading: str) -> str | None:
     """Return the unit that a heading names, in brackets or after its last words."""
-    parts = in_brackets(heading)
+    parts = _in_brackets(heading)
     if parts:
         text = parts[1].strip()[: LONGEST_UNIT + 1]
         known = _is_raw(text) or parse_unit(_of_force(_unit_word(text))[0])

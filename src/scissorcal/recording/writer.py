@@ -39,7 +39,7 @@ class SampleFile:
     """An MCAP file being written: the encoding only, not names, locks or renaming.
 
     The metadata goes first and, at ``finish``, once more: MCAP has no checksum for it. Of several
-    copies the last sound one counts, so that :meth:`describe` may add to it.
+    copies the last sound one counts, so that :meth:`_describe` may add to it.
     """
 
     def __init__(self, stream: IO[bytes], metadata: RecordingMetadata) -> None:
@@ -100,7 +100,7 @@ class SampleFile:
             self._newest_host_time = max(int(times_ns[-1]), 0)
             self.poll(self._newest_host_time)
 
-    def describe(self, metadata: RecordingMetadata) -> None:
+    def _describe(self, metadata: RecordingMetadata) -> None:
         """Write the metadata anew, in the place of what was written before."""
         self._entries = to_entries(metadata)
         self._mark(METADATA_NAME, self._entries)
@@ -259,7 +259,7 @@ class RecordingWriter(SampleFile):
         Call it before samples of a new stroke are appended, so that a killed capture has it too.
         """
         self._metadata = self._metadata.model_copy(update={"strokes": stroke_records(strokes)})
-        self.describe(self._metadata)
+        self._describe(self._metadata)
 
     def close(self) -> Path:
         """Finish the file, rename it and return its path; a second call does nothing."""

@@ -77,8 +77,8 @@ class Photo:
         rows, columns = self.image.shape[:2]
         if factor < 1 or rows % factor or columns % factor:
             raise ValueError(f"{columns} x {rows} pixels are no multiples of {factor}")
-        image = averaged(self.image, factor)
-        return replace(self, image=image, reduction=self.reduction * factor)
+        coarse = _averaged(self.image, factor)
+        return replace(self, image=coarse, reduction=self.reduction * factor)
 
     def whole(self, pixels: ArrayLike) -> Array:
         """Where pixels (n, 2) of ``image`` lie in the whole photograph; (0, 0) is a centre."""
@@ -246,7 +246,7 @@ def _eight_bits(opened: "Image.Image", colour: bool, reduction: int) -> Picture:
     from PIL import Image
 
     if opened.mode in _DEEP:
-        return averaged(_from_deep(np.asarray(opened)), reduction)
+        return _averaged(_from_deep(np.asarray(opened)), reduction)
     if opened.mode in ("1", "P", "PA", "LA", "La", "RGBa") or "transparency" in opened.info:
         opened = opened.convert("L" if opened.mode == "1" else "RGBA")
     if reduction > 1:
@@ -266,7 +266,7 @@ def _from_deep(deep: NDArray[Any]) -> Picture:
     return np.asarray(values >> (bits - 8), dtype=np.uint8)
 
 
-def averaged(image: Picture, factor: int) -> Picture:
+def _averaged(image: Picture, factor: int) -> Picture:
     """Average blocks of ``factor`` by ``factor`` pixels; an incomplete last block is dropped."""
     import cv2
 

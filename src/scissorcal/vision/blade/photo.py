@@ -11,7 +11,7 @@ from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.borders import PicturedBlade
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
 from scissorcal.vision.blade.pair import PairLengths, measure_pair
-from scissorcal.vision.blade.scissors import Scissors, find_scissors, lamp_direction
+from scissorcal.vision.blade.scissors import Scissors, find_scissors, lamp_direction, opening_of
 from scissorcal.vision.blade.silhouette import LONGEST, EdgeSide, Silhouette, lone_blade, silhouette
 from scissorcal.vision.blade.view import PlainView, View, see_mat
 from scissorcal.vision.geometry.camera import Camera
@@ -188,8 +188,7 @@ def photograph_scissors(
         return BladePhoto(photo, view, outline, (), scissors)
     view, measured, lengths = measure_pair(light, view, scissors.blades, photo.source, priors)
     first, second = (measurement.parts for measurement in measured)
-    opening = float(np.arccos(np.clip(first.axis @ second.axis, -1.0, 1.0)))
-    scissors = replace(scissors, blades=(first, second), opening=opening)
+    scissors = replace(scissors, blades=(first, second), opening=opening_of(first, second))
     lamp = lamp_direction(outline, scissors)
     return BladePhoto(photo, view, outline, measured, scissors, lengths, lamp)
 

@@ -98,8 +98,7 @@ class PlainView(View):
             f"No mat: {known}, and the blades' lengths suggest a tilt of "
             f"{np.degrees(np.hypot(*lean[:2])):.1f} deg, which is allowed for."
         )
-        values = np.append(lean, 1.0)
-        return replace(self, values=values, covariance=covariance, uncertainty=words)
+        return replace(self, values=np.append(lean, 1.0), covariance=covariance, uncertainty=words)
 
     def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
         p, q, u, v, share = self.values if values is None else values
@@ -180,7 +179,7 @@ class CameraView(View):
 
 
 @dataclass(frozen=True)
-class HomographyView(View):
+class _HomographyView(View):
     """The mat seen by an unknown camera: a homography after one radial term about the middle.
 
     Values are the homography from pixels to the sheet (8, its last entry 1), the radial term,
@@ -229,7 +228,7 @@ def _camera_view(detection: Detection, camera: Camera, printed: Array, source: s
 
 def _homography_view(
     detection: Detection, size: tuple[int, int], printed: Array, source: str
-) -> HomographyView:
+) -> _HomographyView:
     sheet, pixels = detection.points[:, :2], detection.pixels
     start, _ = cv2.findHomography(_straightened(pixels, 0.0, size), sheet, 0)
     if start is None:
@@ -259,7 +258,7 @@ def _homography_view(
         f"{spread:.2f} px rms."
     )
     values = np.concatenate([solved.x, np.ones(2)])
-    return HomographyView(MAT_FIELD_M, True, "mapping", 2, values, covariance, words, size)
+    return _HomographyView(MAT_FIELD_M, True, "mapping", 2, values, covariance, words, size)
 
 
 def _covariance(J: Array, residual: Array, least: float = 1.0) -> tuple[Array, float]:

@@ -315,9 +315,5 @@ def picture_pose(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | No
     assert pose.covariance is not None
     assert alone.covariance is not None
     shared = pose.covariance - alone.covariance
-    return PicturePose(
-        pose=pose,
-        other=placed(board.other) if board.other else None,
-        noise=alone.covariance,
-        shared=0.5 * (shared + shared.T),
-    )
+    other = placed(board.other) if board.other else None
+    return PicturePose(pose, other, alone.covariance, 0.5 * (shared + shared.T))

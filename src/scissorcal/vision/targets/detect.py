@@ -178,10 +178,11 @@ def _marker_board(grey: Picture, board: MarkerBoard) -> tuple[Integers, Array]:
 
 def _chessboard(grey: Picture, board: Chessboard, window_px: int | None) -> tuple[Integers, Array]:
     size = (board.columns, board.rows)
-    flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-    good, corners = cv2.findChessboardCorners(grey, size, flags=flags)
+    even = cv2.CALIB_CB_NORMALIZE_IMAGE
+    adaptive = cv2.CALIB_CB_ADAPTIVE_THRESH | even
+    good, corners = cv2.findChessboardCorners(grey, size, flags=adaptive)
     if not good:
-        good, corners = cv2.findChessboardCornersSB(grey, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
+        good, corners = cv2.findChessboardCornersSB(grey, size, flags=even)
     if not good:
         return np.zeros(0, np.int64), np.zeros((0, 2))
     rough = np.asarray(corners, dtype=np.float64).reshape(board.rows, board.columns, 2)

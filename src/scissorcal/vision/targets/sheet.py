@@ -272,8 +272,9 @@ def _sheet_picture(sheet: Sheet) -> "Image.Image":
         low = round((shape.y + shape.height) * scale) - 1
         draw.rectangle((left, top, right, low), fill=round(255 * shape.level))
     for words in sheet.words:
-        font = ImageFont.load_default(words.size * scale)
-        draw.text((words.x * scale, words.y * scale), words.text, fill=0, font=font, anchor="ls")
+        place = (words.x * scale, words.y * scale)
+        letters = ImageFont.load_default(words.size * scale)
+        draw.text(place, words.text, fill=0, font=letters, anchor="ls")
     return picture
 
 
