@@ -4,7 +4,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scissorcal.recording.exporting import export_channel, export_table
     from scissorcal.recording.header import (
         Joint,
         Kind,
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from scissorcal.recording.scan import Attachment
     from scissorcal.recording.schema import RecordingFacts, recording_schema
     from scissorcal.recording.strokes import StrokeLabels, TurningPoints, label_strokes
+    from scissorcal.recording.table_file import export_channel, export_table
     from scissorcal.recording.writer import RecordingWriter, write_recording
 
 __all__ = [
@@ -61,7 +61,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "exporting": ("export_channel", "export_table"),
+    "table_file": ("export_channel", "export_table"),
     "header": ("Joint", "Kind", "RecordingHeader", "Stroke", "StrokeKind"),
     "header_reader": ("read_header",),
     "importing": ("ImportOptions", "import_table"),
