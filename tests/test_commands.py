@@ -13,8 +13,8 @@ from typer.core import TyperCommand, TyperGroup
 
 import scissorcal
 from scissorcal.cli.root import scissorcal_command
-from scissorcal.recipe.load import recipe_names
-from scissorcal.workday.steps import STEPS
+from scissorcal.recipe import recipe_names
+from scissorcal.workday import STEPS
 from tests.test_docs import ROOT
 
 PACKAGE = Path(scissorcal.__file__).parent

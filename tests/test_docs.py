@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from scissorcal.cli.root import run
-from scissorcal.recording import read_telemetry
-from scissorcal.recording.layout import CONTROL
+from scissorcal.recording import CONTROL, read_telemetry
 from tests.test_imports import LEAVES, MAY_IMPORT
 
 ROOT = Path(__file__).parents[1]

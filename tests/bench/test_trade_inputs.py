@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from scissorcal.bench.trade.case import Case, Photographed
-from scissorcal.calibration.plate.checks import RESIDUALS
+from scissorcal.calibration import RESIDUALS
 from scissorcal.identity import file_digest
 from scissorcal.model import Edge, EdgeBelief
-from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision import Camera
+from scissorcal.workday import inputs_hash
 from scissorcal.workday.runs import bench_case
-from scissorcal.workday.runs.bench_case import inputs_hash
 from tests.bench.trade.cases import case
 from tests.package.fits import recipe
 

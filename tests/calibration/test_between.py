@@ -14,10 +14,10 @@ from scissorcal.calibration.verify.check import StudySettings, assess, make_stud
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.calibration.verify.simulator import friction_simulator
 from scissorcal.calibration.verify.study import run
-from scissorcal.model.transforms import LOG
-from scissorcal.package.exact import pick_draws
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.model import LOG
+from scissorcal.package import pick_draws
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording
 from tests.calibration.friction.test_fit import emps
 from tests.calibration.truth import QUICK, Truth, friction_recording
 

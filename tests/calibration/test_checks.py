@@ -14,12 +14,10 @@ from scissorcal.calibration.fit_model import Outcome
 from scissorcal.calibration.result import StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.cli.fit_law import text
-from scissorcal.inference import Posterior, SearchStatus, infer
-from scissorcal.inference.status import SamplingStatus
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording, Stroke
-from scissorcal.workday.runs.fit import FitOutcome
-from scissorcal.workday.states import StepState
+from scissorcal.inference import Posterior, SamplingStatus, SearchStatus, infer
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording, Stroke
+from scissorcal.workday import FitOutcome, StepState
 from tests.calibration.test_comparison import line
 from tests.calibration.truth import QUICK, Truth, friction_recording, make_recording, sweep
 

@@ -19,9 +19,9 @@ from scissorcal.calibration.critic import (
 from scissorcal.calibration.fit_candidate import fit_candidate
 from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.model.course_terms import LIBRARY
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.model import LIBRARY
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording
 from tests.calibration.friction.test_fit import emps
 from tests.calibration.truth import QUICK, Truth, friction_recording
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction, save
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.recipe import FitFriction
 from tests.calibration.test_predictive import repeated
 
 ROOT = Path(__file__).parents[2]

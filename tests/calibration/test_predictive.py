@@ -15,8 +15,8 @@ from scissorcal.calibration import (
     save,
 )
 from scissorcal.calibration.assemble import REPLICATES, _rounded
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording, Stroke
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording, Stroke
 from tests.calibration.truth import (
     QUICK,
     RATE_HZ,

@@ -5,7 +5,7 @@ import pytest
 
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.replay import compare_with_replay, replay_from_stroke
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.recipe import FitFriction
 from tests.calibration.test_checks import fitted, motion
 from tests.calibration.truth import Truth, friction_recording
 

@@ -21,7 +21,7 @@ from scissorcal.calibration.store import EARLIER
 from scissorcal.calibration.verify.result import FORMAT, VerifyResult
 from scissorcal.errors import InputError
 from scissorcal.verdicts import Verdict
-from scissorcal.vision.geometry.pose import Pose
+from scissorcal.vision import Pose
 from tests.calibration.results import difference, results
 
 RESULTS = results()

@@ -16,15 +16,10 @@ import typer
 from scissorcal.cli.lazy import LazyGroup
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.root import run
-from scissorcal.recipe.load import builtin_recipe, schemas_dir
-from scissorcal.recipe.schema import Recipe
-from scissorcal.vision.sim.sim_camera import (
-    SIM_LENS,
-    render_card_photographs,
-    render_plate_photographs,
-)
+from scissorcal.recipe import Recipe, builtin_recipe, schemas_dir
+from scissorcal.vision import SIM_LENS, render_card_photographs, render_plate_photographs
+from scissorcal.workday import Workspace
 from scissorcal.workday.tracking import sim_world
-from scissorcal.workday.workspace import Workspace
 from tests.made_once import copied
 from tests.probed_once import probed_once as probed_once
 from tests.workday.made import fitted_copy

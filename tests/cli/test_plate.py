@@ -6,12 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from scissorcal.recipe.schema import Recipe
-from scissorcal.vision.geometry.pose import Pose, difference
-from scissorcal.vision.sim import SimPose
-from scissorcal.vision.sim.sim_camera import (
-    sim_plate_scene,
-)
+from scissorcal.recipe import Recipe
+from scissorcal.vision import Pose, SimPose, difference, sim_plate_scene
 from tests.cli.conftest import Cli
 
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from scissorcal.recipe.load import builtin_recipe, parse_recipe
+from scissorcal.recipe import builtin_recipe, parse_recipe
 
 from .conftest import Cli
 

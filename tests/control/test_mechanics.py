@@ -9,14 +9,13 @@ from scissorcal.control.contours import foot_of
 from scissorcal.control.mechanics import FASTEST_rad_per_s, axis_friction
 from scissorcal.control.settings import Material, Settings, control_settings
 from scissorcal.control.surface_path import map_contour, time_path
-from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device import LockstepLink
 from scissorcal.errors import InputError
+from scissorcal.kernel import fill_struct
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.layout import fill_struct
-from scissorcal.model.friction import FrictionLaw, friction_torque
-from scissorcal.model.surface import Cylinder, Plane
-from scissorcal.recipe.schema import Limits
-from scissorcal.tracking.plate_pose import PlatePose, level_plate
+from scissorcal.model import Cylinder, FrictionLaw, Plane, friction_torque
+from scissorcal.recipe import Limits
+from scissorcal.tracking import PlatePose, level_plate
 from tests.control.virtual import mechanics, points, specimen
 
 LIMITS = Limits()

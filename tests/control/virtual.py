@@ -13,19 +13,20 @@ from scissorcal.control.follow import Job, control
 from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.path_file import SurfacePoints
 from scissorcal.control.settings import Material
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import Operator, RigSession
-from scissorcal.device.sim.rig import VirtualRig
-from scissorcal.device.sim.specimen import Specimen, load_specimen
-from scissorcal.device.sim.truth import true_parameters
+from scissorcal.device import (
+    LockstepLink,
+    Operator,
+    RigSession,
+    Specimen,
+    VirtualRig,
+    load_specimen,
+    true_parameters,
+)
 from scissorcal.kernel import ControlFlag, HybridFlag
-from scissorcal.model.blade_point import BladePoint
-from scissorcal.model.friction import FrictionLaw
-from scissorcal.model.mechanism import AxisLaw
-from scissorcal.model.surface import Plane, Surface
-from scissorcal.recipe.load import builtin_recipe
-from scissorcal.recording.probe import Estimate, ProbeResult
-from scissorcal.tracking.plate_pose import PlatePose, PoseSource, fixed_pose, level_plate
+from scissorcal.model import AxisLaw, BladePoint, FrictionLaw, Plane, Surface
+from scissorcal.recipe import builtin_recipe
+from scissorcal.recording import Estimate, ProbeResult
+from scissorcal.tracking import PlatePose, PoseSource, fixed_pose, level_plate
 
 PLATE: dict[str, Any] = {"place_mm": (20.0, 10.0, 0.0), "extent_mm": (-20.0, 150.0)}
 FLAT = Plane()

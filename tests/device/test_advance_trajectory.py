@@ -18,7 +18,7 @@ from scissorcal.device.advance_trajectory import (
 from scissorcal.device.capture import planned
 from scissorcal.device.trajectory import opening_range
 from scissorcal.errors import InputError
-from scissorcal.recipe.load import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed
 

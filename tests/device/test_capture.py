@@ -33,7 +33,7 @@ from scissorcal.kernel import (
     decode,
     encode,
 )
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.recording import Recording, read_recording
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed, short

@@ -14,7 +14,7 @@ from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.recording import Recording, read_header, read_recording
 from tests.device.recipes import changed
 

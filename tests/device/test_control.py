@@ -31,8 +31,8 @@ from scissorcal.device.paths import PathBuilder
 from scissorcal.device.slow_sliding import StribeckFall
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Identity
-from scissorcal.recipe.load import builtin_recipe
-from scissorcal.recording.probe import Estimate, ProbeResult
+from scissorcal.recipe import builtin_recipe
+from scissorcal.recording import Estimate, ProbeResult
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed
 from tests.strange_device.device import StrangeDevice

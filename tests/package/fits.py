@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from scissorcal.calibration import FitResult, FitSeries, FittedParameter
-from scissorcal.recipe.load import builtin_recipe
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe, builtin_recipe
 
 UNITS = {"response_force": "N", "response_exponent": "1", "fracture_energy": "J/m", "kappa": "1"}
 FRICTION = {

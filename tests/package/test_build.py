@@ -23,7 +23,7 @@ from scissorcal.package import (
     read_manifest,
 )
 from scissorcal.package.manifest import PoseRecord
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.verdicts import Verdict
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.report.geometry_fits import plate_fit

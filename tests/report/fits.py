@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
-from scissorcal.recording.recording import Stroke, StrokeKind
+from scissorcal.calibration import FitResult, FitSeries, FittedParameter, StrokeError
+from scissorcal.recording import Stroke, StrokeKind
 from scissorcal.report import RecordingSummary
 from scissorcal.verdicts import Verdict
 

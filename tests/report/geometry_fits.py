@@ -6,21 +6,25 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from scissorcal.calibration.camera.result import CameraFit, CrossValidation, PixelMap, ViewError
-from scissorcal.calibration.edge.result import (
+from scissorcal.calibration import (
     Band,
     BladeFit,
     BladeResult,
+    CameraFit,
+    CrossValidation,
     FoundNick,
     PhotographRow,
+    PixelMap,
+    PlateFit,
+    PoseHalves,
+    PoseView,
     RungRow,
+    ViewError,
 )
-from scissorcal.calibration.plate.result import Halves, PlateFit, PoseView
 from scissorcal.model import Edge, EdgeBelief
 from scissorcal.report import Geometry
 from scissorcal.verdicts import Verdict
-from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose
+from scissorcal.vision import Camera, Pose
 
 CAMERA_SD = np.array([0.5, 0.5, 0.4, 0.4, 1e-3, 3e-3, 1e-4, 1e-4, 0.0])
 
@@ -131,7 +135,7 @@ def plate_fit() -> PlateFit:
             PoseView("plate-1.jpg", 24, 24, 0.06, 0.055, 60.0, 0.41, 40.0, 3.1, 0.01, 0.02),
             PoseView("plate-2.jpg", 24, 20, 0.30, 0.06, 60.0, 0.41, 40.0, float("inf"), 0.4, 0.9),
         ),
-        halves=Halves(0.05, 0.07, 6.1),
+        halves=PoseHalves(0.05, 0.07, 6.1),
         rms_px=0.07,
         noise_px=0.05,
         verdicts=(Verdict("fit.plate", "at rest", "not_evaluated", None, 3.0, "Take several."),),

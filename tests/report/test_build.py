@@ -12,11 +12,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from scissorcal.calibration.result import FitSeries, FittedParameter
+from scissorcal.calibration import FitSeries, FittedParameter
 from scissorcal.errors import InputError, MissingError
-from scissorcal.package import Review
-from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN
-from scissorcal.recipe.load import schemas_dir
+from scissorcal.package import REPORT_PAGE, REPORT_TWIN, Review
+from scissorcal.recipe import schemas_dir
 from scissorcal.report import Fact, FactSheet, build_report, sign_page
 from scissorcal.report.signature_block import unsigned_digest
 from scissorcal.report.twin import schema_text

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.report import Side, compare, document_of, document_of_fit
 from scissorcal.report.comparison import Comparison
 from scissorcal.report.panel import Panel

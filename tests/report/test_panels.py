@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.result import FitResult
-from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
+from scissorcal.calibration import FitResult
+from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
 from scissorcal.report import RecordingSummary, sheet_from_mapping, summarise_recording
 from scissorcal.report.headline import Headline, geometry_headline, write_headline
 from scissorcal.report.inputs import Cell, Evidence

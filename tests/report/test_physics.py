@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.curves import (
+from scissorcal.calibration import (
     EdgePlace,
+    FitResult,
     force_along_edge,
     fracture_work,
+    friction_curve,
+    friction_map,
     response_curve,
 )
-from scissorcal.calibration.friction.curve import friction_curve, friction_map
-from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.package.scene_torque import scene_torque
-from scissorcal.recording.recording import Stroke
+from scissorcal.recording import Stroke
 from scissorcal.report.document import fit_panels
 from scissorcal.report.inputs import Evidence
 from scissorcal.report.strokes import strokes_of

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from scissorcal.errors import InputError, MissingError
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe import parse_recipe
 from scissorcal.recipe.requirements import requirements
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import restore, versions

@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from scissorcal.calibration.design import CaptureList, choose_captures
-from scissorcal.calibration.design.choice import first_captures
-from scissorcal.calibration.design.state import expected_cut, expected_friction
-from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.trajectory import friction_plan
-from scissorcal.package.scene_slopes import torque_knowledge
-from scissorcal.recipe.load import builtin_recipe, parse_recipe, with_designed_captures
-from scissorcal.recipe.schema import Recipe
+from scissorcal.calibration import (
+    CaptureList,
+    choose_captures,
+    expected_cut,
+    expected_friction,
+    first_captures,
+)
+from scissorcal.device import cut_plan, friction_plan
+from scissorcal.package import torque_knowledge
+from scissorcal.recipe import Recipe, builtin_recipe, parse_recipe, with_designed_captures
 from scissorcal.workday.stock import (
     capture_stock,
     designed_recipe,
@@ -42,7 +44,7 @@ def test_what_a_list_lacks_stays_as_the_recipe_has_it() -> None:
 
 
 def test_the_text_of_a_designed_recipe_says_what_it_captures() -> None:
-    from scissorcal.recipe.load import recipe_path
+    from scissorcal.recipe import recipe_path
 
     text = recipe_path("paper-80gsm").read_text(encoding="utf-8")
     recipe = designed_recipe(parse_recipe(text), LIST)

@@ -12,7 +12,7 @@ import pytest
 
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.recording import SAMPLE_DTYPE
-from scissorcal.vision.live import Frame, LocatedFrame, timed
+from scissorcal.vision import Frame, LocatedFrame, timed
 from scissorcal.workday.tracking import feeds
 from scissorcal.workday.tracking.camera_thread import CameraThread
 from scissorcal.workday.tracking.feeds import (

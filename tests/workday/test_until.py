@@ -5,14 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.design import expected_band
-from scissorcal.device.parts import Part
-from scissorcal.package.scene_slopes import torque_knowledge
-from scissorcal.recipe.load import builtin_recipe
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import Joint, Recording, Stroke
-from scissorcal.recording.header import UntilMark
-from scissorcal.recording.layout import empty_samples
+from scissorcal.calibration import expected_band
+from scissorcal.device import Part
+from scissorcal.package import torque_knowledge
+from scissorcal.recipe import Recipe, builtin_recipe
+from scissorcal.recording import Joint, Recording, Stroke, UntilMark, empty_samples
 from scissorcal.workday.stock import EXCITATION_S
 from scissorcal.workday.until import (
     NO_FIT,

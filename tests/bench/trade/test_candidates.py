@@ -26,7 +26,7 @@ from scissorcal.bench.trade.needed_minutes import needed_minutes
 from scissorcal.bench.trade.package_cost import BYTES, STEP
 from scissorcal.bench.trade.recommend import choices_of
 from scissorcal.bench.trade.torque import AVERAGE, WORST
-from scissorcal.package.simplest.candidates import fitted_candidate
+from scissorcal.package import fitted_candidate
 from tests.bench.trade.cases import case, linear, pressing
 from tests.package.fits import cut_fit, friction_fit, recipe
 

@@ -19,9 +19,9 @@ from scissorcal.model import (
     FrictionLaw,
     Response,
     cut_torque_along,
+    torque_at,
 )
-from scissorcal.model.cutting import torque_at
-from scissorcal.recording.recording import Stroke
+from scissorcal.recording import Stroke
 from tests.calibration.cut.path.made import COULOMB, INERTIA, RATE_HZ, Made, record
 from tests.calibration.truth import Truth, sweep
 

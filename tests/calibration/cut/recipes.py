@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.calibration import FitResult, fit_friction
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from tests.calibration.truth import SPEEDS, Truth, friction_recording
 
 RECIPES = Path(__file__).resolve().parents[3] / "recipes"

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.model import Edge, EdgeBelief, Response
-from scissorcal.model.edge_points import edge_through
+from scissorcal.model import Edge, EdgeBelief, Response, edge_through
 from tests.calibration.truth import Truth
 
 TRUTH = Truth()

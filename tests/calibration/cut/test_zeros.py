@@ -7,8 +7,8 @@ import pytest
 
 from scissorcal.calibration import fit_cut, fit_friction
 from scissorcal.calibration.result import FitResult
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.recording import Recording
+from scissorcal.recipe import Recipe
+from scissorcal.recording import Recording
 from tests.second_rig import capture_cut, capture_friction, draw_truth, fine, recipe_for
 
 SEED = 9301

@@ -20,8 +20,8 @@ from scissorcal.calibration.design import (
 )
 from scissorcal.calibration.design.choice import SPARE, _shorter
 from scissorcal.calibration.parameters import Layout, Parameter
-from scissorcal.model.transforms import IDENTITY
-from scissorcal.recipe.priors import MOST_SPEEDS
+from scissorcal.model import IDENTITY
+from scissorcal.recipe import MOST_SPEEDS
 
 TORQUE = np.array([0.1, 0.1, 0.1])
 

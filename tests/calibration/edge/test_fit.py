@@ -23,10 +23,8 @@ from scissorcal.calibration.edge.model import (
 from scissorcal.calibration.edge.result import BladeResult, FoundNick
 from scissorcal.errors import InputError
 from scissorcal.inference import SamplingStatus
-from scissorcal.recipe.load import load_recipe, recipe_path
-from scissorcal.vision.blade.borders import BorderPoints
-from scissorcal.vision.blade.measure import BladeMeasurement
-from scissorcal.vision.blade.silhouette import BladeParts
+from scissorcal.recipe import load_recipe, recipe_path
+from scissorcal.vision import BladeMeasurement, BladeParts, BorderPoints
 
 LENGTH = 0.075
 

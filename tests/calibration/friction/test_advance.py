@@ -15,13 +15,10 @@ from scissorcal.calibration.friction.advance import (
 from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.simulator import friction_simulator
-from scissorcal.device.capture import capture, open_writer
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import RigSession
-from scissorcal.device.sim.specimen import load_specimen
+from scissorcal.device import LockstepLink, RigSession, load_specimen, open_writer
+from scissorcal.device.capture import capture
 from scissorcal.errors import InputError
-from scissorcal.recipe.friction import AdvanceSettings, FitFrictionAdvance
-from scissorcal.recipe.priors import JointPriors
+from scissorcal.recipe import AdvanceSettings, FitFrictionAdvance, JointPriors
 from scissorcal.recording import Recording, read_recording
 from tests.device.recipes import changed
 from tests.second_rig import capture_friction_advance, coarse, fine, recipe_for

@@ -10,10 +10,8 @@ import pytest
 from scissorcal.calibration import FitResult, fit_friction
 from scissorcal.calibration.caveats import LONG_WINDOWS, caveats_of
 from scissorcal.calibration.friction.probed import inertia_verdict
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.header import Joint
-from scissorcal.recording.probe import PROBE_KEY, Estimate, ProbeResult
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import PROBE_KEY, SAMPLE_DTYPE, Estimate, Joint, ProbeResult, Recording
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
 PUSHED, SD = 4e-4, 0.04

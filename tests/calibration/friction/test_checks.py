@@ -9,9 +9,9 @@ from scipy.ndimage import uniform_filter1d
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.checks import bandwidth_verdict
 from scissorcal.calibration.parameters import Layout, Parameter
-from scissorcal.model.transforms import LOG
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.model import LOG
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
 

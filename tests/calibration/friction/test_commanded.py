@@ -13,7 +13,7 @@ from scissorcal.calibration.friction.advance import (
     force_samples,
     two_tick_means,
 )
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording, Stroke
+from scissorcal.recording import SAMPLE_DTYPE, Recording, Stroke
 
 FINE = 2000
 

@@ -9,8 +9,8 @@ import pytest
 from scissorcal.calibration import fit_friction, load_fit, save
 from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.errors import InputError
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"

@@ -7,7 +7,7 @@ import pytest
 
 from scissorcal.calibration import fit_friction, friction_experiment
 from scissorcal.inference import find_optimum, fit_ar
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.recipe import FitFriction
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
 SETTINGS = FitFriction(rung="stribeck", symmetry="asymmetric")

@@ -18,8 +18,8 @@ from scissorcal.calibration.friction.predict import (
     predict_far_load,
 )
 from scissorcal.errors import InputError
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording
 from tests.calibration.friction.test_fit import emps
 from tests.calibration.friction.test_transmission import CUTOFF_HZ, each_split, split_of
 from tests.calibration.truth import QUICK, Truth, friction_recording

@@ -15,11 +15,8 @@ from scissorcal.calibration.friction.probed import (
     opened,
     with_probed,
 )
-from scissorcal.recipe.priors import JointPriors, LogNormalPrior
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.header import Joint
-from scissorcal.recording.probe import PROBE_KEY, Posterior, ProbeResult
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recipe import FitFriction, JointPriors, LogNormalPrior
+from scissorcal.recording import PROBE_KEY, SAMPLE_DTYPE, Joint, Posterior, ProbeResult, Recording
 from tests.calibration.cut.test_known import bent
 
 SETTINGS = FitFriction()

@@ -11,9 +11,8 @@ import pytest
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.transmission import LoadSolver, two_ended
 from scissorcal.errors import InputError
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording import ImportOptions, import_table
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import SAMPLE_DTYPE, ImportOptions, Recording, import_table
 
 TOOL = Path(__file__).resolve().parents[4] / "shared" / "data" / "mis_tool_friction"
 TORQUE = 3.9811e-5

@@ -9,7 +9,7 @@ from scissorcal.calibration import fit_friction
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.zeros import DriveZero
-from scissorcal.recording.recording import Recording
+from scissorcal.recording import Recording
 from tests.second_rig import capture_friction, draw_truth, fine, recipe_for, true_parameters
 
 SETTINGS = recipe_for(fine()).fit.friction.model_copy(

@@ -9,21 +9,28 @@ import pytest
 from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.errors import InputError, MissingError, VerdictError
-from scissorcal.vision.camera_files import read_camera_file
-from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose, difference
-from scissorcal.vision.geometry.rig_frame import locate_rig
-from scissorcal.vision.photo import read_photo
-from scissorcal.vision.sim import Lens, Looks, SimPose, render, target_layers
-from scissorcal.vision.targets.boards import (
+from scissorcal.vision import (
     BLADE_MAT,
     PLATE_BOARD,
     PLATE_STRIP,
+    Camera,
     CharucoBoard,
+    Detection,
+    Lens,
+    Looks,
     MarkedBoard,
     MarkerBoard,
+    Pose,
+    SimPose,
+    difference,
+    find_board,
+    find_markers,
+    locate_rig,
+    read_camera_file,
+    read_photo,
+    render,
+    target_layers,
 )
-from scissorcal.vision.targets.detect import Detection, find_board, find_markers
 from tests.vision.geometry.test_pose import CAMERA as CARD_CAMERA
 from tests.vision.geometry.test_pose import MIDDLE, card_views
 from tests.vision.scenes import lens, photo_of, pose_before

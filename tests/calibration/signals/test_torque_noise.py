@@ -7,8 +7,8 @@ from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.noise import stroke_offsets
 from scissorcal.calibration.signals.torque_noise import TorqueNoise, torque_noise
 from scissorcal.calibration.signals.weak_form import weigh
-from scissorcal.inference.noise import ArNoise
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.inference import ArNoise
+from scissorcal.recipe import FitFriction
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
 TICK_S = 1e-3

@@ -8,7 +8,7 @@ from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
 from scissorcal.calibration.verify.simulator import friction_simulator
 from scissorcal.calibration.verify.study import run
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.recipe import FitFriction
 from tests.calibration.friction.test_fit import emps
 
 

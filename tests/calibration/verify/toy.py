@@ -12,7 +12,7 @@ from scissorcal.calibration.fit_candidate import Candidate, Likelihood
 from scissorcal.calibration.parameters import Layout, Parameter, StatedPrior
 from scissorcal.calibration.result import Effort, FitResult, StrokeError
 from scissorcal.inference import ArNoise, Posterior, Problem, infer
-from scissorcal.model.transforms import IDENTITY, LOG
+from scissorcal.model import IDENTITY, LOG
 
 BINS = 600
 STROKES = 12

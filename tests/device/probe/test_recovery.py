@@ -11,8 +11,8 @@ from scissorcal.device.probe.probe import probe
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.device.sim.truth import varied
-from scissorcal.recipe.load import builtin_recipe
-from scissorcal.recording.probe import Estimate, ProbeResult, probe_from_dict
+from scissorcal.recipe import builtin_recipe
+from scissorcal.recording import Estimate, ProbeResult, probe_from_dict
 from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 
 RECIPE = builtin_recipe("paper-80gsm")

@@ -7,9 +7,8 @@ import pytest
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.recipe.load import builtin_recipe
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.probe import ProbeResult
+from scissorcal.recipe import Recipe, builtin_recipe
+from scissorcal.recording import ProbeResult
 from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 
 RECIPE = builtin_recipe("paper-80gsm")

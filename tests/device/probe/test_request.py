@@ -6,7 +6,7 @@ from scissorcal.device.probe.hand_pass import CLOSE, OPEN
 from scissorcal.device.probe.probe import probe, request_of
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.kernel import Capability
-from scissorcal.recipe.load import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from tests.strange_device import Person, StrangeDevice, VirtualPort
 
 RECIPE = builtin_recipe("paper-80gsm")

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from scissorcal.recipe.priors import PlatePriors
+from scissorcal.recipe import PlatePriors
 from scissorcal.vision.geometry.board_pose import Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, between, difference, left_jacobian

@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 from benchmarks.scissors import photographed
 
-from scissorcal.calibration.edge.result import BladeResult
-from scissorcal.calibration.store import load
+from scissorcal.calibration import BladeResult, load
 from scissorcal.errors import InputError, MissingError
-from scissorcal.vision.sim.sim_camera import render_blade_photographs
+from scissorcal.vision import render_blade_photographs
 from scissorcal.workday.demo.sim_photographs import specimen_blade
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import FitOptions

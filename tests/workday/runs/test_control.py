@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scissorcal.control.plate_request import REQUEST_FIRST
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import Operator, RigSession
+from scissorcal.control import REQUEST_FIRST
+from scissorcal.device import LockstepLink, Operator, RigSession
 from scissorcal.errors import DeviceError, InputError, MissingError
 from scissorcal.kernel import Capability
-from scissorcal.recording import read_attachments, read_recording, read_telemetry
-from scissorcal.recording.layout import CONTROL
+from scissorcal.recording import CONTROL, read_attachments, read_recording, read_telemetry
 from scissorcal.verdicts import failed
 from scissorcal.workday.options import (
     SIM_RIG,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD
+from scissorcal.calibration import NEXT_RECORDING, ON_RECORD
 from scissorcal.cli.fit_law import text
 from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.engine import Engine
