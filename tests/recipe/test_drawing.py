@@ -14,8 +14,8 @@ import scissorcal
 from scissorcal.errors import InputError
 from scissorcal.foreign import DRAWING
 from scissorcal.model import Outline, spans_on_line
-from scissorcal.recipe.plate_layers import parse_drawing, read_drawing
-from scissorcal.recipe.svg.curves import FLAT_MM
+from scissorcal.recipe.plate_layers import read_drawing
+from scissorcal.recipe.svg.curves import FLAT_MM, parse_drawing
 from scissorcal.recipe.svg.elements import MOST_POINTS, MOST_POINTS_OF_FILE, MOST_SHAPES
 from tests.guard import GUARD_S
 
