@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.priors import BladePriors
+from scissorcal.recipe import BladePriors
 from scissorcal.vision.blade.photo import Laid, photograph_scissors
 from scissorcal.vision.blade.profile import crossings, sampled, steepest
 from scissorcal.vision.blade.silhouette import silhouette
