@@ -33,9 +33,9 @@ INSERTED: dict[str, Sequence[str]] = {
     "name": ("friction.mcap",),
     "path": ("fits/cut.nc",),
     "path.name": ("friction.mcap",),
-    "photographs": ("--image *.jpg", "--image *.jpg --stances stances.csv"),
+    "photographs": ("--image *.jpg", "--image *.jpg --positions positions.csv"),
     "what": ("friction", "cut", "plate"),
-    "words": ("camera", "blade", "plate", "plate --stances FILE"),
+    "words": ("camera", "blade", "plate", "plate --positions FILE"),
     "words or what": RIG_FITS,
 }
 """What each expression within a command line may insert; a new one is to be stated here."""

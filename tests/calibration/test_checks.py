@@ -212,7 +212,7 @@ def steady(truth: Truth, rng: np.random.Generator) -> Recording:
 
 def test_a_rejected_fit_is_not_printed_as_a_calibration(tmp_path):
     rng = np.random.default_rng(2)
-    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+    settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
     found = fit_friction((steady(Truth(), rng),), settings, effort="draft", rng=rng)
     assert "strokes" in {verdict.check for verdict in found.rejected}
     state = StepState("fit friction", "failed", "")

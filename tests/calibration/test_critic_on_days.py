@@ -11,7 +11,7 @@ from tests.calibration.planted import planted
 from tests.second_rig import capture_friction, coarse, fine, recipe_for
 from tests.second_rig.parameters import draw_truth
 
-LAW = FitFriction(rung="stribeck+angle", symmetry="asymmetric")
+LAW = FitFriction(law="stribeck+angle", symmetry="asymmetric")
 NAMES = {
     "drift": "sign*time",
     "ripple": "wave(2 periods)",

@@ -24,7 +24,7 @@ EXPECTED = (
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder: Path = tmp_path_factory.mktemp("workspace")
     rng = np.random.default_rng(1)
-    wanted = FitFriction(rung="coulomb+viscous", critic=False)
+    wanted = FitFriction(law="coulomb+viscous", critic=False)
     found = fit_friction((repeated(rng),), wanted, effort="standard", rng=rng)
     save(found, folder / "fits" / "friction.nc")
     return folder

@@ -9,7 +9,7 @@ from scissorcal.recipe import FitFriction
 from tests.calibration.test_checks import fitted, motion
 from tests.calibration.truth import Truth, friction_recording
 
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
 
 
 @pytest.fixture(scope="module")

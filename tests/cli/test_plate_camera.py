@@ -130,7 +130,7 @@ def test_without_the_rigs_frame_it_says_what_to_photograph(
     cli("import", album / "camera.yml")
     said = cli("render", *SIM, "--package", packages["both"])
     assert said.code == 5
-    assert "'scissorcal capture plate --camera sim --stances sim'" in said.err
+    assert "'scissorcal capture plate --camera sim --positions sim'" in said.err
     assert "known" in said.err
     assert recordings(workspace) == []
 

@@ -94,13 +94,13 @@ def test_stiff_material_is_refused_with_what_would_do() -> None:
         settings(stiffness=3e5)
 
 
-def test_a_place_beyond_the_sledge_is_refused() -> None:
+def test_a_place_beyond_the_carriage_is_refused() -> None:
     rig = mechanics(specimen())
     identity = LockstepLink("office-paper", np.random.default_rng(1)).identity
     pose = PlatePose(0.0, *level_plate((20.0, 10.0, 0.0)), np.zeros((6, 6)))
     path = points(290.0, 310.0)
     contour = map_contour(path, Plane(), pose, 0.4)
-    with pytest.raises(InputError, match=r"x = .* mm the sledge would stand at"):
+    with pytest.raises(InputError, match=r"x = .* mm the carriage would stand at"):
         control_settings(
             rig, identity, Limits(), Material(1e4, 0.2, 1.0),
             time_path(path, contour, 1e-3), 400.0,

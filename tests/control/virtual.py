@@ -50,11 +50,11 @@ def mechanics(truth: Specimen) -> RigMechanics:
     length = 1e-3 * blade.length_mm
     offset = 1e-3 * blade.offset_mm + length * math.tan(math.radians(blade.taper_deg))
     centre = math.radians(truth.mechanism.friction.angle_center_deg)
-    sledge = FrictionLaw({"coulomb": advance.coulomb_N, "viscous": advance.viscous_N_s_per_m})
+    carriage = FrictionLaw({"coulomb": advance.coulomb_N, "viscous": advance.viscous_N_s_per_m})
     return RigMechanics(
         tip=BladePoint(length, offset, blade.moving_blades),
         opening=AxisLaw(values["inertia"], FrictionLaw(law, centre), values["offset"]),
-        advance=AxisLaw(advance.mass_kg, sledge),
+        advance=AxisLaw(advance.mass_kg, carriage),
         friction_sd=4e-4,
         delay_s=DELAY_S,
         torque_sd=1e-3,

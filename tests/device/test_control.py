@@ -160,8 +160,8 @@ def test_designs_keep_their_margins(tick_us: int, delay_ms: float) -> None:
     )
     margins = loop_margins(axis, found.opening)
     assert margins.enough
-    sledge = replace(axis, inertia=ADVANCE_MASS_KG, viscous=4.0, inertia_factor=2.0)
-    assert loop_margins(sledge, found.advance).enough
+    carriage = replace(axis, inertia=ADVANCE_MASS_KG, viscous=4.0, inertia_factor=2.0)
+    assert loop_margins(carriage, found.advance).enough
     assert verdict.value <= margins.phase_deg + 1e-9
 
 

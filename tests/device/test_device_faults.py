@@ -54,9 +54,9 @@ STOPS = {
 """What stops a capture of friction."""
 
 STOPS_OF_A_CUT = {
-    "sledge motor reversed": "RUNAWAY_ADVANCE",
-    "sledge encoder reversed": "RUNAWAY_ADVANCE",
-    "sledge encoder stuck": "ADVANCE_STANDS",
+    "carriage motor reversed": "RUNAWAY_ADVANCE",
+    "carriage encoder reversed": "RUNAWAY_ADVANCE",
+    "carriage encoder stuck": "ADVANCE_STANDS",
     "5 ms late": "OSCILLATION",
 }
 

@@ -40,7 +40,7 @@ from scissorcal.recording import (
 from scissorcal.recording import (
     read_header as read_recording_header,
 )
-from scissorcal.vision import read_camera_file, read_photo, read_stances, write_camera_file
+from scissorcal.vision import read_camera_file, read_photo, read_rig_positions, write_camera_file
 from tests.calibration.results import results
 from tests.calibration.test_store import checked
 from tests.foreign.seals import (
@@ -319,13 +319,13 @@ def _read_surface(path: Path) -> None:
     assert probed_surface(path, 0.02).surface is not None
 
 
-def _stances(path: Path) -> None:
+def _positions(path: Path) -> None:
     lines = "".join(f"r-{i}.jpg,3{i},2{i}\n" for i in range(3))
     path.write_text(f"file,advance_mm,opening_deg\n{lines}")
 
 
-def _read_stances(path: Path) -> None:
-    assert np.isfinite(list(read_stances(path).values())).all()
+def _read_positions(path: Path) -> None:
+    assert np.isfinite(list(read_rig_positions(path).values())).all()
 
 
 def _track_lines(path: Path) -> None:
@@ -434,7 +434,7 @@ SAMPLES: dict[str, Sample] = {
     "path CSV": Sample("path.csv", _path, _read_path),
     "drawing SVG": Sample("plate.svg", _drawing, _read_drawing),
     "surface CSV": Sample("heights.csv", _surface, _read_surface),
-    "stances CSV": Sample("stances.csv", _stances, _read_stances),
+    "positions CSV": Sample("positions.csv", _positions, _read_positions),
     "track of lines": Sample("track.jsonl", _track_lines, _read_track_lines),
     "checkpoint": Sample("walks.npz", _checkpoint, _read_checkpoint, changed_member),
     "file index": Sample("index.json", _state_index, _read_state_index),

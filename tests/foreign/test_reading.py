@@ -18,7 +18,7 @@ from scissorcal.foreign import Format, open_foreign, parse_json, read_foreign, r
 from scissorcal.package import open_package
 from scissorcal.recipe import load_recipe, parse_recipe, probed_surface, read_drawing
 from scissorcal.recording import import_table, read_header, read_recording, run_end
-from scissorcal.vision import frames_of, read_camera_file, read_photo, read_stances
+from scissorcal.vision import frames_of, read_camera_file, read_photo, read_rig_positions
 from tests.recording.logs import COLUMNS
 from tests.recording.made import made_samples, written_live
 
@@ -34,7 +34,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "a.zip": open_package,
     "a.toml": load_recipe,
     "path.csv": read_path,
-    "stances.csv": read_stances,
+    "positions.csv": read_rig_positions,
     "plate.svg": read_drawing,
     "heights.csv": lambda path: probed_surface(path, 0.02),
     "cut.verify.json": lambda path: load(path, VerifyResult),

@@ -12,16 +12,16 @@ from scissorcal.calibration import (
     BladeResult,
     CameraFit,
     CrossValidation,
+    EdgeCandidate,
     FoundNick,
     PhotographRow,
     PixelMap,
     PlateFit,
     PoseHalves,
     PoseView,
-    RungRow,
     ViewError,
 )
-from scissorcal.model import Edge, EdgeBelief
+from scissorcal.model import Edge, EdgeDistribution
 from scissorcal.report import Geometry
 from scissorcal.verdicts import Verdict
 from scissorcal.vision import Camera, Pose
@@ -47,8 +47,8 @@ def camera_fit() -> CameraFit:
         ),
         origin="fitted",
         board="camera board",
-        rung="k1, k2, p1, p2",
-        rungs=(_rung("k1", behind=9.0), _rung("k1, k2, p1, p2", chosen=True)),
+        candidate="k1, k2, p1, p2",
+        candidates=(_candidate("k1", behind=9.0), _candidate("k1, k2, p1, p2", chosen=True)),
         draws=np.zeros((4, 9)),
         views=(_view("board-1.jpg", 0.11), _view("board-2.jpg", 0.52), _view("board-3.jpg", 0.09)),
         bulge_mm=(0.2, 0.0),
@@ -75,7 +75,7 @@ def imported_camera() -> CameraFit:
         fit,
         camera=camera,
         origin="imported",
-        rungs=(),
+        candidates=(),
         views=(),
         noise_px=nan,
         stretch=nan,
@@ -94,11 +94,11 @@ def blade_result(*, metric: bool = True, nicked: bool = True) -> BladeResult:
     offset = edge.offset_at(station)
     fit = BladeFit(
         name="blade",
-        belief=EdgeBelief(edge, names, np.diag(sd**2)),
+        edge_posterior=EdgeDistribution(edge, names, np.diag(sd**2)),
         draws=np.zeros((4, 3)),
-        rungs=(
-            RungRow("line", 90.0, False, 1.4, 9e-6, 1e-3, 2e-6),
-            RungRow("arc", 104.0, True, 1.2, 1e-6, 1e-3, 2e-6),
+        candidates=(
+            EdgeCandidate("line", 90.0, False, 1.4, 9e-6, 1e-3, 2e-6),
+            EdgeCandidate("arc", 104.0, True, 1.2, 1e-6, 1e-3, 2e-6),
         ),
         station=station,
         offset=_band(offset, 2e-5),
@@ -173,7 +173,7 @@ def noise(path: Path, size: tuple[int, int]) -> Path:
     return path
 
 
-def _rung(name: str, *, behind: float = 0.0, chosen: bool = False) -> dict[str, object]:
+def _candidate(name: str, *, behind: float = 0.0, chosen: bool = False) -> dict[str, object]:
     return {
         "name": name,
         "free": 6,

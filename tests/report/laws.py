@@ -80,7 +80,7 @@ def _known(
         structure=structure,
         sources=sources,
         diagnostics=diagnostics,
-        rungs=(),
+        candidates=(),
     )
 
 

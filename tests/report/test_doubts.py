@@ -74,7 +74,7 @@ def checked(fit: FitResult, ranks: tuple[int, ...]) -> VerifyResult:
         FORMAT,
         "friction",
         fit.inputs_hash,
-        fit.rung,
+        fit.candidate,
         fit.effort,
         0,
         Calibration(

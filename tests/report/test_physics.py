@@ -196,7 +196,7 @@ def test_the_response_is_the_law_with_other_candidates_beside_it() -> None:
     truth = Truth()
     fit = swept_like(truth)
     values = {"response_force": 0.6, "response_exponent": 2.0, "fracture_energy": 0.5}
-    rungs = (
+    candidates = (
         {"name": "power, smooth", "chosen": True, "equivalent": True},
         {
             "name": "exponential, smooth",
@@ -206,7 +206,7 @@ def test_the_response_is_the_law_with_other_candidates_beside_it() -> None:
         },
         {"name": "spline, smooth", "equivalent": True},
     )
-    curve = response_curve(replace(fit, rungs=rungs))
+    curve = response_curve(replace(fit, candidates=candidates))
     x = curve.indentation
     expected = np.array([truth.response(delta) for delta in x])
     assert np.allclose(curve.force, expected, rtol=0.02, atol=1e-6)

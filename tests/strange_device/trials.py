@@ -114,7 +114,7 @@ def render_trial(
 ) -> Outcome:
     """Render on a device with one fault, a hand at the handles; ``rig`` is what is known of it."""
     device = StrangeDevice(faults or FAULTS[name], seed=SEED)
-    device.sledge.place = RENDER_ADVANCE_M
+    device.carriage.place = RENDER_ADVANCE_M
     device.blades.place = Hand().high
     path = folder / "render.mcap"
 

@@ -242,7 +242,7 @@ def check_of(workspace: Workspace, what: Literal["friction", "cut"], status: Sta
         format="scissorcal-verify/1",
         what=what,
         fit_hash=fit.inputs_hash,
-        rung=fit.rung,
+        candidate=fit.candidate,
         effort=fit.effort,
         seed=0,
         calibration=None,

@@ -79,8 +79,8 @@ def test_a_designed_list_takes_the_minutes_that_its_plan_takes(name: str) -> Non
     cut = expected_cut(recipe, friction)
     identity = nominal_identity(recipe)
     stock = capture_stock(recipe, identity, friction, cut)
-    for told in (one.told.scores for one in stock.sweeps.values()):
-        values = np.linalg.eigvalsh(told)
+    for scores in (one.information.scores for one in stock.sweeps.values()):
+        values = np.linalg.eigvalsh(scores)
         assert values.min() > -1e-12 * values.max()
     least = first_captures(stock)
     wanted = designed_recipe(recipe, least)

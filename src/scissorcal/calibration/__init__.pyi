@@ -27,9 +27,9 @@ from .design.state import expected_friction as expected_friction
 from .edge.result import Band as Band
 from .edge.result import BladeFit as BladeFit
 from .edge.result import BladeResult as BladeResult
+from .edge.result import EdgeCandidate as EdgeCandidate
 from .edge.result import FoundNick as FoundNick
 from .edge.result import PhotographRow as PhotographRow
-from .edge.result import RungRow as RungRow
 from .edge.result import SeenPair as SeenPair
 from .fit_model import CutRun as CutRun
 from .fit_model import Experiment as Experiment

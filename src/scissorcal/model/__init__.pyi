@@ -13,7 +13,7 @@ from .cutting import settled_contact as settled_contact
 from .cutting import torque_at as torque_at
 from .cutting import within_thickness as within_thickness
 from .edge import Edge as Edge
-from .edge import EdgeBelief as EdgeBelief
+from .edge import EdgeDistribution as EdgeDistribution
 from .edge import EdgeView as EdgeView
 from .edge import draw_edges as draw_edges
 from .edge import edge_height as edge_height
@@ -44,7 +44,7 @@ from .transforms import LOGIT as LOGIT
 __all__ = [
     "Cutting",
     "Edge",
-    "EdgeBelief",
+    "EdgeDistribution",
     "EdgeView",
     "FrictionLaw",
     "Response",

@@ -6,6 +6,7 @@ from .euler_angles import EulerAngles as EulerAngles
 from .friction import AdvanceSettings as AdvanceSettings
 from .friction import FitFriction as FitFriction
 from .friction import FitFrictionAdvance as FitFrictionAdvance
+from .friction import as_first_named as as_first_named
 from .load import builtin_recipe as builtin_recipe
 from .load import load_recipe as load_recipe
 from .load import parse_recipe as parse_recipe

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import InputError, MissingError, warn_of_old_word
 from scissorcal.foreign import read_foreign_text
 from scissorcal.foreign.formats import RECIPE, Format
 from scissorcal.recipe.explain import broken_statement, explain, key_lines
+from scissorcal.recipe.friction import OLD_LAW_KEY
 from scissorcal.recipe.priors import AnyPrior
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recipe.unlikely import Unlikely, unlikely_numbers
@@ -43,7 +44,13 @@ def parse_recipe(text: str, source: str = "recipe", *, judged: bool = True) -> R
     """
     document = _parse(text, source)
     unlikely = unlikely_numbers(document) if judged else []
-    return _checked(document, unlikely, text, Recipe, source)
+    recipe = _checked(document, unlikely, text, Recipe, source)
+    if judged:
+        for table in ("friction", "friction_advance"):
+            if OLD_LAW_KEY in document.get("fit", {}).get(table, {}):
+                key = f"fit.{table}"
+                warn_of_old_word(f"{key}.{OLD_LAW_KEY}", f"{key}.law", source)
+    return recipe
 
 
 def load_toml(path: Path, model: type[Model], kind: Format = RECIPE) -> Model:

@@ -55,8 +55,8 @@ def requirements(recipe: Recipe) -> Requirements:
     what the motor measures while it cuts is cutting *and* friction, so the response of the material
     cannot be separated from the friction of the pivot unless that is known from an empty stroke.
     A scene that only presses needs neither toughness nor fracture. A linear joint carries no
-    blades: it has friction and inertia, and nothing is cut with it. Mass and friction of the sledge
-    are needed where a force along the cut is rendered with friction.
+    blades: it has friction and inertia, and nothing is cut with it. Mass and friction of the
+    carriage are needed where a force along the cut is rendered with friction.
 
     >>> from scissorcal.recipe.load import builtin_recipe
     >>> needs = requirements(builtin_recipe("press-only"))
@@ -121,11 +121,11 @@ def requirements(recipe: Recipe) -> Requirements:
 
 
 def _advance(recipe: Recipe) -> tuple[Requirement, ...]:
-    """Friction of the sledge, where a hand feels it beside a rendered force."""
+    """Friction of the carriage, where a hand feels it beside a rendered force."""
     scene = recipe.scene
     if "translation_force" not in scene.render or not scene.render_friction:
         return ()
-    why = "a force along the cut is rendered with friction, and the sledge's own comes on top"
+    why = "a force along the cut is rendered with friction, and the carriage's own comes on top"
     return (Requirement("friction-advance", why),)
 
 
@@ -354,7 +354,7 @@ def _slides_s(recipe: Recipe) -> float:
 
 
 def _strokes_s(recipe: Recipe) -> float:
-    """Every stroke over the whole range of openings, the sledge over the whole sheet after each."""
+    """Every stroke over the whole range of openings, the carriage over the sheet after each."""
     low, high = recipe.scene.opening_rad
     cut = recipe.capture.cut
     opening_speed = min(OPENING_SPEED, recipe.scene.opening_rate_rad_per_s[1])
@@ -367,7 +367,7 @@ def _strokes_s(recipe: Recipe) -> float:
     else:  # a press opens as slowly as it closes, after a way to its place
         pressing = 2.0 * cut.sheets * _in_turn(times, cut.strokes_per_sheet)
         moving = pressing + 2.0 * strokes * glide_time(high - low, OPENING_SPEED, turn)
-    # the ways of the sledge between a sheet's strokes add up to its length; then it returns
+    # the ways of the carriage between a sheet's strokes add up to its length; then it returns
     slides = cut.strokes_per_sheet * SETTLE_S + 2.0 * glide_time(
         moved, ADVANCE_SPEED, ADVANCE_ACCELERATION
     )

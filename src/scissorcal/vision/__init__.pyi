@@ -19,6 +19,7 @@ from .live import frames_of as frames_of
 from .live import timed as timed
 from .photo import Photo as Photo
 from .photo import read_photo as read_photo
+from .rig_positions import read_rig_positions as read_rig_positions
 from .sim.optics import Lens as Lens
 from .sim.optics import Looks as Looks
 from .sim.optics import SimPose as SimPose
@@ -33,7 +34,6 @@ from .sim.sim_camera import render_card_photographs as render_card_photographs
 from .sim.sim_camera import render_frame as render_frame
 from .sim.sim_camera import render_plate_photographs as render_plate_photographs
 from .sim.sim_camera import sim_plate_scene as sim_plate_scene
-from .stances import read_stances as read_stances
 from .targets.boards import BLADE_MAT as BLADE_MAT
 from .targets.boards import CAMERA_BOARD as CAMERA_BOARD
 from .targets.boards import PLATE_BOARD as PLATE_BOARD

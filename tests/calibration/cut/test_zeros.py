@@ -19,7 +19,7 @@ def recipe_of(rig: object) -> Recipe:
     recipe = recipe_for(rig, sheets=1)
     cut = recipe.fit.cut.model_copy(update={"critic": False, "load_share": "none"})
     friction = recipe.fit.friction.model_copy(
-        update={"critic": False, "rung": "stribeck+angle", "symmetry": "asymmetric"}
+        update={"critic": False, "law": "stribeck+angle", "symmetry": "asymmetric"}
     )
     fit = recipe.fit.model_copy(update={"cut": cut, "friction": friction})
     return recipe.model_copy(update={"fit": fit})

@@ -16,7 +16,7 @@ from scissorcal.recipe import FitFriction
 from scissorcal.recording import Joint, Recording, empty_samples, label_strokes
 
 COULOMB, VISCOUS = 0.05, 0.02
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
 
 
 def log(

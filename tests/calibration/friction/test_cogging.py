@@ -15,7 +15,7 @@ from scissorcal.recipe import FitFriction, JointPriors
 from scissorcal.recording import Recording
 from tests.calibration.truth import Truth, friction_recording
 
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
 PERIODS, SIZE = 137.0, 6e-4
 
 

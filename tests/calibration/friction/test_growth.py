@@ -47,7 +47,7 @@ def long(short: Recording) -> Recording:
 
 
 def fit(recording: Recording, **settings) -> None:
-    one = FitFriction(rung="stribeck+angle", symmetry="asymmetric", **settings)
+    one = FitFriction(law="stribeck+angle", symmetry="asymmetric", **settings)
     fit_friction((recording,), one, effort="draft", rng=np.random.default_rng(2))
 
 

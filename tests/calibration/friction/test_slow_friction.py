@@ -123,7 +123,7 @@ def test_friction_at_the_slowest_sweep_changes_by_what_the_law_lacks() -> None:
     assert (after.draws[:, 1] - after.draws[:, 0]).std() > 0.4
 
 
-def test_sweeps_that_show_the_rise_are_believed() -> None:
+def test_sweeps_that_show_the_rise_decide() -> None:
     before, after = opened_from(slowest=RATE, lacking=1e-4)
     assert after is before
 

@@ -13,7 +13,7 @@ from scissorcal.recording import Recording
 from tests.second_rig import capture_friction, draw_truth, fine, recipe_for, true_parameters
 
 SETTINGS = recipe_for(fine()).fit.friction.model_copy(
-    update={"critic": False, "rung": "stribeck+angle", "symmetry": "asymmetric"}
+    update={"critic": False, "law": "stribeck+angle", "symmetry": "asymmetric"}
 )
 LEVELS = ("coulomb_pos", "coulomb_neg")
 

@@ -218,7 +218,7 @@ def test_every_real_marker_is_found() -> None:
         find_board(photo, PLATE_BOARD)
 
 
-def test_stances_that_do_not_fit_the_card_fail(still: tuple[SimPose, list[PosePhoto]]) -> None:
+def test_positions_that_do_not_fit_the_card_fail(still: tuple[SimPose, list[PosePhoto]]) -> None:
     """The blade turned by half of what was said."""
     _, seen = card_views(
         [(a, b) for a in (0.0, 0.03) for b in (0.1, 0.3)], np.random.default_rng(1)

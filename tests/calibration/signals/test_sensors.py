@@ -12,7 +12,7 @@ from scissorcal.recipe import FitFriction
 from scissorcal.recording import SAMPLE_DTYPE, Recording, resolution_of
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
 
 
 @pytest.fixture(scope="module")

@@ -96,7 +96,7 @@ def test_differing_strokes_are_detected_and_equal_ones_are_not():
 
 
 def test_a_friction_fit_stores_its_noise():
-    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+    settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
     recording = friction_recording(Truth(), np.random.default_rng(1), QUICK)
     fit = fit_friction((recording,), settings, effort="draft", rng=np.random.default_rng(2))
     truth = Truth()

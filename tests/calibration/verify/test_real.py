@@ -16,7 +16,7 @@ from tests.calibration.friction.test_fit import emps
 def test_emps_is_calibrated_and_its_halves_agree():
     """30 fits, 1 % of false alarms. What the law lacks repeats: halves differ less than claimed."""
     recording = emps()
-    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+    settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
     fit = fit_friction((recording,), settings, effort="standard", rng=np.random.default_rng(0))
     design = friction_experiment((recording,), settings, fit)
     simulator = friction_simulator((recording,), settings, fit, design.layout)

@@ -122,7 +122,7 @@ def as_fit(experiment: Linear, posterior: Posterior) -> FitResult:
         "what": "friction",
         "words": "friction",
         "effort": "standard",
-        "rung": "linear",
+        "candidate": "linear",
         "structure": {},
         "verdicts": (),
         "parameters": fitted[:3],

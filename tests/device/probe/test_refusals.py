@@ -40,8 +40,8 @@ MOVED = {
     "measured torque reversed": "motor_torque has the opposite sign of the command",
     "measured torque half": "its scale or the motor's torque constant is wrong",
     "measured torque frozen": "motor_torque does not follow the command",
-    "sledge motor reversed": "Positive force retracts the sledge",
-    "sledge encoder reversed": "Positive force retracts the sledge",
+    "carriage motor reversed": "Positive force retracts the carriage",
+    "carriage encoder reversed": "Positive force retracts the carriage",
 }
 
 PUSHING_S = 4.5
@@ -101,7 +101,7 @@ def test_a_sequence_that_leaps_is_no_deaf_watchdog() -> None:
     assert device.largest_torque == 0.0
 
 
-OF_ONE_PATH = {"measured torque half", "measured torque frozen", "sledge encoder reversed"}
+OF_ONE_PATH = {"measured torque half", "measured torque frozen", "carriage encoder reversed"}
 """Faults that the same stage finds as another one of the list."""
 
 

@@ -23,7 +23,7 @@ def probed(faults: Faults, recipe: Recipe = RECIPE) -> ProbeResult:
     device = StrangeDevice(faults, 1)
     with (
         patch("scissorcal.device.probe.probe._push"),
-        patch("scissorcal.device.probe.probe._push_sledge"),
+        patch("scissorcal.device.probe.probe._push_carriage"),
     ):
         return probe(RigSession(VirtualPort(device), recipe, Operator(Person(device))))
 

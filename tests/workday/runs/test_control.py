@@ -47,12 +47,12 @@ repeats = 1
 excitation_s = 3.0
 
 [fit.friction]
-rung = "coulomb+viscous"
+law = "coulomb+viscous"
 symmetry = "symmetric"
 critic = false
 
 [fit.friction_advance]
-rung = "coulomb+viscous"
+law = "coulomb+viscous"
 symmetry = "symmetric"
 critic = false
 """
@@ -112,7 +112,7 @@ def test_without_a_pose_it_says_what_to_do(fitted: Workspace) -> None:
         control_workspace(fitted, SIM_RIG, ControlOptions(path_of(fitted)))
 
 
-def test_without_friction_of_the_sledge_it_says_what_to_run(
+def test_without_friction_of_the_carriage_it_says_what_to_run(
     fitted: Workspace, tmp_path: Path
 ) -> None:
     import shutil

@@ -137,12 +137,12 @@ def _rig(rig: RigPose | None) -> Verdict:
             "markers at several advances and openings."
         )
         return RIG_FRAME.not_evaluated(why)
-    if rig.untold:
+    if rig.undetermined:
         why = (
-            f"The rig's motion does not determine: {', '.join(rig.untold)}. Photograph the rig "
-            "markers at several advances and several openings."
+            f"The rig's motion does not determine: {', '.join(rig.undetermined)}. Photograph the "
+            "rig markers at several advances and several openings."
         )
-        return RIG_FRAME.judge(len(rig.untold), why, threshold=0.0)
+        return RIG_FRAME.judge(len(rig.undetermined), why, threshold=0.0)
     off = rig.rms_px / np.sqrt(2.0)
     bad = (
         f"The card's corner residuals have a standard deviation of {off:.2g} px (limit "
