@@ -22,7 +22,7 @@ from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import load_specimen
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
 

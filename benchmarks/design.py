@@ -62,7 +62,7 @@ from scissorcal.device.trajectory import friction_plan
 from scissorcal.kernel import Identity
 from scissorcal.package.scene_slopes import torque_knowledge
 from scissorcal.package.scene_torque import SceneTorque, scene_torque
-from scissorcal.recipe.library import builtin_recipe, recipe_path
+from scissorcal.recipe.load import builtin_recipe, recipe_path
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
 from scissorcal.workday.stock import (

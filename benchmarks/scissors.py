@@ -22,7 +22,7 @@ from benchmarks.photographs import CastShadow, Lamp, TexturedLayer, random_looks
 
 from scissorcal.calibration.edge.fit import Blade, fit_blade
 from scissorcal.errors import InputError
-from scissorcal.vision.blade.photo import BladePhoto, by_blade, photograph_scissors
+from scissorcal.vision.blade.photo import BladePhoto, Laid, by_blade, photograph_scissors
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import (
     BladeShape,
@@ -261,7 +261,7 @@ def _measured(pairs: list[Pair]) -> list[BladePhoto]:
     for number, pair in enumerate(pairs, start=1):
         try:
             named = replace(pair.photo, source=f"{number}.jpg")
-            found.append(photograph_scissors(named, mat=False))
+            found.append(photograph_scissors(named, laid=Laid(mat=False)))
         except InputError:
             if not found and number == len(pairs):
                 raise

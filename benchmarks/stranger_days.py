@@ -38,7 +38,7 @@ import numpy as np
 from benchmarks.days import day_options
 
 from scissorcal.package.model_package import open_package
-from scissorcal.recipe.library import recipe_path
+from scissorcal.recipe.load import recipe_path
 
 RIG = Path(__file__).resolve().parents[1] / "../shared/rig/rig.py"
 COUNTS = (8192, 16384, 20000, 65536, 131072, 1_000_000)

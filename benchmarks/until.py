@@ -42,11 +42,11 @@ from scissorcal.device.sim.truth import average_torque, true_parameters, varied
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.package.exact import FitDraws, exact_model, torque_quantiles
 from scissorcal.package.scene_torque import SceneTorque, scene_torque
-from scissorcal.recipe.library import builtin_recipe, recipe_path
+from scissorcal.recipe.load import builtin_recipe, recipe_path
 from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
-from scissorcal.recording.until import UntilMark
+from scissorcal.recording.header import UntilMark
 from scissorcal.workday.runs.sweep_speeds import sweep_bounds
 from scissorcal.workday.stock import seconds_at_rig
 from scissorcal.workday.until import Earlier, Limits, UntilTolerance

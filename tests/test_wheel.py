@@ -251,7 +251,7 @@ def test_the_lock_of_the_page_names_no_registry() -> None:
 @pytest.mark.slow
 def test_it_runs_from_another_folder(unpacked: Path, tmp_path: Path) -> None:
     code = (
-        "from scissorcal.recipe.library import recipe_names, recipes_dir, schemas_dir\n"
+        "from scissorcal.recipe.load import recipe_names, recipes_dir, schemas_dir\n"
         "import scissorcal.kernel\n"
         "print(recipes_dir(), schemas_dir(), *recipe_names(), sep='\\n')\n"
     )

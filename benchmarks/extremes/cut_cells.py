@@ -11,7 +11,7 @@ from benchmarks.extremes.made_cut import MadeCut, cut_motion, record_cut
 from benchmarks.extremes.made_friction import MadeFriction, changed, record, sweeps
 
 from scissorcal.calibration import FitResult, fit_cut, fit_friction
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording
 

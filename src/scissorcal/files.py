@@ -1,4 +1,7 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and locks on open ones.
+
+A lock is of the process that opened the file, and given back however it ends.
+"""
 
 import contextlib
 import errno
@@ -7,6 +10,7 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 _PART = re.compile(r"\.(?P<host>[A-Za-z0-9_-]+)\.(?P<pid>\d+)\.[0-9a-f]{8}\.part$")
 _LONGEST_NAME = 40
@@ -105,9 +109,9 @@ def left_over(folder: Path) -> tuple[Path, ...]:
     return tuple(
         part
         for part in sorted(folder.glob("*.part"))
-        if (found := _PART.search(part.name))
-        and found["host"] == _host()
-        and not is_running(int(found["pid"]))
+        if (name := _PART.search(part.name))
+        and name["host"] == _host()
+        and not is_running(int(name["pid"]))
     )
 
 
@@ -166,3 +170,41 @@ def keep_name(folder: Path) -> None:
             raise
     finally:
         os.close(handle)
+
+
+_NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL, errno.EBADF)
+"""Answers where there are no locks; NFS gives EBADF for a file that may only be read."""
+
+
+def lock(file: IO[bytes]) -> None:
+    """Wait for the lock of an open file, which ends when the file is closed.
+
+    Where the file system or the operating system has no locks, none is held.
+    """
+    _locked(file, blocking=True)
+
+
+def try_lock(file: IO[bytes]) -> bool | None:
+    """Lock an open file: False where a running process holds its lock, None where none exist.
+
+    Locks do not exist where the file system or the operating system has none.
+    """
+    return _locked(file, blocking=False)
+
+
+def unlock(file: IO[bytes]) -> None:
+    """Give back the lock of a file that stays open."""
+    from filelock import unlock_descriptor  # as in `_locked`
+
+    unlock_descriptor(file.fileno())
+
+
+def _locked(file: IO[bytes], blocking: bool) -> bool | None:
+    from filelock import lock_descriptor  # most commands lock nothing
+
+    try:
+        return bool(lock_descriptor(file.fileno(), blocking=blocking))
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise
+        return None

@@ -27,7 +27,7 @@ def open_workspace(path: Path | str = ".") -> "Workspace":
     such folder, or no recipe.toml in it or above it, InputError where it is a file.
 
     >>> from pathlib import Path
-    >>> from scissorcal.recipe.library import recipe_path
+    >>> from scissorcal.recipe.load import recipe_path
     >>> _ = Path("recipe.toml").write_text(recipe_path("paper-80gsm").read_text())
     >>> open_workspace(".").recipe().name
     'paper-80gsm'

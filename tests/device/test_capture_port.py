@@ -41,7 +41,7 @@ from pathlib import Path
 from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.link import open_link
 from scissorcal.device.session import Operator, RigSession
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe.load import builtin_recipe
 
 recipe = builtin_recipe("paper-80gsm")
 with open_link(sys.argv[1]) as link:

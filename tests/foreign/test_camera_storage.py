@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.foreign.text_tree import parse_xml, parse_yaml
+from scissorcal.foreign.reading import parse_xml, parse_yaml
 from scissorcal.vision import matrix_of, number_of, read_camera_file
 
 STYLES = {

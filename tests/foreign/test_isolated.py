@@ -14,7 +14,7 @@ import pytest
 
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.foreign import Format, isolated, parse_isolated
-from scissorcal.foreign.child import MOST_HELD_BYTES
+from scissorcal.foreign.isolated import MOST_HELD_BYTES
 from tests.guard import GUARD_S
 
 KIND = Format("a test", 10_000, "Write it again.", memory_bytes=600_000_000, processor_s=20)

@@ -14,8 +14,8 @@ import scissorcal
 from scissorcal.errors import InputError
 from scissorcal.foreign import DRAWING
 from scissorcal.model import Outline, spans_on_line
-from scissorcal.recipe.drawing import parse_drawing, read_drawing
-from scissorcal.recipe.svg.curves import FLAT_MM
+from scissorcal.recipe.plate_layers import read_drawing
+from scissorcal.recipe.svg.curves import FLAT_MM, parse_drawing
 from scissorcal.recipe.svg.elements import MOST_POINTS, MOST_POINTS_OF_FILE, MOST_SHAPES
 from tests.guard import GUARD_S
 
@@ -206,7 +206,7 @@ def test_two_megabytes_of_one_thing_are_read_or_refused_for_what_they_are(
     """Not for the processor time that they took, which grows with the square where a search of text
     goes back again and again: calls do not count that, and here it would be hours. The time on the
     wall, which depends on load, only guards against hanging."""
-    monkeypatch.setattr("scissorcal.recipe.drawing.DRAWING", replace(DRAWING, wall_s=GUARD_S))
+    monkeypatch.setattr("scissorcal.recipe.plate_layers.DRAWING", replace(DRAWING, wall_s=GUARD_S))
     path = tmp_path / "plate.svg"
     path.write_bytes(slow(what, MOST_CHARACTERS))
     said = ""

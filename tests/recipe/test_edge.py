@@ -11,10 +11,14 @@ from jsonschema import Draft202012Validator
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.edge import edge_sentence, stated_curve
-from scissorcal.recipe.library import builtin_recipe, recipe_path
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe.load import (
+    as_toml,
+    builtin_recipe,
+    parse_recipe,
+    recipe_path,
+    recipe_settings,
+)
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recipe.show import as_toml, recipe_settings
 
 POINTS = 'family = "points"\npoints_mm = [[0, -8], [30, -7], [75, -5]]'
 

@@ -3,7 +3,7 @@
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import (
+from scissorcal.recipe.load import (
     builtin_recipe,
     recipe_names,
     recipe_path,

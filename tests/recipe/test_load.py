@@ -8,8 +8,13 @@ from hypothesis import strategies as st
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.explain import key_lines
-from scissorcal.recipe.library import builtin_recipe, recipe_names, recipe_path
-from scissorcal.recipe.load import load_recipe, parse_recipe
+from scissorcal.recipe.load import (
+    builtin_recipe,
+    load_recipe,
+    parse_recipe,
+    recipe_names,
+    recipe_path,
+)
 
 PAPER = recipe_path("paper-80gsm").read_text(encoding="utf-8")
 

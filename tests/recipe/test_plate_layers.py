@@ -5,10 +5,8 @@ from pathlib import Path
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe.load import as_toml, parse_recipe, recipe_path, recipe_settings
 from scissorcal.recipe.plate_layers import plate_pieces, plate_sentence
-from scissorcal.recipe.show import as_toml, recipe_settings
 
 BASE = recipe_path("paper-80gsm").read_text(encoding="utf-8")
 BOX = "[[0, -30], [80, -30], [80, 30], [0, 30]]"

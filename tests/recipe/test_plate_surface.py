@@ -7,8 +7,7 @@ import pytest
 
 from scissorcal.errors import InputError
 from scissorcal.model import Cylinder, HeightField, Plane, Sphere
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe.load import parse_recipe, recipe_path
 from scissorcal.recipe.plate_surface import PlateSurface, plate_surface, probed_surface
 
 RECIPE = recipe_path("paper-80gsm").read_text(encoding="utf-8")

@@ -1,7 +1,6 @@
 """A scene is asked for what it needs and for nothing else."""
 
-from scissorcal.recipe.library import builtin_recipe, recipe_path
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe.load import builtin_recipe, parse_recipe, recipe_path
 from scissorcal.recipe.requirements import Requirement, requirements
 
 PAPER = recipe_path("paper-80gsm").read_text(encoding="utf-8")

@@ -5,10 +5,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import recipe_names, recipe_path
-from scissorcal.recipe.load import parse_recipe, read_text
+from scissorcal.recipe.load import (
+    as_toml,
+    parse_recipe,
+    read_text,
+    recipe_names,
+    recipe_path,
+    recipe_settings,
+)
 from scissorcal.recipe.priors import JointPriors
-from scissorcal.recipe.show import as_toml, recipe_settings
 
 TEXT = read_text(recipe_path("paper-80gsm"))
 

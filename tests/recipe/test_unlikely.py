@@ -10,11 +10,16 @@ from hypothesis import strategies as st
 
 from scissorcal.errors import InputError
 from scissorcal.recipe.explain import table_model
-from scissorcal.recipe.library import builtin_recipe, recipe_names, recipe_path
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe.load import (
+    as_toml,
+    builtin_recipe,
+    parse_recipe,
+    recipe_names,
+    recipe_path,
+    recipe_settings,
+)
 from scissorcal.recipe.priors import AnyPrior, NormalPrior
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recipe.show import as_toml, recipe_settings
 from scissorcal.recipe.units import split_unit
 from scissorcal.recipe.unlikely import EVERYDAY, MARGIN, QUANTITY_OF, bounds, unlikely_numbers
 

@@ -19,8 +19,7 @@ from scissorcal.recording import (
     recover,
     summary,
 )
-from scissorcal.recording.exporting import channel_columns
-from scissorcal.recording.telemetry import (
+from scissorcal.recording.layout import (
     CHANNELS,
     FRAME,
     PICTURE,
@@ -28,6 +27,7 @@ from scissorcal.recording.telemetry import (
     TelemetryChannel,
     frame_rows,
 )
+from scissorcal.recording.table_file import channel_columns
 from tests.recording.made import EPOCH_NS, made_samples
 
 COUNT = 60

@@ -133,7 +133,7 @@ def test_a_recording_of_a_later_format_is_refused(
         del entries["crc32"]
         return {**entries, "crc32": description.checksum(entries)}
 
-    monkeypatch.setattr("scissorcal.recording.samplefile.to_entries", later)
+    monkeypatch.setattr("scissorcal.recording.writer.to_entries", later)
     path = write_recording(made_recording(50), tmp_path / "a.mcap")
     with pytest.raises(InputError, match=r"scissorcal-recording/2.*use the version"):
         read_recording(path)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scissorcal.calibration import survey
 from scissorcal.errors import InputError
 from scissorcal.recording import ImportOptions, Joint, Recording, import_table, textfile
-from scissorcal.recording.resolution import noise_of, stroke_threshold
+from scissorcal.recording.strokes import noise_of, stroke_threshold
 from tests.recording.logs import imported
 
 HEAD = "t_ms,angle_deg,force_g"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scissorcal.recording import Joint, Recording, Stroke, summary
-from scissorcal.recording.summarising import find_gaps
+from scissorcal.recording.recording import find_gaps
 from tests.recording.made import made_recording, made_samples
 
 

@@ -14,7 +14,7 @@ from scissorcal.recording import (
     read_telemetry,
     recover,
 )
-from scissorcal.recording.telemetry import CONTROL
+from scissorcal.recording.layout import CONTROL
 from tests.recording.made import made_samples
 
 
@@ -43,7 +43,7 @@ def write(path: Path, *, close: bool = True) -> np.ndarray:
     if close:
         writer.close()
     else:
-        writer._file._mcap.flush()
+        writer._mcap.flush()
         writer._stream.close()
     return np.concatenate(written)
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from scissorcal.recording.until import UNTIL_MARK, UntilMark
+from scissorcal.recording.header import UNTIL_MARK, UntilMark
 
 GOING = UntilMark("", 3, 2, 1.2, 0.4, 0.8, 0.04, 0.07, 0.95)
 

@@ -131,7 +131,7 @@ def seconds_of(words: str) -> float:
 
 def _day(name: str, seed: int) -> "Workspace":
     """The workspace of a built-in recipe with a day on the virtual rig; made where it is not."""
-    from scissorcal.recipe.library import recipe_path
+    from scissorcal.recipe.load import recipe_path
     from scissorcal.workday.demo.day import make_day
     from scissorcal.workday.workspace import Workspace, create_workspace, demo_folder
 

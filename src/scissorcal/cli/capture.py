@@ -17,7 +17,7 @@ from scissorcal.workday.options import CaptureOptions, RigOptions
 if TYPE_CHECKING:
     from scissorcal.device.session import Operator
     from scissorcal.recipe.requirements import CaptureKind
-    from scissorcal.recording.until import UntilMark
+    from scissorcal.recording.header import UntilMark
     from scissorcal.workday.runs.capture import Captured
     from scissorcal.workday.workspace import Workspace
 

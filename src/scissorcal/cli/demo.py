@@ -57,7 +57,7 @@ def demo(
         coulomb_pos  0.01334 (0.01327 to 0.01341) N m  0.01331 N m       yes
       ...
     """
-    from scissorcal.recipe.library import recipe_path
+    from scissorcal.recipe.load import recipe_path
     from scissorcal.report import panel_text
     from scissorcal.workday.demo.day import run_demo
     from scissorcal.workday.workspace import demo_folder

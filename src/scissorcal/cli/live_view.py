@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from scissorcal.device.coverage import CoveredAxis
     from scissorcal.device.recorder import Recorder
     from scissorcal.device.session import Operator
-    from scissorcal.recording.until import UntilMark
+    from scissorcal.recording.header import UntilMark
 
 _LINE_EVERY_S = 5.0
 _DRAW_EVERY_S = 0.1
@@ -159,7 +159,7 @@ class LiveView:
 def band_line(marks: "Sequence[UntilMark]") -> str:
     """The last mark's sentence, and a bar for each: the share of places within the tolerance.
 
-    >>> from scissorcal.recording.until import UntilMark
+    >>> from scissorcal.recording.header import UntilMark
     >>> first = UntilMark("", 1, 1, 0.5, 1.0, 0.0, 0.2, 0.07, 0.95)
     >>> second = UntilMark("", 2, 1, 0.6, 0.9, 1.0, 0.05, 0.07, 0.95)
     >>> band_line([first, second])[:2]

@@ -46,9 +46,13 @@ def show(
       [fit.friction.priors.rotary]
       ...
     """
-    from scissorcal.recipe.library import recipe_file
-    from scissorcal.recipe.load import parse_recipe, read_text
-    from scissorcal.recipe.show import as_toml, recipe_settings
+    from scissorcal.recipe.load import (
+        as_toml,
+        parse_recipe,
+        read_text,
+        recipe_file,
+        recipe_settings,
+    )
     from scissorcal.workday.workspace import find_workspace
 
     path = find_workspace(folder).recipe_path if name is None else recipe_file(name)

@@ -42,9 +42,9 @@ from scissorcal.device.session import RigSession, is_simulator, refuse_nobody
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import CONTROL_DTYPE, ConfigKey, ControlFlag
 from scissorcal.model.surface import Surface
-from scissorcal.recipe.pace import APPROACH_SPEED, TURN_ACCELERATION
+from scissorcal.recipe.requirements import APPROACH_SPEED, TURN_ACCELERATION
 from scissorcal.recording import RecordingWriter
-from scissorcal.recording.telemetry import CONTROL
+from scissorcal.recording.layout import CONTROL
 from scissorcal.tracking.plate_pose import PlatePose, PoseSource
 
 EVERY_S = 0.01

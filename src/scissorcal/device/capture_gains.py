@@ -16,7 +16,7 @@ from scissorcal.device.trajectory import SWING_ACCELERATION, largest_acceleratio
 from scissorcal.device.watching import STILL_RAD
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Identity
-from scissorcal.recipe.pace import (
+from scissorcal.recipe.requirements import (
     ADVANCE_ACCELERATION,
     ADVANCE_SPEED,
     APPROACH_SPEED,

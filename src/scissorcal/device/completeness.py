@@ -25,7 +25,7 @@ from scissorcal.device.counts import (
 )
 from scissorcal.recipe.requirements import LITTLE, CaptureKind, command_words
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.until import UntilMark
+from scissorcal.recording.header import UntilMark
 
 SAME = 1e-9
 """Shares that differ by less are one: of percents in a recipe and in a mark."""

@@ -15,8 +15,8 @@ from scissorcal.kernel import Identity
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.requirements import LITTLE, CaptureKind
 from scissorcal.recipe.schema import Capture, Recipe
+from scissorcal.recording.header import UntilMark
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.until import UntilMark
 
 Labels = NDArray[np.int64]
 

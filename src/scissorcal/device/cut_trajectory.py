@@ -20,7 +20,7 @@ from scissorcal.device.trajectory import (
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability, Identity
 from scissorcal.recipe.edge import StatedCurve, stated_curve
-from scissorcal.recipe.pace import (
+from scissorcal.recipe.requirements import (
     ADVANCE_ACCELERATION,
     ADVANCE_SPEED,
     DWELL_S,
@@ -59,7 +59,7 @@ class Blade:
         sin(beta). NaN where the edge never reaches it, or only beyond the blade's tip, and where a
         curve through points rises through it more than once.
 
-        >>> from scissorcal.recipe.library import builtin_recipe
+        >>> from scissorcal.recipe.load import builtin_recipe
         >>> blade = Blade.of(builtin_recipe("paper-80gsm"))
         >>> np.round(1e3 * blade.crossing(np.radians([50.0, 12.0])), 1)
         array([17.7, 57.8])

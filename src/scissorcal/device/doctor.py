@@ -16,7 +16,7 @@ from scissorcal.device.motion import LOOP
 from scissorcal.device.timing import Percentiles
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, State
-from scissorcal.recording.summarising import missing_frames
+from scissorcal.recording.recording import missing_frames
 from scissorcal.verdicts import STATED, Check, Verdict
 
 ROUND_TRIPS = 100

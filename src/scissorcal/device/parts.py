@@ -10,8 +10,13 @@ from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.paths import PathBuilder, Reference
 from scissorcal.device.trajectory import Plan, Segment, friction_plan
 from scissorcal.kernel import Identity
-from scissorcal.recipe.pace import APPROACH_SPEED, DWELL_S, SETTLE_S, TURN_ACCELERATION
-from scissorcal.recipe.requirements import DesignedKind
+from scissorcal.recipe.requirements import (
+    APPROACH_SPEED,
+    DWELL_S,
+    SETTLE_S,
+    TURN_ACCELERATION,
+    DesignedKind,
+)
 from scissorcal.recipe.schema import CaptureCut, CaptureFriction, Recipe
 from scissorcal.recording import Stroke
 

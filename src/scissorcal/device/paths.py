@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.recipe.pace import MOST_MIN, glide_speed, glide_time, ramp_time
+from scissorcal.recipe.requirements import MOST_MIN, glide_speed, glide_time, ramp_time
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scissorcal.device.coverage import CoverageGrid, CoveredAxis
 from scissorcal.kernel import StateFlag
 from scissorcal.recording import RecordingWriter, Stroke
-from scissorcal.recording.recording import UNLOADED_MARK
-from scissorcal.recording.summarising import missing_frames
+from scissorcal.recording.recording import UNLOADED_MARK, missing_frames
 
 NOTES_OF_A_KIND = 3
 COUNTED_AT_ONCE = 5

@@ -14,8 +14,8 @@ from scissorcal.device.recorder import Recorder
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability, ConfigKey, Identity
 from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.header import UntilMark
 from scissorcal.recording.probe import PROBE_KEY, UNKNOWN_REST, Estimate, ProbeResult, RestFacts
-from scissorcal.recording.until import UntilMark
 
 Confirm = Callable[[str], None]
 """Shows a request to a person and returns once it is done; raises to cancel."""
@@ -60,7 +60,7 @@ class RigSession:
 
     >>> import numpy as np
     >>> from scissorcal.device.lockstep import LockstepLink
-    >>> from scissorcal.recipe.library import builtin_recipe
+    >>> from scissorcal.recipe.load import builtin_recipe
     >>> with LockstepLink("office-paper", np.random.default_rng(1)) as link:
     ...     RigSession(link, builtin_recipe("paper-80gsm")).name
     'scissorcal-sim office-paper'

@@ -12,7 +12,7 @@ import numpy as np
 from scissorcal.device.paths import PathBuilder, Reference, SwingLimits, multisine
 from scissorcal.errors import InputError
 from scissorcal.kernel import Capability, Identity
-from scissorcal.recipe.pace import (
+from scissorcal.recipe.requirements import (
     ADVANCE_ACCELERATION,
     ADVANCE_SPEED,
     APPROACH_SPEED,

@@ -4,9 +4,8 @@ import os
 import re
 from codecs import getincrementaldecoder
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from io import BytesIO
-from typing import IO
+from typing import IO, NamedTuple
 
 from scissorcal.errors import OtherKindError
 
@@ -21,8 +20,7 @@ OF_SCISSORCAL = b"scissorcal"
 _LARGEST_FIT = 500_000_000
 
 
-@dataclass(frozen=True)
-class FileKind:
+class FileKind(NamedTuple):
     """A kind of file: the word by which a format accepts it, and its name with an article.
 
     ``use`` is a sentence on what to do with it where another file was needed.

@@ -19,7 +19,7 @@ from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.recording import layout
 from scissorcal.recording.following import RecordingFollower
-from scissorcal.recording.telemetry import POSE
+from scissorcal.recording.layout import POSE
 
 SEARCH_EVERY_s = 0.2
 QUIET_s = 3.0

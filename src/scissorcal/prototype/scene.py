@@ -58,10 +58,9 @@ class Scene(Part):
     ``tables`` (3, knots) and ``numbers`` are what the kernel evaluates, in the orders of
     TABLE_NAMES and MODEL_NUMBERS. ``mean_energy`` (3, knots) and ``levels`` are those of the
     average torque; without a ripple there are none. ``cut`` and ``friction`` are as fitted on the
-    knots, from which sliders and draws differ. ``notes`` are sentences about the package that do
-    not warn. ``pieces`` are the plate along the cut, None for a uniform sheet; ``recipe`` is the
-    text that a drawn plate is written into; ``drawn_plate`` is the plate whose outlines stand in
-    files beside that recipe.
+    knots, from which sliders and draws differ. ``pieces`` are the plate along the cut, None for a
+    uniform sheet; ``recipe`` is the text that a drawn plate is written into; ``drawn_plate`` is the
+    plate whose outlines stand in files beside that recipe.
     """
 
     format: Literal["scissorcal-prototype/1"] = FORMAT
@@ -69,7 +68,6 @@ class Scene(Part):
     made_utc: str
     version: str
     warnings: tuple[str, ...]
-    notes: tuple[str, ...] = ()
     bound_Nm: float
     torque_limit_Nm: float
     opening_rad: tuple[float, float]

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 from pydantic import ConfigDict, Field, GetCoreSchemaHandler, Strict, model_validator
 from pydantic_core import CoreSchema, core_schema
 
-from scissorcal.recipe.fields import Length_mm
-from scissorcal.recipe.priors import Section
+from scissorcal.recipe.priors import Length_mm, Section
 
 if TYPE_CHECKING:
     from scissorcal.model.edge import Edge as Curve
@@ -121,7 +120,7 @@ def stated_curve(edge: Edge) -> StatedCurve:
     Points become one spline (:func:`scissorcal.model.edge_points.edge_through`). Raises
     ValueError, a sentence, for points that are none; a recipe that was read has none of these.
 
-    >>> from scissorcal.recipe.library import builtin_recipe
+    >>> from scissorcal.recipe.load import builtin_recipe
     >>> curve = stated_curve(builtin_recipe("paper-80gsm").rig.edge).edge
     >>> curve.family, curve.offset_m, curve.length_m
     ('line', -0.008, 0.075)

@@ -140,7 +140,7 @@ def euler_deg(quaternions: ArrayLike) -> Array:
 
     given = np.asarray(quaternions, dtype=np.float64)
     flat = given.reshape(-1, 4)
-    found = np.full((len(flat), 3), np.nan)
+    angles = np.full((len(flat), 3), np.nan)
     with np.errstate(invalid="ignore", over="ignore"):
         unit = np.abs(np.linalg.norm(flat, axis=1) - 1.0) <= ROUNDED_LENGTH
     known = np.flatnonzero(unit)
@@ -150,11 +150,11 @@ def euler_deg(quaternions: ArrayLike) -> Array:
         level = np.hypot(matrices[:, 0, 0], matrices[:, 1, 0])
         free = level > _LOCK
         if free.any():
-            found[known[free]] = turns[free].as_euler("ZYX", degrees=True)
+            angles[known[free]] = turns[free].as_euler("ZYX", degrees=True)
         for at, matrix, small in zip(known[~free], matrices[~free], level[~free], strict=True):
             yaw, pitch = np.arctan2(-matrix[0, 1], matrix[1, 1]), np.arctan2(-matrix[2, 0], small)
-            found[at] = np.degrees(yaw), np.degrees(pitch), 0.0
-    return found.reshape(*given.shape[:-1], 3)
+            angles[at] = np.degrees(yaw), np.degrees(pitch), 0.0
+    return angles.reshape(*given.shape[:-1], 3)
 
 
 def singular_within_deg(covariance: Array | None) -> Array:
@@ -243,9 +243,9 @@ def _quaternion(turn: "Rotation") -> Quaternion:
 
 
 def _apart_deg(a: Quaternion, b: Quaternion) -> float:
-    """The angle of the turn from one unit quaternion to the other."""
-    one, other = np.array(a), np.array(b)
-    near = min(float(np.linalg.norm(one - other)), float(np.linalg.norm(one + other)))
+    """The angle of the turn from first unit quaternion to the second."""
+    first, second = np.array(a), np.array(b)
+    near = min(float(np.linalg.norm(first - second)), float(np.linalg.norm(first + second)))
     return math.degrees(4.0 * math.asin(min(0.5 * near, 1.0)))
 
 
@@ -262,8 +262,8 @@ def _sds_deg(yaw: float, pitch: float, covariance: Array) -> tuple[float, float,
     ).T
     slope = np.linalg.inv(axes)
     variances = np.maximum(np.diag(slope @ covariance @ slope.T), 0.0)
-    one, two, three = np.degrees(np.sqrt(variances)).tolist()
-    return one, two, three
+    yaw_sd, pitch_sd, roll_sd = np.degrees(np.sqrt(variances)).tolist()
+    return yaw_sd, pitch_sd, roll_sd
 
 
 def _note(yaw: float, pitch: float, roll: float, reach: float) -> str:

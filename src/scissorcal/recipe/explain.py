@@ -7,7 +7,6 @@ import tomllib
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -50,26 +49,21 @@ _MOST_COMPARED = 500
 """Unknown keys whose likely meaning is looked for; a recipe has fewer keys."""
 
 
-@dataclass(frozen=True)
-class Mistakes:
-    """Sentences in the order of the file, at most ``MOST_MISTAKES``, and how many there are."""
-
-    sentences: tuple[str, ...]
-    count: int
-
-
 def explain(
     error: ValidationError | None,
     unlikely: Sequence[Unlikely],
     document: Mapping[str, Any],
     text: str,
     model: type[BaseModel],
-) -> Mistakes:
+) -> tuple[tuple[str, ...], int]:
     """Turn what pydantic found, and ``unlikely`` numbers, into sentences, each with its line.
 
     A key that was written under another name (a wrong unit, a typo) is one mistake, not two: the
     name that stands there is reported, the name that is therefore missing is not. An unlikely
     number that breaks a rule is one mistake, too: the rule, with the likely slip.
+
+    Returns sentences in the order of the file, at most ``MOST_MISTAKES``, and how many mistakes
+    there are.
     """
     details = error.errors(include_url=False) if error is not None else []
     unknown = [_path(item) for item in details if item["type"] == "extra_forbidden"]
@@ -89,7 +83,7 @@ def explain(
     ]
     lines = key_lines(text, [_given(document, path) for path, _ in mistakes])
     ordered = sorted(zip(lines, mistakes, strict=True), key=lambda pair: pair[0] or 0)
-    return Mistakes(
+    return (
         tuple(
             f"line {line}, {sentence}" if path and line else sentence
             for line, (path, sentence) in ordered
@@ -109,10 +103,10 @@ def _mistake(
         return path, _unknown(path, meant.get(path), item["input"], model)
     if item["type"] == "value_error":
         return _broken_rule(path, item)
-    return path, f"{dotted(path)}: {_wrong_value(item, _fields(model, path))}"
+    return path, f"{_dotted(path)}: {_wrong_value(item, _fields(model, path))}"
 
 
-def dotted(path: Path) -> str:
+def _dotted(path: Path) -> str:
     """Write a path as people do: ``scene.contact_mm[1]``."""
     words = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
     return _short(words.lstrip("."))
@@ -133,11 +127,11 @@ def _given(document: Any, path: Path) -> Path:
 
 
 def _missing(path: Path) -> str:
-    table = dotted(path[:-1])
+    table = _dotted(path[:-1])
     if isinstance(path[-1], int):
         return f"{table}: the list is too short; it needs {path[-1] + 1} numbers or more."
     where = f"in [{table}]" if table else "at the top of the file"
-    return f"{dotted(path)} is missing: add {path[-1]} {where}."
+    return f"{_dotted(path)} is missing: add {path[-1]} {where}."
 
 
 def _broken_rule(path: Path, item: Any) -> tuple[Path, str]:
@@ -147,9 +141,9 @@ def _broken_rule(path: Path, item: Any) -> tuple[Path, str]:
         inner = tuple(word.strip("(),:;").split("."))
         if (path or len(inner) > 1) and _given(item["input"], inner) == inner:
             place = (*path, *inner)
-            spoken = reason if word.startswith(dotted(place)) else f"{dotted(place)}: {reason}"
+            spoken = reason if word.startswith(_dotted(place)) else f"{_dotted(place)}: {reason}"
             return place, f"{spoken}."
-    return path, f"{dotted(path)}: {reason}." if path else f"{reason}."
+    return path, f"{_dotted(path)}: {reason}." if path else f"{reason}."
 
 
 def _wrong_value(item: Any, fields: Sequence[str]) -> str:
@@ -199,7 +193,7 @@ def _choices(given: Any, expected: str) -> str:
 
 
 def _unknown(path: Path, meant: str | None, value: Any, model: type[BaseModel]) -> str:
-    key, place = str(path[-1]), dotted(path)
+    key, place = str(path[-1]), _dotted(path)
     if meant is None:
         fields = _fields(model, path[:-1])
         allowed = ", ".join(fields) if fields else "nothing"
@@ -214,7 +208,7 @@ def _elsewhere(key: str, path: Path, model: type[BaseModel]) -> str:
     homes = [table for table in homes if table != path[:-1]]
     if len(homes) != 1:
         return ""
-    return f" It belongs {'in [' + dotted(homes[0]) + ']' if homes[0] else 'at the top'}."
+    return f" It belongs {'in [' + _dotted(homes[0]) + ']' if homes[0] else 'at the top'}."
 
 
 def _suggest(path: Path, model: type[BaseModel], document: Any) -> str | None:

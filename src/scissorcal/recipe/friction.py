@@ -7,16 +7,17 @@ from typing import Annotated, Any, Literal
 from pydantic import AliasChoices, Field, Strict
 
 from scissorcal.model.friction_terms import CANDIDATES, TERMS, law_names
-from scissorcal.recipe.fields import (
+from scissorcal.recipe.priors import (
     BETWEEN_percent,
     Between_percent,
     Count,
+    JointPriors,
     Length_mm,
     OneOf,
+    Section,
     SlidingSpeeds,
     Speeds,
 )
-from scissorcal.recipe.priors import JointPriors, Section
 
 FrictionLawName = Annotated[str, OneOf(*law_names())]
 FrictionTerm = Annotated[str, OneOf(*(term.name for term in TERMS.values() if term.adoptable))]

@@ -2,19 +2,75 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field, Strict, model_validator
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.drawing import Drawing, read_drawing
-from scissorcal.recipe.fields import Finite, Range, Thickness_mm
+from scissorcal.foreign import parse_isolated, read_foreign
+from scissorcal.foreign.formats import DRAWING
 from scissorcal.recipe.plate_surface import PlateSurface, PlateTracking, Touch
-from scissorcal.recipe.priors import Section
+from scissorcal.recipe.priors import Finite, Range, Section, Thickness_mm
 
 if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import Layer, LayerPiece, Outline
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Shapes of one file: by id, in the order of the file; shapes without id are "" alone."""
+
+    path: Path
+    shapes: tuple[tuple[str, Outline], ...]
+
+    def shape(self, name: str | None) -> Outline:
+        """The shape with this id, or the only one; ValueError, a sentence, where there is none."""
+        named = [identity for identity, _ in self.shapes if identity]
+        listed = ", ".join(named[:20]) or "none has an id"
+        if name is None:
+            if len(self.shapes) != 1:
+                raise ValueError(
+                    f"{self.path.name} has {len(self.shapes)} shapes: say which is meant with id "
+                    f"(there are: {listed})"
+                )
+            return self.shapes[0][1]
+        matches = [outline for identity, outline in self.shapes if identity == name]
+        if len(matches) != 1:
+            count = "no" if not matches else str(len(matches))
+            raise ValueError(
+                f'{self.path.name} has {count} shapes with id "{name}" (there are: {listed})'
+            )
+        return matches[0]
+
+
+def read_drawing(path: Path) -> Drawing:
+    """Read the shapes of an SVG file, by a child process with limits of memory and time.
+
+    Lengths come from the file's width and height, which need a unit, and its viewBox. Taken are
+    path, rect, circle, ellipse, polygon and polyline with their transforms; curves are flattened
+    to 0.01 mm, open contours closed. Text, pictures, single lines and colours are passed over (a
+    shape without fill and line is a shape), and what display or visibility hides. The file may be
+    compressed (svgz).
+
+    Raises InputError where it is no such file, has entities, a script or a clone, or refers to
+    another file; and, by its name, for any element, attribute or property that is not known to
+    leave the shapes' places as they are, such as transform-origin, clip-path or <switch>.
+    """
+    from scissorcal.model.plate_pieces import Outline
+
+    data = read_foreign(path, DRAWING)
+    answer = parse_isolated(
+        "scissorcal.recipe.svg.curves:parse_drawing", data, path, DRAWING, name=str(path)
+    )
+    shapes: dict[int, tuple[str, list[Any]]] = {}
+    for index, name, contour in answer:
+        shapes.setdefault(index, (name, []))[1].append(contour * 1e-3)
+    return Drawing(
+        path, tuple((name, Outline(tuple(contours))) for name, contours in shapes.values())
+    )
+
 
 MOST_PIECES = 16
 MOST_STRIPS = 64
@@ -176,8 +232,8 @@ def refuse_impossible_layers(plate: Plate, plate_pose: str, joint: str) -> None:
         raise ValueError(
             'plate.layers need blades, and rig.joint = "linear" has none: remove the layers'
         )
-    written = [c for one in layers for p in one.parts for c in p.outline_mm or ()]
-    written += [corner for one in layers for hole in one.holes_mm for corner in hole]
+    written = [c for layer in layers for p in layer.parts for c in p.outline_mm or ()]
+    written += [corner for layer in layers for hole in layer.holes_mm for corner in hole]
     if len(written) > MOST_CORNERS:
         raise ValueError(
             f"plate.layers have {len(written)} corners, and a recipe holds {MOST_CORNERS}: draw "
@@ -240,13 +296,13 @@ def plate_sentence(
     )
     if thick != [thickness_mm]:
         sentence += (
-            f" Layers of {', '.join(f'{one:g}' for one in thick)} mm rest on an assumption: "
+            f" Layers of {', '.join(f'{height:g}' for height in thick)} mm rest on an assumption: "
             "response and fracture energy proportional to the thickness."
         )
     if ratios != [1.0]:
         sentence += (
-            f" Toughness ratios of {', '.join(f'{one:g}' for one in ratios)} are declared in the "
-            "recipe, not measured."
+            f" Toughness ratios of {', '.join(f'{ratio:g}' for ratio in ratios)} are declared in "
+            "the recipe, not measured."
         )
     return sentence
 

@@ -13,17 +13,6 @@ from typing import Annotated, Literal
 from pydantic import Field, Strict, model_validator
 
 from scissorcal.recipe.edge import Edge as Edge
-from scissorcal.recipe.fields import (
-    BETWEEN_percent,
-    Between_percent,
-    Count,
-    Length_mm,
-    NonNegative,
-    Positive,
-    Range,
-    Speeds,
-    Thickness_mm,
-)
 from scissorcal.recipe.friction import (
     AdvanceSettings,
     CaptureFrictionAdvance,
@@ -35,12 +24,21 @@ from scissorcal.recipe.friction import FrictionLawName as FrictionLawName
 from scissorcal.recipe.friction import FrictionTerm as FrictionTerm
 from scissorcal.recipe.plate_layers import Plate, refuse_impossible_layers
 from scissorcal.recipe.priors import (
+    BETWEEN_percent,
+    Between_percent,
     BladePriors,
     CameraPriors,
+    Count,
     CutPriors,
+    Length_mm,
     LogNormalPrior,
+    NonNegative,
     PlatePriors,
+    Positive,
+    Range,
     Section,
+    Speeds,
+    Thickness_mm,
 )
 
 Rendered = Literal["torque", "handle_force", "translation_force"]

@@ -7,8 +7,7 @@ columns to SI.
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 _BASE: dict[str, tuple[str, float]] = {
     "m": ("m", 1.0),
@@ -46,8 +45,7 @@ _DIMENSION = {
 }
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(NamedTuple):
     """A unit read from a name: factor to SI, and dimension as sorted (base, power) pairs."""
 
     name: str

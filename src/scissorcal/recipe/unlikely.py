@@ -15,13 +15,12 @@ import difflib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from scissorcal.recipe.units import Unit, converted, parse_unit, split_unit
 
 
-@dataclass(frozen=True)
-class Everyday:
+class Everyday(NamedTuple):
     """One range, from ``low`` to ``high``, and ``why``: what has such values.
 
     ``least`` is the smallest magnitude that is usual, where the range reaches or crosses 0.

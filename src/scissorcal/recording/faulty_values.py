@@ -6,7 +6,7 @@ The latter are 9999, -32768, -1 and the like, for overflow and loss.
 import numpy as np
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.recording.resolution import GAP_FACTOR, resolution_of
+from scissorcal.recording.strokes import GAP_FACTOR, resolution_of
 
 MOST_LEFT = 0.25
 """Share of a period that a step may have once it is continued: half of where its direction is a

@@ -5,20 +5,20 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Self
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
+from scissorcal.files import try_lock, unlock
 from scissorcal.foreign import open_foreign
 from scissorcal.foreign.formats import RECORDING
 from scissorcal.recording.chunks import LARGEST_CHUNK, DamageError
 from scissorcal.recording.header import HEAD, MAGIC
+from scissorcal.recording.layout import TelemetryChannel, rows_of
 from scissorcal.recording.scan import Telemetry, Walk, samples_among
 from scissorcal.recording.schema import RecordingMetadata
-from scissorcal.recording.telemetry import TelemetryChannel, rows_of
 
 MOST_RECORD_BYTES = 64_000_000
 """Of a record that is read whole; a longer one (a file kept within) is passed over unread."""
@@ -29,12 +29,12 @@ _LAST_CHUNKS = 16
 """Of a recording that is joined in its midst: about 2 s of samples."""
 
 
-class RecordingFollower:
+class RecordingFollower(ExitStack):
     """Follows a file that another process appends to; it is only read, never locked or changed.
 
     A recording grows by a chunk each 0.15 s or so, and each :meth:`read` returns the samples of
     those that are whole by then. One that is joined in its midst begins with its last two seconds.
-    The file stays open where its writer renames it at the end.
+    The file stays open where its writer renames it at the end, until ``close``.
 
     Raises InputError where the file cannot be opened, or is none of a recording.
 
@@ -44,29 +44,14 @@ class RecordingFollower:
     """
 
     def __init__(self, path: Path) -> None:
+        super().__init__()
         self.path = path
-        self._open = ExitStack()
-        self._stream: IO[bytes] = self._open.enter_context(open_foreign(path, RECORDING))
+        self._stream: IO[bytes] = self.enter_context(open_foreign(path, RECORDING))
         self._offset = 0
         self._joins = True
         self._walk = Walk(room=LARGEST_CHUNK)
         self.finished = False
         """Whether its writer closed it; nothing comes after that."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file; a second call does nothing."""
-        self._open.close()
 
     @property
     def metadata(self) -> RecordingMetadata | None:
@@ -95,8 +80,6 @@ class RecordingFollower:
         The lock is tried and given back at once, so ask seldom, and only where the file does not
         grow.
         """
-        from scissorcal.locks import try_lock, unlock
-
         free = try_lock(self._stream)
         if free:
             unlock(self._stream)

@@ -107,19 +107,19 @@ def two_marks(cells: Sequence[Sequence[str]]) -> tuple[int, int] | None:
     >>> two_marks([["0.005", "2,003"], ["0.010", "1,998"]])
     (0, 1)
     """
-    found: dict[int, dict[str, int]] = {}
+    rows_of: dict[int, dict[str, int]] = {}
     for row, line in enumerate(cells):
         for column, cell in enumerate(line):
             for mark in ".,":
                 if mark in cell:
-                    found.setdefault(column, {}).setdefault(mark, row)
-    if len({mark for marks in found.values() for mark in marks}) < 2:
+                    rows_of.setdefault(column, {}).setdefault(mark, row)
+    if len({mark for marks in rows_of.values() for mark in marks}) < 2:
         return None
-    both = [(max(marks.values()), column) for column, marks in found.items() if len(marks) > 1]
+    both = [(max(marks.values()), column) for column, marks in rows_of.items() if len(marks) > 1]
     if both:
         return both[0]
     groups, decimal = [], set()
-    for column, marks in found.items():
+    for column, marks in rows_of.items():
         ((mark, row),) = marks.items()
         if all(ONE_GROUP.fullmatch(line[column]) for line in cells if mark in line[column]):
             groups.append((mark, (row, column)))

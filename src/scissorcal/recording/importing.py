@@ -21,20 +21,26 @@ from scissorcal.recording.faulty_values import (
     overflows,
 )
 from scissorcal.recording.layout import MEASURED, empty_samples
-from scissorcal.recording.quantities import Quantity, describe, quantity, size_note
 from scissorcal.recording.reader import content_hash
-from scissorcal.recording.recording import Joint, Kind, Recording, Stroke
-from scissorcal.recording.resolution import (
+from scissorcal.recording.recording import Joint, Kind, Recording, Stroke, gap_cost, gap_note
+from scissorcal.recording.strokes import (
     GAP_FACTOR,
     MOST_NOISE_SHARE,
     NOISE_OF_STROKE,
     StrokeThreshold,
+    label_strokes,
     noise_of,
     stroke_threshold,
 )
-from scissorcal.recording.strokes import label_strokes
-from scissorcal.recording.summarising import gap_cost, gap_note
-from scissorcal.recording.table import Table, shortened
+from scissorcal.recording.table import (
+    Column,
+    Quantity,
+    Table,
+    describe,
+    quantity,
+    shortened,
+    size_note,
+)
 from scissorcal.recording.table_file import read_table, refuse_no_table
 
 MOST_PLACES = 3
@@ -254,8 +260,8 @@ def _clock_goes_on(table: Table, factor: float) -> tuple[Table, list[str]]:
         f"The clock begins at {begins} again at {_listed(table, places)}, after {length}: it was "
         "continued."
     )
-    columns = {**table.columns, "time": replace(clock, values=values)}
-    return replace(table, columns=columns), [sentence]
+    continued_time = {"time": Column(clock.heading, values)}
+    return replace(table, columns={**table.columns, **continued_time}), [sentence]
 
 
 def _opening_goes_on(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:

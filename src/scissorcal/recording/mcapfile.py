@@ -33,24 +33,11 @@ from numpy.typing import NDArray
 
 from scissorcal.recording import layout
 from scissorcal.recording.header import HEAD, MAGIC, SAMPLE_CHANNEL
-from scissorcal.recording.telemetry import TelemetryChannel
+from scissorcal.recording.layout import TelemetryChannel
 
 _CHANNEL = SAMPLE_CHANNEL
-_SCHEMA = 1
 _COMPRESSION = "zstd"
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
-_MESSAGE = np.dtype(
-    [
-        ("opcode", "u1"),
-        ("length", "<u8"),
-        ("channel", "<u2"),
-        ("sequence", "<u4"),
-        ("log_time", "<u8"),
-        ("publish_time", "<u8"),
-        ("cdr_header", "S4"),
-        ("sample", layout.SAMPLE_DTYPE),
-    ]
-)
 
 
 class McapFile:
@@ -79,30 +66,17 @@ class McapFile:
         self, schema_name: str, encoding: str, schema: bytes, facts: Mapping[str, str]
     ) -> None:
         """State what the samples are; ``facts`` are the channel's metadata."""
-        self._schema = Schema(id=_SCHEMA, data=schema, encoding=encoding, name=schema_name)
-        self._channel = Channel(
-            id=_CHANNEL,
-            topic=layout.TOPIC,
-            message_encoding=layout.MESSAGE_ENCODING,
-            schema_id=_SCHEMA,
-            metadata=dict(facts),
-        )
+        self._schema = Schema(id=_CHANNEL, data=schema, encoding=encoding, name=schema_name)
+        self._channel = _channel(_CHANNEL, layout.TOPIC, facts)
         self._begun = [_bytes_of([self._schema, self._channel])]
         self._size = len(self._begun[0])
 
     def add_samples(self, samples: NDArray[np.void]) -> None:
         """Add samples, shape (n,) with SAMPLE_DTYPE; their times are their host's, 0 at least."""
-        messages = np.zeros(len(samples), dtype=_MESSAGE)
-        messages["opcode"] = 0x05
-        messages["length"] = _MESSAGE.itemsize - HEAD.size
-        messages["channel"] = _CHANNEL
+        messages = _messages(_CHANNEL, samples, samples["host_time_ns"])
         messages["sequence"] = samples["sequence"]
-        messages["log_time"] = np.maximum(samples["host_time_ns"], 0)
-        messages["publish_time"] = messages["log_time"]
-        messages["cdr_header"] = layout.CDR_HEADER
-        messages["sample"] = samples
         while len(messages):
-            room = max(self._chunk_bytes - self._size, 0) // _MESSAGE.itemsize + 1
+            room = max(self._chunk_bytes - self._size, 0) // messages.itemsize + 1
             self._add(messages[:room])
             messages = messages[room:]
             if self._size > self._chunk_bytes:
@@ -118,16 +92,9 @@ class McapFile:
         other = self._others.get(channel)
         if other is None:
             other = self._others[channel] = _other(channel, _CHANNEL + 1 + len(self._others))
-        messages = np.zeros(len(rows), dtype=channel.message_dtype)
-        messages["opcode"] = 0x05
-        messages["length"] = channel.message_dtype.itemsize - HEAD.size
-        messages["channel"] = other.channel.id
+        messages = _messages(other.channel.id, rows, times_ns)
         counts = "sequence" in (rows.dtype.names or ())
         messages["sequence"] = rows["sequence"] if counts else other.count + np.arange(len(rows))
-        messages["log_time"] = np.maximum(times_ns, 0)
-        messages["publish_time"] = messages["log_time"]
-        messages["cdr_header"] = layout.CDR_HEADER
-        messages["row"] = rows
         other.waiting.append(messages)
         other.count += len(rows)
 
@@ -264,14 +231,33 @@ def _other(telemetry: TelemetryChannel, number: int) -> _Other:
         encoding=layout.SCHEMA_ENCODING,
         name=telemetry.schema_name,
     )
-    channel = Channel(
+    channel = _channel(number, telemetry.topic, telemetry.units)
+    return _Other(schema, channel, _bytes_of([schema, channel]), [])
+
+
+def _channel(number: int, topic: str, facts: Mapping[str, str]) -> Any:
+    """The record of a channel whose schema has the same number."""
+    return Channel(
         id=number,
-        topic=telemetry.topic,
+        topic=topic,
         message_encoding=layout.MESSAGE_ENCODING,
         schema_id=number,
-        metadata=telemetry.units,
+        metadata=dict(facts),
     )
-    return _Other(schema, channel, _bytes_of([schema, channel]), [])
+
+
+def _messages(
+    channel: int, rows: NDArray[np.void], times_ns: NDArray[np.int64]
+) -> NDArray[np.void]:
+    """Message records of rows (n,), without their sequence numbers; their times are 0 at least."""
+    messages: NDArray[np.void] = np.zeros(len(rows), dtype=layout.message_dtype(rows.dtype))
+    messages["opcode"] = 0x05
+    messages["length"] = messages.itemsize - HEAD.size
+    messages["channel"] = channel
+    messages["log_time"] = messages["publish_time"] = np.maximum(times_ns, 0)
+    messages["cdr_header"] = layout.CDR_HEADER
+    messages["row"] = rows
+    return messages
 
 
 def _entries(messages: NDArray[np.void], offset: int) -> NDArray[np.void]:

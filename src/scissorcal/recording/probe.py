@@ -164,8 +164,8 @@ class ProbeResult:
         return {**asdict(self), "facts": facts}
 
 
-def _above_zero(found: Estimate | None) -> float | None:
-    return found.mean if found is not None and found.mean > 0.0 else None
+def _above_zero(estimate: Estimate | None) -> float | None:
+    return estimate.mean if estimate is not None and estimate.mean > 0.0 else None
 
 
 def probe_of(device: Mapping[str, Any]) -> ProbeResult | None:
@@ -176,8 +176,8 @@ def probe_of(device: Mapping[str, Any]) -> ProbeResult | None:
 
 def newest_probe(devices: Iterable[Mapping[str, Any]]) -> ProbeResult | None:
     """The latest probe that the ``device`` of any recording holds; None where none does."""
-    made = [found for device in devices if (found := probe_of(device)) is not None]
-    return max(made, key=lambda one: one.made_at, default=None)
+    made = [probe for device in devices if (probe := probe_of(device)) is not None]
+    return max(made, key=lambda probe: probe.made_at, default=None)
 
 
 def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:
@@ -192,7 +192,7 @@ def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:
     try:
         if values.get("posterior") is not None:
             values["posterior"] = _posterior(values["posterior"])
-        values["swings"] = tuple(_swing(one) for one in values.get("swings", ()))
+        values["swings"] = tuple(_swing(swing) for swing in values.get("swings", ()))
         for name, value in values.items():
             if isinstance(value, Mapping) and name != "facts":
                 values[name] = Estimate(float(value["mean"]), float(value["sd"]))
@@ -208,10 +208,10 @@ def probe_from_dict(plain: Mapping[str, Any]) -> ProbeResult:
 def _posterior(plain: Mapping[str, Any]) -> Posterior:
     names = tuple(str(name) for name in plain["names"])
     rows = tuple(_numbers(row) for row in plain["covariance"])
-    found = Posterior(names, _numbers(plain["mean"]), rows)
-    if not len(names) == len(found.mean) == len(rows) or any(len(r) != len(names) for r in rows):
+    posterior = Posterior(names, _numbers(plain["mean"]), rows)
+    if len({len(names), len(posterior.mean), len(rows), *map(len, rows)}) > 1:
         raise ValueError("its posterior has not as many rows as names")
-    return found
+    return posterior
 
 
 def _swing(plain: Mapping[str, Any]) -> Swing:

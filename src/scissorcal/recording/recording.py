@@ -1,15 +1,18 @@
-"""A recording in memory: arrays with time first, strokes, and provenance."""
+"""A recording in memory: arrays with time first, strokes, provenance, and its summary."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.errors import needs_extra
 from scissorcal.recording.header import Joint, Kind, Stroke, StrokeKind
-from scissorcal.recording.layout import SAMPLE_DTYPE, column_name, fields
+from scissorcal.recording.layout import MEASURED, SAMPLE, SAMPLE_DTYPE, column_name, unit_of
+from scissorcal.recording.strokes import EDGE_S, GAP_FACTOR, edge_samples, is_short, long_enough
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -112,9 +115,195 @@ def columns(recording: Recording) -> dict[str, NDArray[Any]]:
     ['device_time_us', 'time_s', 'opening_rad']
     """
     by_name: dict[str, NDArray[Any]] = {}
-    for channel in fields():
-        name = column_name(channel, recording.joint)
-        by_name[name] = np.ascontiguousarray(recording.samples[channel])
-        if channel == "device_time_us":
+    for channel in SAMPLE:
+        name = column_name(channel.name, recording.joint)
+        by_name[name] = np.ascontiguousarray(recording.samples[channel.name])
+        if channel.name == "device_time_us":
             by_name["time_s"] = recording.device_time_s
     return by_name
+
+
+KNOT_S = 0.0049
+"""Knot distance of a fit's windows at the usual cutoff of 75 Hz; a window lasts three of them."""
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Frames that the device sent and the recording lacks.
+
+    ``places`` counts the jumps of the sequence number, ``missing`` the frames lost in them;
+    ``longest`` frames are lost in the longest one, which begins at ``longest_at_s``.
+    """
+
+    places: int
+    missing: int
+    longest: int
+    longest_at_s: float
+
+
+@dataclass(frozen=True)
+class GapCost:
+    """What gaps cost a fit: ``lost_s`` of ``recorded_s``, about; ``bridged`` of ``gaps`` are short.
+
+    A window that touches a bridged gap is lost; at a longer one an edge on either side is, and so
+    is a stretch between two of them that is too short.
+    """
+
+    gaps: int
+    bridged: int
+    lost_s: float
+    recorded_s: float
+
+    @property
+    def sentence(self) -> str:
+        """The cost in words."""
+        return (
+            f"A fit of friction bridges gaps of up to {EDGE_S:g} s (here {self.bridged} of "
+            f"{self.gaps}), uses no window that touches one, and leaves out {EDGE_S:g} s on either "
+            f"side of a longer one: about {self.lost_s:.3g} s of {self.recorded_s:.3g} s."
+        )
+
+
+@dataclass(frozen=True)
+class ChannelRange:
+    """Smallest and largest value of one channel, in ``unit``."""
+
+    channel: str
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class StrokeSummary:
+    """One stroke as planned (or found) and as recorded: its samples and travel."""
+
+    stroke: Stroke
+    samples: int
+    travel: float
+
+
+@dataclass(frozen=True)
+class RecordingSummary:
+    """What ``recording show`` prints; ``rate_Hz`` is from the median step of the device clock.
+
+    ``beside`` is how many rows each channel beside the samples has.
+    """
+
+    source: str
+    content_hash: str
+    kind: str
+    joint: str
+    samples: int
+    duration_s: float
+    rate_Hz: float
+    gaps: Gaps
+    strokes: tuple[StrokeSummary, ...]
+    ranges: tuple[ChannelRange, ...]
+    notes: tuple[str, ...]
+    beside: dict[str, int]
+
+
+def summary(recording: Recording) -> RecordingSummary:
+    """Sum up a recording; every number is finite, also for an empty one (then 0)."""
+    samples = recording.samples
+    steps = np.diff(samples["device_time_us"])
+    step_us = float(np.median(steps)) if len(steps) else 0.0
+    return RecordingSummary(
+        source=recording.source,
+        content_hash=recording.content_hash,
+        kind=recording.kind,
+        joint=recording.joint.kind,
+        samples=len(samples),
+        duration_s=recording.duration_s,
+        rate_Hz=1e6 / step_us if step_us > 0 else 0.0,
+        gaps=find_gaps(samples),
+        strokes=_strokes(recording),
+        ranges=tuple(_range(recording, channel) for channel in MEASURED),
+        notes=recording.notes,
+        beside=dict(recording.beside),
+    )
+
+
+def find_gaps(samples: NDArray[np.void]) -> Gaps:
+    """Find jumps of the sequence number (which wraps at 2**32) in samples, shape (N,)."""
+    if len(samples) < 2:
+        return Gaps(0, 0, 0, 0.0)
+    lost = missing_frames(samples["sequence"])
+    worst = int(np.argmax(lost))
+    time = samples["device_time_us"]
+    longest = int(lost[worst])
+    at_s = float(time[worst] - time[0]) * 1e-6 if longest else 0.0
+    return Gaps(int(np.count_nonzero(lost)), int(lost.sum()), longest, at_s)
+
+
+def missing_frames(sequence: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
+    """Frames missing between each two of ``sequence`` (n,), which wraps at 2**32; shape (n - 1,).
+
+    A step back by less than half the range is a repeated or reordered frame, not 4e9 lost ones.
+
+    >>> missing_frames(np.array([2**32 - 2, 2**32 - 1, 0, 3, 3])).tolist()
+    [0, 0, 2, 0]
+    """
+    numbers = sequence.astype(np.int64)
+    lost = (numbers[1:] - numbers[:-1] - 1) % 2**32
+    return np.where(lost < 2**31, lost, 0)
+
+
+def gap_note(samples: NDArray[np.void]) -> tuple[str, ...]:
+    """One sentence on missing frames; none where no frame is missing."""
+    gaps = find_gaps(samples)
+    if not gaps.places:
+        return ()
+    where = "1 gap" if gaps.places == 1 else f"{gaps.places} gaps"
+    return (
+        f"{gaps.missing} frames are missing in {where}, the longest "
+        f"({gaps.longest} frames) at {gaps.longest_at_s:.3f} s.",
+    )
+
+
+def gap_cost(time_s: Array) -> GapCost:
+    """What the gaps of a clock (n,) cost, n > 1."""
+    step = np.diff(time_s)
+    usual = float(np.median(step))
+    gaps = step > GAP_FACTOR * usual
+    bridged = gaps & is_short(step, usual)
+    ends = np.concatenate([[0], np.flatnonzero(gaps & ~bridged) + 1, [len(time_s)]])
+    edge, window = edge_samples(1.0 / usual) * usual, 3 * max(1, round(KNOT_S / usual)) * usual
+    lost = 0.0
+    for low, high in pairwise(ends):
+        inside = bridged[low : high - 1]
+        count = (high - low) * usual
+        whole = long_enough(int(high - low + np.sum(step[low : high - 1][inside]) / usual), usual)
+        windows = (window - usual) * np.count_nonzero(inside)
+        at_ends = edge * (int(low > 0) + int(high < len(time_s)))
+        lost += min(count, windows + at_ends) if whole else count
+    return GapCost(
+        int(np.count_nonzero(gaps)), int(np.count_nonzero(bridged)), lost, usual * len(time_s)
+    )
+
+
+def _strokes(recording: Recording) -> tuple[StrokeSummary, ...]:
+    """Samples and travel of each stroke, in one pass over the samples, sorted by stroke."""
+    labels = recording.samples["stroke"]
+    order = np.argsort(labels, kind="stable")
+    moved = "advance" if recording.kind == "friction-advance" else "opening"
+    place, labels = recording.samples[moved][order], labels[order]
+    numbers = [stroke.index for stroke in recording.strokes]
+    first = np.searchsorted(labels, numbers, side="left")
+    after = np.searchsorted(labels, numbers, side="right")
+    return tuple(
+        StrokeSummary(stroke, int(end - start), _travel(place[start:end]))
+        for stroke, start, end in zip(recording.strokes, first, after, strict=True)
+    )
+
+
+def _travel(place: NDArray[np.float64]) -> float:
+    return float(place.max() - place.min()) if len(place) else 0.0
+
+
+def _range(recording: Recording, channel: str) -> ChannelRange:
+    values = recording.samples[channel]
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+    return ChannelRange(channel, unit_of(channel, recording.joint), low, high)

@@ -4,6 +4,7 @@ import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -25,8 +26,8 @@ from scissorcal.recording.chunks import (
     run_end,
 )
 from scissorcal.recording.header import HEAD, MAGIC, METADATA_NAME, NOTE_NAME
+from scissorcal.recording.layout import CHANNELS, TelemetryChannel, rows_of
 from scissorcal.recording.schema import RecordingMetadata, from_entries
-from scissorcal.recording.telemetry import CHANNELS, TelemetryChannel, rows_of
 
 LARGEST_RATIO = 100
 """Unpacked bytes for each byte of a file, beyond one chunk: samples of a rig at rest, without any
@@ -40,8 +41,7 @@ MOST_DAMAGE = 20
 """Places of damage that are listed; of further ones the number."""
 
 
-@dataclass(frozen=True)
-class Attachment:
+class Attachment(NamedTuple):
     """A file kept within a recording."""
 
     name: str
@@ -49,22 +49,19 @@ class Attachment:
     data: bytes
 
 
-@dataclass(frozen=True)
-class Note:
+class Note(NamedTuple):
     """A sentence that the writer left."""
 
     sentence: str
 
 
-@dataclass(frozen=True)
-class Sheet:
+class Sheet(NamedTuple):
     """This sheet of material is loaded from here on."""
 
     number: int
 
 
-@dataclass(frozen=True)
-class Mark:
+class Mark(NamedTuple):
     """A fact about the samples until here, such as the stop that ended them."""
 
     name: str
@@ -274,7 +271,7 @@ class Walk:
         if channel is not None:
             self.events.append(Telemetry(channel, np.frombuffer(messages, channel.message_dtype)))
         else:
-            self.events.append(np.frombuffer(messages, layout.MESSAGE_DTYPE)["sample"].copy())
+            self.events.append(np.frombuffer(messages, layout.MESSAGE_DTYPE)["row"].copy())
 
 
 def _records(data: bytes, walk: Walk) -> Iterator[tuple[int, int, bytes]]:

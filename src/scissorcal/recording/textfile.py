@@ -195,10 +195,10 @@ def _find_delimiter(rows: Sequence[str]) -> str | None:
         numbers = [[_is_number(cell) for cell in _cells(row, delimiter)] for row in rows]
         return sum(all(row) for row in numbers), sum(sum(row) for row in numbers)
 
-    found = max(DELIMITERS, key=score)
-    if found is None and score("\t")[1] > score("\t")[0] == len(rows):
+    likeliest = max(DELIMITERS, key=score)
+    if likeliest is None and score("\t")[1] > score("\t")[0] == len(rows):
         return "\t"  # cells with spaces in them, as between thousands
-    return found
+    return likeliest
 
 
 def _cells(text: str, delimiter: str | None) -> list[str]:
@@ -221,10 +221,10 @@ def _check_width(path: Path, rows: list[Line], delimiter: str | None, width: int
     for line in rows:
         if delimiter is not None and line.text.count(delimiter) == width - 1:
             continue  # nearly all lines, and twenty times as fast as to divide each
-        found = len(_cells(line.text, delimiter))
-        if found != width:
+        count = len(_cells(line.text, delimiter))
+        if count != width:
             raise InputError(
-                f"{path}, line {line.number} has {found} cells where the others have {width}. "
+                f"{path}, line {line.number} has {count} cells where the others have {width}. "
                 "Complete or remove that line."
             )
 
@@ -239,10 +239,10 @@ def _headings(
     """
 
     def as_wide(lines: list[Line]) -> list[list[str]]:
-        found = [_cells(line.text, delimiter) for line in lines]
-        found = [cells[:-1] if cells[len(row) :] == [""] else cells for cells in found]
-        found = [[*cells, ""] if row[len(cells) :] == [""] else cells for cells in found]
-        return [cells for cells in found if len(cells) == len(row)]
+        wide = [_cells(line.text, delimiter) for line in lines]
+        wide = [cells[:-1] if cells[len(row) :] == [""] else cells for cells in wide]
+        wide = [[*cells, ""] if row[len(cells) :] == [""] else cells for cells in wide]
+        return [cells for cells in wide if len(cells) == len(row)]
 
     rows = as_wide(before) or as_wide(comments)[-1:]
     if not rows:

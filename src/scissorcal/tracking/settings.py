@@ -126,7 +126,7 @@ def settings_of(recipe: Recipe, shared: Array | None = None) -> TrackingSettings
     ``shared`` (6, 6) is the covariance of what all pictures share, by the fits of the camera and of
     the rig's card (None where these state none); the recipe's numbers take its place.
 
-    >>> from scissorcal.recipe.library import builtin_recipe
+    >>> from scissorcal.recipe.load import builtin_recipe
     >>> round(1e3 * settings_of(builtin_recipe("paper-80gsm")).camera.place_bias_m, 3)
     0.3
     """

@@ -77,8 +77,8 @@ class Photo:
         rows, columns = self.image.shape[:2]
         if factor < 1 or rows % factor or columns % factor:
             raise ValueError(f"{columns} x {rows} pixels are no multiples of {factor}")
-        image = averaged(self.image, factor)
-        return replace(self, image=image, reduction=self.reduction * factor)
+        coarse = _averaged(self.image, factor)
+        return replace(self, image=coarse, reduction=self.reduction * factor)
 
     def whole(self, pixels: ArrayLike) -> Array:
         """Where pixels (n, 2) of ``image`` lie in the whole photograph; (0, 0) is a centre."""
@@ -118,7 +118,7 @@ def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True)
 def picture_size(path: Path) -> tuple[int, int]:
     """Width and height in pixels by the header alone; raises InputError as `read_photo` does."""
     data = read_foreign(path, PHOTOGRAPH)
-    size = parse_isolated(f"{__name__}:decode_size", data, path, PHOTOGRAPH, path=str(path))
+    size = parse_isolated(f"{__name__}:_decode_size", data, path, PHOTOGRAPH, path=str(path))
     return size[0], size[1]
 
 
@@ -151,7 +151,7 @@ def decode(data: bytes, path: str, max_pixels: int, colour: bool) -> dict[str, A
         return _photo(path, opened, max_pixels, colour)
 
 
-def decode_size(data: bytes, path: str) -> list[int]:
+def _decode_size(data: bytes, path: str) -> list[int]:
     """Width and height in pixels, as the header states them."""
     with _opened(data, path) as opened:
         return list(opened.size)
@@ -246,7 +246,7 @@ def _eight_bits(opened: "Image.Image", colour: bool, reduction: int) -> Picture:
     from PIL import Image
 
     if opened.mode in _DEEP:
-        return averaged(_from_deep(np.asarray(opened)), reduction)
+        return _averaged(_from_deep(np.asarray(opened)), reduction)
     if opened.mode in ("1", "P", "PA", "LA", "La", "RGBa") or "transparency" in opened.info:
         opened = opened.convert("L" if opened.mode == "1" else "RGBA")
     if reduction > 1:
@@ -266,7 +266,7 @@ def _from_deep(deep: NDArray[Any]) -> Picture:
     return np.asarray(values >> (bits - 8), dtype=np.uint8)
 
 
-def averaged(image: Picture, factor: int) -> Picture:
+def _averaged(image: Picture, factor: int) -> Picture:
     """Average blocks of ``factor`` by ``factor`` pixels; an incomplete last block is dropped."""
     import cv2
 

@@ -37,22 +37,22 @@ def read_rig_positions(path: Path) -> RigPositions:
                 f"{path} needs a first line 'file,advance_mm,opening_deg' and a line for each "
                 "photograph below it."
             )
-        found: dict[str, tuple[float, float]] = {}
+        positions: dict[str, tuple[float, float]] = {}
         for row in rows:
             if not any(cell.strip() for cell in row):
                 continue
             where = f"{path}, line {rows.line_num}"
             name, position = _position(row, head, where)
-            if found.setdefault(name, position) != position:
+            if positions.setdefault(name, position) != position:
                 raise InputError(f"{where}: {name} has another position above. Keep the right one.")
     except csv.Error as error:
         raise InputError(
             f"{path}, line {rows.line_num}: this is no line of CSV ({error}). "
             f"{RIG_POSITIONS.remedy}"
         ) from None
-    if not found:
+    if not positions:
         raise InputError(f"{path} has no line below its first. {RIG_POSITIONS.remedy}")
-    return found
+    return positions
 
 
 def _position(row: list[str], head: list[str], where: str) -> tuple[str, tuple[float, float]]:

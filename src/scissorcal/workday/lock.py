@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from scissorcal.errors import InputError
-from scissorcal.files import host_name
-from scissorcal.locks import try_lock
+from scissorcal.files import host_name, try_lock
 
 if TYPE_CHECKING:
     from scissorcal.workday.workspace import Workspace

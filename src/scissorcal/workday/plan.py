@@ -4,9 +4,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from scissorcal.recipe.edge import edge_sentence
-from scissorcal.recipe.pace import CaptureCost, capture_cost
 from scissorcal.recipe.plate_layers import plate_pieces, plate_sentence
-from scissorcal.recipe.requirements import CaptureKind, Requirement, requirements
+from scissorcal.recipe.requirements import (
+    CaptureCost,
+    CaptureKind,
+    Requirement,
+    capture_cost,
+    requirements,
+)
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.probe import probe_state
 from scissorcal.workday.states import StepState

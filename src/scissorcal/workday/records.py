@@ -8,10 +8,9 @@ from types import TracebackType
 from typing import Any
 
 from scissorcal.errors import InputError
-from scissorcal.files import replacing
+from scissorcal.files import replacing, try_lock
 from scissorcal.foreign import open_foreign, refuse_unless_regular
 from scissorcal.foreign.formats import RECORDS
-from scissorcal.locks import try_lock
 
 FORMAT = "scissorcal-records/1"
 

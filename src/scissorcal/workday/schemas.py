@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe.load import schemas_dir
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -80,7 +80,7 @@ def _capture(name: str) -> Why:
 
 
 def _photograph(name: str) -> Why:
-    return _of(lambda needs: needs.photographs, name)
+    return _of(lambda needs: needs.geometry, name)
 
 
 def _fit(name: str) -> Why:

@@ -38,7 +38,7 @@ from scissorcal.package.scene_slopes import torque_knowledge
 from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording
-from scissorcal.recording.until import UntilMark
+from scissorcal.recording.header import UntilMark
 from scissorcal.workday.stock import EXCITATION_S, MOST_PLACES, capture_stock
 
 MOVED_SDS = 1.0

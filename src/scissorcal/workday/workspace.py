@@ -166,8 +166,7 @@ def create_workspace(folder: Path, recipe_name: str) -> Workspace:
     Raises InputError where the folder already has a recipe, or another file of a drawing's name,
     or where the recipe is unknown or wrong, or a drawing of it.
     """
-    from scissorcal.recipe.library import recipe_file
-    from scissorcal.recipe.load import parse_recipe, read_text
+    from scissorcal.recipe.load import parse_recipe, read_text, recipe_file
     from scissorcal.recipe.plate_layers import plate_pieces
 
     workspace = Workspace(folder.absolute())

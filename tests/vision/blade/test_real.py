@@ -9,7 +9,8 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
 from scissorcal.errors import InputError
-from scissorcal.vision.blade.photo import photograph_scissors
+from scissorcal.recipe import BladePriors
+from scissorcal.vision.blade.photo import Laid, photograph_scissors
 from scissorcal.vision.blade.profile import crossings, sampled, steepest
 from scissorcal.vision.blade.silhouette import silhouette
 from scissorcal.vision.blade.view import PlainView
@@ -42,7 +43,9 @@ OPEN_DEG = {8: 53.0, 10: 53.0, 12: 82.0, 15: 36.0}
 @pytest.fixture(scope="module")
 def found():
     return {
-        number: photograph_scissors(read_photo(PHOTOS / f"scissors_{number}.jpg"), mat=False)
+        number: photograph_scissors(
+            read_photo(PHOTOS / f"scissors_{number}.jpg"), laid=Laid(mat=False)
+        )
         for number in SCREWS
     }
 
@@ -90,7 +93,7 @@ def test_two_photographs_of_one_pair_agree_to_a_hundredth_of_its_length(found):
 def test_forks_are_refused_with_the_reason(number):
     photo = read_photo(PHOTOS / f"fork_{number}.jpg")
     with pytest.raises(InputError, match=rf"fork_{number}.*no handle with a ring.*fork"):
-        photograph_scissors(photo, mat=False)
+        photograph_scissors(photo, laid=Laid(mat=False))
 
 
 def drawn_curves():
@@ -167,7 +170,7 @@ def test_a_drawn_pair_is_outlined_to_a_fraction_of_a_pixel(size, blur, noise, me
     light = (0.9 - 0.8 * coverage(curves, size, size)).astype(np.float32)
     picture = develop(light, Looks(1.0, softness_px=blur, noise=noise), np.random.default_rng(1))
     read = linear_light(picture[:, :, 1])
-    view = PlainView((0.0, 0.0, size - 1.0, size - 1.0))
+    view = PlainView.by_hand(size, size, BladePriors())
     shape = silhouette(read, view, "drawn", longest=min(size, 1000))
     tree = cKDTree(np.concatenate(curves))
     away = []

@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.overlay import PLACES, SIZES, SLANTS, ViewCoverage, detection_words
 from scissorcal.vision.sim import Lens, SimPose
 from scissorcal.vision.targets.boards import CAMERA_BOARD
 from scissorcal.vision.targets.detect import Detection
-from scissorcal.vision.view_coverage import PLACES, SIZES, SLANTS, ViewCoverage, detection_words
 from tests.vision.scenes import lens, photo_of, pose_before
 
 BEND = (-0.25, 0.07, 0.001, -0.0006, 0.02)

@@ -30,7 +30,7 @@ class Refitted:
 def as_fitted(case: Case) -> Recipe:
     """The recipe with every discrete choice as the present fits made it, nothing left to compare.
 
-    >>> from scissorcal.recipe.library import builtin_recipe
+    >>> from scissorcal.recipe.load import builtin_recipe
     >>> case = Case(builtin_recipe("paper-80gsm"), (), (), None, (), None, None, "draft")
     >>> as_fitted(case).fit.cut.response
     'power'

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.segments import Bridged, bridge, sheets_of
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.resolution import resolution_of
+from scissorcal.recording.strokes import resolution_of
 
 STRIDES = (1, 2, 4, 8, 16)
 CLEAR = 3.0

@@ -243,7 +243,7 @@ def usual_law(laws: Sequence[CutLaw]) -> CutLaw:
     soft things that are only pressed stiffen exponentially (Fung 1967,
     doi:10.1152/ajplegacy.1967.213.6.1532; taken on 3 of 3 days of the virtual rig).
 
-    >>> from scissorcal.recipe.library import builtin_recipe
+    >>> from scissorcal.recipe.load import builtin_recipe
     >>> usual_law(allowed_laws(builtin_recipe("paper-80gsm"))).name
     'power response, rippled fracture'
     """

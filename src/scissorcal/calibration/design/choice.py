@@ -6,7 +6,7 @@ from typing import Literal
 
 from scissorcal.calibration.design.band import Band, TorqueKnowledge, expected_band
 from scissorcal.calibration.design.information import Information
-from scissorcal.recipe.fields import MOST_SPEEDS
+from scissorcal.recipe.priors import MOST_SPEEDS
 
 WORTH = 1e-9
 """Least gain, in e-folds of the excess per minute, that counts as one."""

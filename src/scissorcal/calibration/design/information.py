@@ -20,7 +20,7 @@ from scissorcal.inference.curvature import (
     natural_step,
     slopes_at,
 )
-from scissorcal.recipe.fields import BETWEEN_percent
+from scissorcal.recipe.priors import BETWEEN_percent
 
 STEP = 1e-3
 """Step in prior standard deviations by which a friction law's mean is differentiated."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.segments import stretches
-from scissorcal.recording.resolution import edge_samples, noise_of, resolution_of
+from scissorcal.recording.strokes import edge_samples, noise_of, resolution_of
 
 BIN_S = 0.005
 HIGHEST = 0.4

@@ -8,7 +8,7 @@ import numpy as np
 from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.resolution import (
+from scissorcal.recording.strokes import (
     EDGE_S,
     EDGES,
     FEWEST_SAMPLES,

@@ -11,7 +11,7 @@ from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.segments import still_clock, stretches
 from scissorcal.recording.faulty_values import marks_in
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.resolution import resolution_of
+from scissorcal.recording.strokes import resolution_of
 from scissorcal.verdicts import Check, Verdict
 
 Scope = Literal["fit.friction", "fit.cut"]

@@ -11,9 +11,9 @@ from scissorcal.calibration.signals.segments import by_label
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.errors import InputError
 from scissorcal.kernel import StateFlag
-from scissorcal.recipe.pace import ADVANCE_ACCELERATION, TURN_ACCELERATION, ramp_time
+from scissorcal.recipe.requirements import ADVANCE_ACCELERATION, TURN_ACCELERATION, ramp_time
 from scissorcal.recording.recording import Joint, Recording
-from scissorcal.recording.resolution import noise_of, resolution_of
+from scissorcal.recording.strokes import noise_of, resolution_of
 from scissorcal.verdicts import Check, Verdict
 
 LARGEST = 1e100

@@ -15,8 +15,7 @@ from scissorcal.calibration.signals.sensors import (
 )
 from scissorcal.recording.faulty_values import lone_excursion
 from scissorcal.recording.layout import unit_of
-from scissorcal.recording.recording import Recording
-from scissorcal.recording.summarising import Gaps, find_gaps
+from scissorcal.recording.recording import Gaps, Recording, find_gaps
 
 SPREAD = (0.05, 0.95)
 CHANNELS = ("opening", "motor_torque", "handle_force")

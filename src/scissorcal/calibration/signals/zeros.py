@@ -9,7 +9,7 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.signals.segments import pieces_of, stretches
 from scissorcal.recording.probe import probe_of
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.resolution import noise_of, resolution_of
+from scissorcal.recording.strokes import noise_of, resolution_of
 from scissorcal.verdicts import TORQUE, Check, Verdict
 
 SURE = 2.0

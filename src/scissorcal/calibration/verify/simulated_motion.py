@@ -14,7 +14,7 @@ from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.weak_form import HELD
 from scissorcal.model import FrictionLaw
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.resolution import resolution_of
+from scissorcal.recording.strokes import resolution_of
 
 MOVED_HZ = 15.0
 """Motion up to here is kept however coarse an encoder is: excitations of the inertia end here."""

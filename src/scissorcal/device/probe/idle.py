@@ -11,7 +11,7 @@ from scissorcal.aliases import Array
 from scissorcal.device.probe.talk import MEASURED, RELEASE, Stage, Talk
 from scissorcal.kernel import Identity, StateFlag
 from scissorcal.recording.probe import Estimate
-from scissorcal.recording.summarising import missing_frames
+from scissorcal.recording.recording import missing_frames
 
 SETTLE_S = 0.1
 IDLE_S = 1.0

@@ -15,8 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from scissorcal.device.sim.wave import Wave
 from scissorcal.foreign.formats import SPECIMEN
-from scissorcal.recipe.library import specimen_path
-from scissorcal.recipe.load import load_toml
+from scissorcal.recipe.load import load_toml, specimen_path
 
 FORMAT = "scissorcal-specimen/1"
 

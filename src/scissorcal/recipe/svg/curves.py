@@ -1,11 +1,23 @@
-"""Contours of a path as polygons in mm."""
+"""The shapes of a drawing as polygons in mm; it runs where the drawing is parsed."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from scissorcal.recipe.svg.elements import MOST_POINTS, MOST_POINTS_OF_FILE, TOO_MANY, DrawnShape
+import numpy as np
+from svgelements import Arc, CubicBezier, Move, Path, QuadraticBezier
+
+from scissorcal.errors import InputError
+from scissorcal.foreign.formats import DRAWING
+from scissorcal.recipe.svg.elements import (
+    MOST_POINTS,
+    MOST_POINTS_OF_FILE,
+    TOO_MANY,
+    DrawnShape,
+    shown_shapes,
+    unpacked,
+)
 
 FLAT_MM = 0.01
 """Curves become polygons that lie nowhere farther from them."""
@@ -14,17 +26,36 @@ LARGEST_MM = 100_000.0
 _NO_PLACES = "it has numbers that are no places on a plate"
 
 
-def contours_mm(shape: DrawnShape, most: int) -> list[Any]:
+def parse_drawing(data: bytes, name: str) -> list[list[Any]]:
+    """Contours of an SVG file's shapes: number of the shape, its id, corners (n, 2) in mm.
+
+    InputError, with the file's ``name`` and the reason, where it is not taken; see
+    :func:`scissorcal.recipe.plate_layers.read_drawing`.
+    """
+    shapes: list[list[Any]] = []
+    room = MOST_POINTS_OF_FILE
+    try:
+        for index, shape in enumerate(shown_shapes(unpacked(data, DRAWING.most_bytes))):
+            contours = _contours_mm(shape, room)
+            room -= sum(map(len, contours))
+            shapes += [[index, shape.id, contour] for contour in contours]
+    except ValueError as error:
+        raise InputError(f"{name} is not taken as a drawing: {error}.") from None
+    if not shapes:
+        raise InputError(
+            f"{name} has no closed shape: draw path, rect, circle, ellipse or polygon."
+        )
+    return shapes
+
+
+def _contours_mm(shape: DrawnShape, most: int) -> list[Any]:
     """Corners (n, 2) of each contour of a shape, each once; ``most`` are taken of all together.
 
     ValueError where there are more, or numbers that are no places.
     """
-    import numpy as np
-    from svgelements import Path
-
-    found: list[Any] = []
+    closed: list[Any] = []
     if not shape.path:
-        return found
+        return closed
     a, b, c, d, e, f = shape.to_mm
     to_mm = np.array([[a, c, e], [b, d, f]], dtype=np.float64)
     if not np.isfinite(to_mm).all():
@@ -35,14 +66,12 @@ def contours_mm(shape: DrawnShape, most: int) -> list[Any]:
         contour = _closed(corners, to_mm)
         most -= len(contour)
         if len(contour) >= 3:
-            found.append(contour)
-    return found
+            closed.append(contour)
+    return closed
 
 
 def _flattened(path: Any, tolerance: float, room: int) -> list[Any]:
     """Corners of one contour: ends of lines, and points of curves close enough together."""
-    from svgelements import Arc, CubicBezier, Move, QuadraticBezier
-
     corners: list[Any] = []
     for segment in path:
         if isinstance(segment, Move) or segment.start is None or segment.end is None:
@@ -91,18 +120,14 @@ def _whole(number: float) -> int:
 
 def _stretch(matrix: Any) -> float:
     """By how much a matrix lengthens at most; 1 where it makes a point of everything."""
-    import numpy as np
-
     return float(np.linalg.norm(matrix[:, :2], 2)) or 1.0
 
 
 def _closed(corners: list[Any], to_mm: Any) -> Any:
     """Corners (n, 2) in mm, each once."""
-    import numpy as np
-
     if not corners:
         return np.zeros((0, 2))
-    drawn = np.array([[one.x, one.y, 1.0] for one in corners], dtype=np.float64)
+    drawn = np.array([[corner.x, corner.y, 1.0] for corner in corners], dtype=np.float64)
     with np.errstate(all="ignore"):
         places = drawn @ to_mm.T
     if not (np.isfinite(places).all() and np.abs(places).max() <= LARGEST_MM):

@@ -12,9 +12,8 @@ import json
 import re
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.parsers import expat
 
 from scissorcal.recipe.svg import path_data as paths
@@ -77,8 +76,7 @@ _ENTITIES = (
 )
 
 
-@dataclass(frozen=True)
-class DrawnShape:
+class DrawnShape(NamedTuple):
     """One shown shape: its path in its own units, and the matrix from these to mm on the page."""
 
     id: str

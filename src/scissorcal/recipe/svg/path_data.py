@@ -138,8 +138,8 @@ class _Pen:
         if kind == "m":
             self._begin = (at[0], at[1])
         self._x, self._y = at[-2:]
-        flags = [str(int(one)) for one in at[3:5]] if kind == "a" else []
-        numbers = [repr(one) for one in at]
+        flags = [str(int(flag)) for flag in at[3:5]] if kind == "a" else []
+        numbers = [repr(number) for number in at]
         numbers[3:5] = flags or numbers[3:5]
         self.made += [{"m": "M", "c": "C", "s": "C", "q": "Q", "t": "Q", "a": "A"}.get(kind, "L")]
         self.made += numbers

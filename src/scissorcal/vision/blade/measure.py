@@ -82,13 +82,12 @@ def measure_blade(
         _refuse_unhalved(view, parts, border, f"{source}: too little of the blade's {what}")
     borders = SeenBorders(edge, back, find_hole(blade))
     frame = _framed(view, parts, borders)
-    pivot, axis, up = frame.pivot, frame.axis, frame.up
     columns, names = edge_modes(view, borders, frame, parts, priors)
     there = view.to_sheet(edge.pixels)
     station, offset = frame.of(there)
     # noise along the normals in pixels becomes noise along ``up`` in sheet units
-    unit = np.abs((view.to_sheet(edge.pixels + edge.normals) - there) @ up)
-    length = float(parts.length + (parts.pivot - pivot) @ axis)
+    unit = np.abs((view.to_sheet(edge.pixels + edge.normals) - there) @ frame.up)
+    length = float(parts.length + (parts.pivot - frame.pivot) @ frame.axis)
     order = np.argsort(station)
     apart = np.diff(station[order], prepend=-np.inf, append=np.inf)
     # points that share a station have no slope between them
@@ -103,13 +102,13 @@ def measure_blade(
         names,
         length,
         frame.radius,
-        replace(parts, pivot=pivot, axis=axis, up=up, length=length),
+        replace(parts, pivot=frame.pivot, axis=frame.axis, up=frame.up, length=length),
         edge,
         back,
         view.metric,
         view.uncertainty,
-        view.to_pixels(pivot[None])[0],
-        view.to_pixels((pivot + 0.5 * length * axis)[None])[0],
+        view.to_pixels(frame.pivot[None])[0],
+        view.to_pixels((frame.pivot + 0.5 * length * frame.axis)[None])[0],
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +18,7 @@ SHARP = 1.4
 _ROUNDS = 20
 
 
-@dataclass(frozen=True)
-class SeenBorders:
+class SeenBorders(NamedTuple):
     """A blade's borders in the picture; ``hole`` is None where no hole shows the pivot."""
 
     edge: BorderPoints
@@ -26,8 +26,7 @@ class SeenBorders:
     hole: BorderPoints | None
 
 
-@dataclass(frozen=True)
-class BladeFrame:
+class BladeFrame(NamedTuple):
     """A blade's frame on the sheet: ``pivot``, unit vectors ``axis`` and ``up``, hole radius."""
 
     pivot: Array
@@ -52,37 +51,42 @@ def edge_modes(
     """Effect on the edge of one standard deviation of each common error source.
 
     Columns (n, k) are changes of the offset at a fixed station, at the edge's points in the order
-    of ``seen.edge``; names say which source each belongs to. They come from one linear response:
+    of ``borders.edge``; names say which source each belongs to. They come from one linear response:
     a source moves border points and pivot on the sheet; the centreline, which halves the blade,
     turns after them; and a point that moves along the edge changes the offset by the edge's slope.
     That slope is a cubic's, so that no column carries the noise of the points.
     """
     edge, back = view.to_sheet(borders.edge.pixels), view.to_sheet(borders.back.pixels)
-    response = _Response.of(frame, parts, (edge, borders.edge), (back, borders.back))
-    outward = _Outward.of(view, borders)
+    sides = ((edge, borders.edge), (back, borders.back))
+    response = _Response(frame, *(_Side.of(frame, parts, *side) for side in sides))
+    edge_out, back_out = _outward(view, borders.edge), _outward(view, borders.back)
+    still = np.zeros(2)
+    pivot_out = still
+    if borders.hole is not None:
+        place = view.to_sheet(borders.hole.pixels)
+        pivot_out = _circle_follows(place, _outward(view, borders.hole), frame)
     rows: list[Array] = []
     names: list[str] = []
     for name, moved in _mapping_moves(view, borders, frame, parts):
         rows.append(response.to(*moved))
         names.append(name)
     tone = 0.01 * priors.tone_sd_percent * borders.edge.blur_px
-    rows.append(response.to(tone * outward.edge, tone * outward.back, tone * outward.pivot(frame)))
+    rows.append(response.to(tone * edge_out, tone * back_out, tone * pivot_out))
     names.append("tone")
-    still = np.zeros(2)
     grain = 0.01 * priors.grain_percent
     rough = grain * float(np.median(borders.edge.sd_px))
     along = np.linspace(-1.0, 1.0, len(edge))
     rows += [
-        response.to((rough * drift)[:, None] * outward.edge, 0.0 * back, still)
+        response.to((rough * drift)[:, None] * edge_out, 0.0 * back, still)
         for drift in (np.ones_like(along), along, (3.0 * along**2 - 1.0) / 2.0)
     ]
     behind = grain * float(np.median(borders.back.sd_px))
-    rows.append(response.to(0.0 * edge, behind * outward.back, still))
+    rows.append(response.to(0.0 * edge, behind * back_out, still))
     names += ["grain"] * 4
-    for shift in _pivot_shifts(outward, frame, borders, parts, grain):
+    for shift in _pivot_shifts(view, frame, borders, parts, grain):
         rows.append(response.to(0.0 * edge, 0.0 * back, shift))
         names.append("pivot")
-    rows.append(-_turn_sd(*frame.of(back)) * response.swing)
+    rows.append(-_turn_sd(*frame.of(back)) * response.edge.swing)
     names.append("centreline")
     return np.stack(rows, axis=1), tuple(names)
 
@@ -120,20 +124,6 @@ class _Response:
     edge: _Side
     back: _Side
 
-    @classmethod
-    def of(
-        cls,
-        frame: BladeFrame,
-        parts: BladeParts,
-        edge: tuple[Array, BorderPoints],
-        back: tuple[Array, BorderPoints],
-    ) -> "_Response":
-        return cls(frame, _Side.of(frame, parts, *edge), _Side.of(frame, parts, *back))
-
-    @property
-    def swing(self) -> Array:
-        return self.edge.swing
-
     def to(self, edge_moves: Array, back_moves: Array, pivot_move: Array) -> Array:
         """Change (n,) of the edge's offset at a fixed station, the centreline following."""
         here = self.edge.shifted(edge_moves - pivot_move, self.frame)
@@ -141,32 +131,12 @@ class _Response:
         # the axis turns until both sides' weighted offsets balance again
         lever = self.edge.weight @ self.edge.swing + self.back.weight @ self.back.swing
         turn = (self.edge.weight @ here + self.back.weight @ there) / lever
-        return np.asarray(here - turn * self.swing)
+        return np.asarray(here - turn * self.edge.swing)
 
 
-@dataclass(frozen=True)
-class _Outward:
-    """Moves on the sheet when every border moves out of the metal by a pixel."""
-
-    edge: Array
-    back: Array
-    hole: Array | None
-    hole_place: Array | None
-
-    @classmethod
-    def of(cls, view: View, seen: SeenBorders) -> "_Outward":
-        def out(border: BorderPoints) -> Array:
-            return view.to_sheet(border.pixels + border.normals) - view.to_sheet(border.pixels)
-
-        if seen.hole is None:
-            return cls(out(seen.edge), out(seen.back), None, None)
-        place = view.to_sheet(seen.hole.pixels)
-        return cls(out(seen.edge), out(seen.back), out(seen.hole), place)
-
-    def pivot(self, frame: BladeFrame) -> Array:
-        if self.hole is None or self.hole_place is None:
-            return np.zeros(2)
-        return _circle_follows(self.hole_place, self.hole, frame)
+def _outward(view: View, border: BorderPoints) -> Array:
+    """Moves (n, 2) on the sheet when a border moves out of the metal by a pixel."""
+    return view.to_sheet(border.pixels + border.normals) - view.to_sheet(border.pixels)
 
 
 def _circle_follows(hole: Array, moves: Array, frame: BladeFrame) -> Array:
@@ -178,19 +148,19 @@ def _circle_follows(hole: Array, moves: Array, frame: BladeFrame) -> Array:
 
 
 def _mapping_moves(
-    view: View, seen: SeenBorders, frame: BladeFrame, parts: BladeParts
+    view: View, borders: SeenBorders, frame: BladeFrame, parts: BladeParts
 ) -> Iterator[tuple[str, tuple[Array, Array, Array]]]:
     """Moves of edge, back and pivot for each independent error of the mapping."""
-    pivot = seen.hole.pixels if seen.hole is not None else view.to_pixels(parts.pivot[None])
-    pixels = np.concatenate([seen.edge.pixels, seen.back.pixels, pivot])
-    borders = np.cumsum([len(seen.edge.pixels), len(seen.back.pixels)])
+    pivot = borders.hole.pixels if borders.hole is not None else view.to_pixels(parts.pivot[None])
+    pixels = np.concatenate([borders.edge.pixels, borders.back.pixels, pivot])
+    ends = np.cumsum([len(borders.edge.pixels), len(borders.back.pixels)])
     before = view.to_sheet(pixels)
     for name, values in _mapping_errors(view):
-        edge, back, rest = np.split(view.to_sheet(pixels, values) - before, borders)
-        if seen.hole is None:
+        edge, back, rest = np.split(view.to_sheet(pixels, values) - before, ends)
+        if borders.hole is None:
             yield name, (edge, back, rest[0])
         else:
-            yield name, (edge, back, _circle_follows(before[borders[1] :], rest, frame))
+            yield name, (edge, back, _circle_follows(before[ends[1] :], rest, frame))
 
 
 def _mapping_errors(view: View) -> list[tuple[str, Array]]:
@@ -217,21 +187,21 @@ def _mapping_errors(view: View) -> list[tuple[str, Array]]:
 
 
 def _pivot_shifts(
-    outward: _Outward, frame: BladeFrame, borders: SeenBorders, parts: BladeParts, grain: float
+    view: View, frame: BladeFrame, borders: SeenBorders, parts: BladeParts, grain: float
 ) -> Array:
     """Two shifts of the pivot, one standard deviation each.
 
     ``grain`` is the share of a point's noise that its neighbours have too.
     """
-    if borders.hole is None or outward.hole is None or outward.hole_place is None:
+    if borders.hole is None:
         return np.eye(2) * parts.pivot_sd
-    away = outward.hole_place - frame.pivot
+    away = view.to_sheet(borders.hole.pixels) - frame.pivot
     radial = away / np.linalg.norm(away, axis=1, keepdims=True)
     off = np.linalg.norm(away, axis=1) - frame.radius
     # neighbours along a small circle share pixels: about one in four is independent
     spread = float(np.sqrt(np.mean(off**2)))
     information = radial.T @ radial / 4.0
-    pixel = float(np.median(np.linalg.norm(outward.hole, axis=1)))
+    pixel = float(np.median(np.linalg.norm(_outward(view, borders.hole), axis=1)))
     common = grain * float(np.median(borders.hole.sd_px)) * pixel
     covariance = np.linalg.inv(information) * spread**2 + common**2 * np.eye(2)
     return np.asarray(np.linalg.cholesky(covariance)).T

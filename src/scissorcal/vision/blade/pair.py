@@ -4,9 +4,9 @@ The end of each blade's metal is told from the end of its shadow.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import hypot
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import cv2
 import numpy as np
@@ -43,8 +43,7 @@ SEARCH = 0.1
 _STEP = 1e-4
 
 
-@dataclass(frozen=True)
-class PairLengths:
+class PairLengths(NamedTuple):
     """The lengths of a pair's blades, in the order of its measurements, and how unlike they are.
 
     ``seen`` are lengths in the picture (pixels of the sheet without tilt), or on the mat.
@@ -82,13 +81,14 @@ def measure_pair(
     ratio = _log_ratio(view, pixels, view.values)
     sd, tilt = sd_of_pair, 0.0
     leant = view
-    if isinstance(view, PlainView) and view.lean_covariance is not None:
+    if isinstance(view, PlainView):
+        lean_covariance = view.covariance[:4, :4]
         slope = _slope(view, pixels)
-        carried = view.lean_covariance @ slope
+        carried = lean_covariance @ slope
         sd = float(np.sqrt(sd_of_pair**2 + slope @ carried))
         tilt = float(np.degrees(abs(ratio) / max(float(np.linalg.norm(slope[:2])), 1e-12)))
         gain = carried / sd**2
-        leant = view.leaning(-gain * ratio, view.lean_covariance - np.outer(gain, carried))
+        leant = view.leaning(-gain * ratio, lean_covariance - np.outer(gain, carried))
         tips = [_in_view(parts, view, leant) for parts in tips]
     measured = [
         measure_blade(PicturedBlade(light, leant, parts, source), priors, search=SEARCH)

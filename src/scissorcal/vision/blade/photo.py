@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.borders import PicturedBlade
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
 from scissorcal.vision.blade.pair import PairLengths, measure_pair
-from scissorcal.vision.blade.scissors import Scissors, find_scissors, lamp_direction
+from scissorcal.vision.blade.scissors import Scissors, find_scissors, lamp_direction, opening_of
 from scissorcal.vision.blade.silhouette import LONGEST, EdgeSide, Silhouette, lone_blade, silhouette
 from scissorcal.vision.blade.view import PlainView, View, see_mat
 from scissorcal.vision.geometry.camera import Camera
@@ -36,8 +37,7 @@ _MOST_ARROWS = 120
 _ARROW_PX = 30.0
 
 
-@dataclass(frozen=True)
-class NickMark:
+class NickMark(NamedTuple):
     """A nick to be shown: where along the edge, and what to write beside it."""
 
     station: float
@@ -113,8 +113,8 @@ class Laid:
     """How blades were laid down for a photograph.
 
     ``both``: open scissors in place of one blade. ``mat``: on the printed blade mat; without it,
-    ``scale`` (metres per pixel) gives the size. ``edge_side``: the mat's rim that the edge faces.
-    ``pivot_px``: the pivot in the picture, where no hole shows it.
+    ``scale`` (metres per pixel of the whole photograph) gives the size. ``edge_side``: the mat's
+    rim that the edge faces. ``pivot_px``: the pivot in the picture, where no hole shows it.
     """
 
     both: bool = False
@@ -134,35 +134,30 @@ def photograph_laid(
     """
     if camera and (not laid.mat or (camera.width, camera.height) != (photo.width, photo.height)):
         camera = None
-    if laid.both:
-        return photograph_scissors(photo, camera, priors=priors, mat=laid.mat, scale=laid.scale)
-    return photograph_blade(
-        photo, camera, priors=priors, edge_side=laid.edge_side, pivot_px=laid.pivot_px
-    )
+    measure = photograph_scissors if laid.both else photograph_blade
+    return measure(photo, camera, laid, priors)
 
 
 def photograph_blade(
     photo: Photo,
     camera: Camera | None = None,
-    *,
+    laid: Laid = Laid(),
     priors: BladePriors = BladePriors(),
-    edge_side: EdgeSide = "down",
-    pivot_px: tuple[float, float] | None = None,
 ) -> BladePhoto:
     """Measure one blade on the mat.
 
-    ``pivot_px`` is the pivot in the whole photograph's pixels where no hole shows it. Raises
-    InputError where the photograph cannot be used, saying what is wrong with it.
+    The pivot is where ``laid`` has it, in the whole photograph's pixels, else in the blade's hole.
+    Raises InputError where the photograph cannot be used, saying what is wrong with it.
     """
     view = see_mat(photo, camera, priors)
     light = linear_light(photo.grey)
     outline = silhouette(light, view, photo.source)
     pivot, sd = None, 0.0
-    if pivot_px is not None:
-        beside = (pivot_px[0] + 1.0, pivot_px[1])
-        there = view.to_sheet(photo.within([pivot_px, beside]))
+    if laid.pivot_px is not None:
+        beside = (laid.pivot_px[0] + 1.0, laid.pivot_px[1])
+        there = view.to_sheet(photo.within([laid.pivot_px, beside]))
         pivot, sd = there[0], priors.pivot_sd_px * float(np.hypot(*(there[1] - there[0])))
-    parts = lone_blade(outline, photo.source, edge_side=edge_side, pivot=pivot, pivot_sd=sd)
+    parts = lone_blade(outline, photo.source, laid.edge_side, pivot, sd)
     measured = measure_blade(PicturedBlade(light, view, parts, photo.source), priors)
     return BladePhoto(photo, view, outline, (measured,))
 
@@ -170,34 +165,30 @@ def photograph_blade(
 def photograph_scissors(
     photo: Photo,
     camera: Camera | None = None,
-    *,
+    laid: Laid = Laid(),
     priors: BladePriors = BladePriors(),
-    mat: bool = True,
-    scale: float | None = None,
 ) -> BladePhoto:
     """Measure both blades of open scissors, on the mat or on any bright sheet.
 
-    Without the mat shapes have no scale; ``scale`` (metres per pixel of the whole photograph) gives
-    it. The camera should look straight down, since its tilt is not corrected. Raises
-    InputError where the photograph shows no scissors, or cannot be used.
+    Without the mat shapes have no scale, unless ``laid`` states it. The camera should look straight
+    down, since its tilt is not corrected. Raises InputError where the photograph shows no scissors,
+    or cannot be used.
     """
     light = linear_light(photo.grey)
-    if mat:
+    if laid.mat:
         view: View = see_mat(photo, camera, priors)
         outline = silhouette(light, view, photo.source)
     else:
         height, width = photo.image.shape[:2]
-        read = scale * photo.reduction if scale else None
-        view = PlainView.by_hand(width, height, priors, read)
+        scale = laid.scale * photo.reduction if laid.scale else None
+        view = PlainView.by_hand(width, height, priors, scale)
         outline = silhouette(light, view, photo.source, longest=min(max(width, height), LONGEST))
-    scissors = find_scissors(outline, photo.source, whole=not mat)
+    scissors = find_scissors(outline, photo.source, whole=not laid.mat)
     if not scissors.blades:
         return BladePhoto(photo, view, outline, (), scissors)
     view, measured, lengths = measure_pair(light, view, scissors.blades, photo.source, priors)
-    blades = tuple(measurement.parts for measurement in measured)
-    along = float(blades[0].axis @ blades[1].axis)
-    opening = float(np.arccos(np.clip(along, -1.0, 1.0)))
-    scissors = replace(scissors, blades=blades, opening=opening)
+    first, second = (measurement.parts for measurement in measured)
+    scissors = replace(scissors, blades=(first, second), opening=opening_of(first, second))
     lamp = lamp_direction(outline, scissors)
     return BladePhoto(photo, view, outline, measured, scissors, lengths, lamp)
 

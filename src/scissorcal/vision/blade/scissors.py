@@ -197,14 +197,18 @@ def _open(
         edge, back = (_between(rough, side, clear, last) for side in (rough.edge, rough.back))
         halved = (max(OPEN_FIRST, clear / stop), BACK_LAST)
         blades.append(replace(rough, edge=edge, back=back, length=stop, halved=halved))
-    cosine = float(np.clip(blades[0].axis @ blades[1].axis, -1.0, 1.0))
-    opening = float(np.arccos(cosine))
+    opening = opening_of(*blades)
     if min(len(b.edge) for b in blades) < 20 or opening < LEAST_OPENING:
         raise InputError(
             f"{source}: the blades are open by {np.degrees(opening):.0f} deg, and too little of "
             "their edges is visible: open them wider."
         )
     return Scissors(pivot, sd, screw, tuple(blades), opening, outline[list(tips)], rings, length)
+
+
+def opening_of(first: BladeParts, second: BladeParts) -> float:
+    """The angle (rad) between the centrelines of two blades."""
+    return float(np.arccos(np.clip(first.axis @ second.axis, -1.0, 1.0)))
 
 
 def _closed(shape: Silhouette, tip: Array, handles: Array, rings: tuple[Array, ...]) -> Scissors:

@@ -239,7 +239,6 @@ def _outlined(
 def lone_blade(
     shape: Silhouette,
     source: str,
-    *,
     edge_side: EdgeSide = "down",
     pivot: Array | None = None,
     pivot_sd: float = 0.0,

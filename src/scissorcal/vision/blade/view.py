@@ -3,8 +3,8 @@
 The sheet is the mat with its markers, or bare, under a camera that is held above it by hand.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol
 
 import cv2
 import numpy as np
@@ -24,20 +24,52 @@ FOCAL_SHARE = 0.85
 one. It only turns a tilt into a change of scale across the picture."""
 
 
-@dataclass(frozen=True)
-class PlainView:
-    """A photograph of a bare sheet: shapes up to similarity, or to scale with ``scale``.
+LEAST_MARKERS = 6
 
-    ``scale`` is metres per pixel, None where it is unknown. ``lean`` is the camera's tilt (rad,
-    towards x and y of the picture) and the two components by which the tilt foreshortens lengths;
-    ``lean_covariance`` (4, 4) is theirs. The sheet's unit is that of a pixel in the middle.
+_CORNER_SD_PX = 0.03
+_FIXED_POINT_STEPS = 30
+_FAR_OFF = 5.0
+
+
+@dataclass(frozen=True)
+class View(ABC):
+    """One photograph's mapping from pixels to a sheet, x to the right and y down.
+
+    ``values`` (p,) with ``covariance`` (p, p) are its parameters; `to_sheet` takes other values, to
+    show what each of them moves. The last ``shared`` of them are the same in every photograph of
+    one mat and camera; ``own_error`` names the error of the others. ``bounds`` (left, top,
+    right, bottom) is the part of the sheet in which a blade may lie, in sheet units: metres, or
+    pixels where no scale is known (``metric`` False). ``uncertainty`` is a sentence on its
+    accuracy.
     """
 
     bounds: tuple[float, float, float, float]
-    scale: float | None = None
-    scale_share_sd: float = 0.0
-    lean: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    lean_covariance: Array | None = None
+    metric: bool
+    own_error: str
+    shared: int
+    values: Array
+    covariance: Array
+    uncertainty: str
+
+    @abstractmethod
+    def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
+        """Places (n, 2) on the sheet of pixels (n, 2)."""
+
+    @abstractmethod
+    def to_pixels(self, points: Array) -> Array:
+        """Pixels (n, 2) of places (n, 2) on the sheet."""
+
+
+@dataclass(frozen=True)
+class PlainView(View):
+    """A photograph of a bare sheet: shapes up to similarity, or to scale with ``scale``.
+
+    ``scale`` is metres per pixel, None where it is unknown. Values are the camera's tilt (rad,
+    towards x and y of the picture), the two components by which the tilt foreshortens lengths, and
+    the scale's share. The sheet's unit is that of a pixel in the middle.
+    """
+
+    scale: float | None
 
     @classmethod
     def by_hand(
@@ -49,49 +81,24 @@ class PlainView:
         """
         unit = scale or 1.0
         tilt = np.radians(priors.tilt_sd_deg) ** 2
-        covariance = np.diag([tilt, tilt, 0.25 * tilt**2, 0.25 * tilt**2])
+        share = (0.01 * priors.scale_sd_percent if scale else 0.0) ** 2
+        covariance = np.diag([tilt, tilt, 0.25 * tilt**2, 0.25 * tilt**2, share])
         bounds = (0.0, 0.0, (width - 1) * unit, (height - 1) * unit)
-        sd = 0.01 * priors.scale_sd_percent if scale else 0.0
-        return cls(bounds, scale, sd, lean_covariance=covariance)
-
-    @property
-    def metric(self) -> bool:
-        return self.scale is not None
-
-    @property
-    def uncertainty(self) -> str:
-        tilt = np.degrees(np.hypot(*self.lean[:2]))
-        tilt_sentence = (
-            f"the blades' lengths suggest a tilt of {tilt:.1f} deg, which is allowed for"
+        level = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
+        return cls(bounds, scale is not None, "tilt", 1, level, covariance, "", scale).leaning(
+            level[:4], covariance[:4, :4]
         )
-        if self.scale is None:
-            return f"No mat: the shape has no scale, and {tilt_sentence}."
-        return f"No mat: the scale is as stated, and {tilt_sentence}."
 
-    @property
-    def values(self) -> Array:
-        return np.array([*self.lean, 1.0])
-
-    @property
-    def covariance(self) -> Array:
-        covariance = np.zeros((5, 5))
-        if self.lean_covariance is not None:
-            covariance[:4, :4] = self.lean_covariance
-        covariance[4, 4] = self.scale_share_sd**2
-        return covariance
-
-    @property
-    def shared(self) -> int:
-        return 1
-
-    @property
-    def own_error(self) -> str:
-        return "tilt"
-
-    def leaning(self, lean: Array, covariance: Array) -> "PlainView":
-        """The same view with another estimate of its tilt."""
-        p, q, u, v = (float(value) for value in lean)
-        return replace(self, lean=(p, q, u, v), lean_covariance=covariance)
+    def leaning(self, lean: Array, lean_covariance: Array) -> "PlainView":
+        """The same view with another estimate (4,) of its tilt and foreshortening."""
+        covariance = self.covariance.copy()
+        covariance[:4, :4] = lean_covariance
+        known = "the shape has no scale" if self.scale is None else "the scale is as stated"
+        words = (
+            f"No mat: {known}, and the blades' lengths suggest a tilt of "
+            f"{np.degrees(np.hypot(*lean[:2])):.1f} deg, which is allowed for."
+        )
+        return replace(self, values=np.append(lean, 1.0), covariance=covariance, uncertainty=words)
 
     def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
         p, q, u, v, share = self.values if values is None else values
@@ -118,51 +125,7 @@ class PlainView:
         return 0.5 * size, FOCAL_SHARE * float(size.max() + 1.0), unit
 
 
-LEAST_MARKERS = 6
-
-_CORNER_SD_PX = 0.03
-_FIXED_POINT_STEPS = 30
-_FAR_OFF = 5.0
-
-
-class View(Protocol):
-    """One photograph's mapping from pixels to a sheet, x to the right and y down.
-
-    ``values`` (p,) with ``covariance`` (p, p) are its parameters; `to_sheet` takes other values, to
-    show what each of them moves. The last ``shared`` of them are the same in every photograph of
-    one mat and camera; ``own_error`` names the error of the others. ``bounds`` (left, top,
-    right, bottom) is the part of the sheet in which a blade may lie, in sheet units: metres, or
-    pixels where no scale is known (``metric`` False). ``uncertainty`` is a sentence on its
-    accuracy.
-    """
-
-    @property
-    def bounds(self) -> tuple[float, float, float, float]: ...
-
-    @property
-    def metric(self) -> bool: ...
-
-    @property
-    def uncertainty(self) -> str: ...
-
-    @property
-    def values(self) -> Array: ...
-
-    @property
-    def covariance(self) -> Array: ...
-
-    @property
-    def shared(self) -> int: ...
-
-    @property
-    def own_error(self) -> str: ...
-
-    def to_sheet(self, pixels: Array, values: Array | None = None) -> Array: ...
-
-    def to_pixels(self, points: Array) -> Array: ...
-
-
-def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePriors()) -> "View":
+def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePriors()) -> View:
     """Find the blade mat in a photograph and how it is seen.
 
     With a camera by the mat's pose; without one by a homography and one radial term of distortion.
@@ -193,30 +156,13 @@ def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePrio
 
 
 @dataclass(frozen=True)
-class _MatView:
-    """What views of the mat have in common; the last two of their values are the print's scale."""
-
-    covariance: Array
-    uncertainty: str
-    bounds: ClassVar[tuple[float, float, float, float]] = MAT_FIELD_M
-    metric: ClassVar[bool] = True
-    own_error: ClassVar[str] = "mapping"
-
-
-@dataclass(frozen=True)
-class CameraView(_MatView):
+class CameraView(View):
     """The mat at a pose before a known camera.
 
     Values are its rotation and shift, the camera's intrinsics, and the print's scale by axis.
     """
 
     camera: Camera
-    pose: Array
-    shared: ClassVar[int] = 11
-
-    @property
-    def values(self) -> Array:
-        return np.concatenate([self.pose, self.camera.parameters, np.ones(2)])
 
     def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
         v = self.values if values is None else values
@@ -228,37 +174,30 @@ class CameraView(_MatView):
         return np.asarray((origin[:2] - directions[:, :2] * reach[:, None]) * v[-2:])
 
     def to_pixels(self, points: Array) -> Array:
-        rotation = cv2.Rodrigues(self.pose[:3])[0]
-        return self.camera.project(points @ rotation[:, :2].T + self.pose[3:6])
+        rotation = cv2.Rodrigues(self.values[:3])[0]
+        return self.camera.project(points @ rotation[:, :2].T + self.values[3:6])
 
 
 @dataclass(frozen=True)
-class HomographyView(_MatView):
+class _HomographyView(View):
     """The mat seen by an unknown camera: a homography after one radial term about the middle.
 
     Values are the homography from pixels to the sheet (8, its last entry 1), the radial term,
     and the print's scale along either axis.
     """
 
-    matrix: Array
-    radial: float
     size: tuple[int, int]
-    shared: ClassVar[int] = 2
-
-    @property
-    def values(self) -> Array:
-        return np.concatenate([self.matrix.ravel()[:8], [self.radial], np.ones(2)])
 
     def to_sheet(self, pixels: Array, values: Array | None = None) -> Array:
         v = self.values if values is None else values
         return np.asarray(_through(_matrix(v[:8]), _straightened(pixels, v[8], self.size)) * v[-2:])
 
     def to_pixels(self, points: Array) -> Array:
-        straight = _through(np.asarray(np.linalg.inv(self.matrix)), points)
+        straight = _through(np.asarray(np.linalg.inv(_matrix(self.values[:8]))), points)
         bent = straight.copy()
         for _ in range(_FIXED_POINT_STEPS):
             r2 = np.sum(bent**2, axis=1, keepdims=True)
-            bent = straight / (1.0 + self.radial * r2)
+            bent = straight / (1.0 + self.values[8] * r2)
         return np.asarray(bent * _half(self.size) + _middle(self.size))
 
 
@@ -283,12 +222,13 @@ def _camera_view(detection: Detection, camera: Camera, printed: Array, source: s
     covariance[6:15, 6:15] = known
     covariance[15:, 15:] = printed
     words = f"Fitted camera: the mat's corner residuals are {spread:.2f} px rms."
-    return CameraView(covariance, words, camera, pose)
+    values = np.concatenate([pose, camera.parameters, np.ones(2)])
+    return CameraView(MAT_FIELD_M, True, "mapping", 11, values, covariance, words, camera)
 
 
 def _homography_view(
     detection: Detection, size: tuple[int, int], printed: Array, source: str
-) -> HomographyView:
+) -> _HomographyView:
     sheet, pixels = detection.points[:, :2], detection.pixels
     start, _ = cv2.findHomography(_straightened(pixels, 0.0, size), sheet, 0)
     if start is None:
@@ -317,7 +257,8 @@ def _homography_view(
         "No camera fit: a homography and one radial term, with corner residuals of "
         f"{spread:.2f} px rms."
     )
-    return HomographyView(covariance, words, _matrix(solved.x[:8]), float(solved.x[8]), size)
+    values = np.concatenate([solved.x, np.ones(2)])
+    return _HomographyView(MAT_FIELD_M, True, "mapping", 2, values, covariance, words, size)
 
 
 def _covariance(J: Array, residual: Array, least: float = 1.0) -> tuple[Array, float]:

@@ -11,12 +11,12 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.foreign.text_tree import TYPE_KEY
+from scissorcal.foreign.reading import TYPE_KEY
 from scissorcal.vision.camera_files import vocabulary as words
 
 Distortion = Literal["none", "plumb_bob", "rational_polynomial"]
@@ -72,8 +72,7 @@ _BINARY_HEAD = 24
 """Bytes of text before the numbers of a matrix in base64, which repeat its type."""
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """One value of a file with its place: the keys that lead to it."""
 
     place: str

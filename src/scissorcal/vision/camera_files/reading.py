@@ -14,7 +14,7 @@ from scissorcal.errors import InputError, file_error
 from scissorcal.files import replacing
 from scissorcal.foreign import read_foreign_text
 from scissorcal.foreign.formats import CAMERA
-from scissorcal.foreign.text_tree import TYPE_KEY, parse_xml, parse_yaml
+from scissorcal.foreign.reading import TYPE_KEY, parse_xml, parse_yaml
 from scissorcal.vision.camera_files.assembling import camera_of
 from scissorcal.vision.camera_files.keys import Facts, RefusedError, facts_of, number_of, plain
 from scissorcal.vision.geometry.camera import Camera

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.foreign.text_tree import TYPE_KEY
+from scissorcal.foreign.reading import TYPE_KEY
 from scissorcal.vision.camera_files.keys import (
     MOST_NUMBERS,
     Entry,

@@ -1,6 +1,7 @@
 """The pose of a flat target before a camera: both solutions of a plane, and their covariance."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -41,12 +42,12 @@ class Corners:
 
     @classmethod
     def of(cls, *detections: Detection) -> "Corners":
-        """The corners of one target, a frame for each of its detections."""
+        """The corners of detection target, a frame for each of its detections."""
         return cls(
-            np.concatenate([one.pixels for one in detections]),
-            np.concatenate([one.points for one in detections]),
-            np.repeat(np.arange(len(detections)), [len(one.ids) for one in detections]),
-            np.concatenate([one.ids for one in detections]),
+            np.concatenate([detection.pixels for detection in detections]),
+            np.concatenate([detection.points for detection in detections]),
+            np.repeat(np.arange(len(detections)), [len(detection.ids) for detection in detections]),
+            np.concatenate([detection.ids for detection in detections]),
         )
 
     def where(self, keep: NDArray[np.bool_]) -> "Corners":
@@ -106,16 +107,16 @@ def locate_board(
         refined = [_refine(start, corners, camera, used) for start in begun]
         used = near(min(refined, key=_square).residuals, used)
         refined = sorted(
-            (_refine(found.pose, corners, camera, used) for found in refined), key=_square
+            (_refine(start.pose, corners, camera, used) for start in refined), key=_square
         )
         best = refined[0]
         noise, kept = _components(best.residuals, corners, used, priors)
-        own, by_camera, by_print = _covariance(best, corners, used, noise, kept)
+        by_noise, by_camera, by_print = _covariance(best, corners, used, noise, kept)
     except np.linalg.LinAlgError:
         raise ValueError("the corners that were seen do not determine a pose") from None
     sd = float(np.sqrt(noise + kept))
     print_sd = 0.01 * priors.print_scale_sd_percent
-    covariance = own + print_sd**2 * by_print @ by_print.T
+    covariance = by_noise + print_sd**2 * by_print @ by_print.T
     if camera.covariance is not None:
         covariance = covariance + by_camera @ camera.covariance @ by_camera.T
     other = refined[1] if len(refined) > 1 and _apart(refined[0], refined[1]) else None
@@ -132,12 +133,11 @@ def locate_board(
         residuals_px=best.residuals,
         by_camera=by_camera,
         by_print=by_print,
-        noise=own,
+        noise=by_noise,
     )
 
 
-@dataclass(frozen=True)
-class _Refined:
+class _Refined(NamedTuple):
     """``pose`` (6,) as rotation vector and translation, ``slope`` (2 n, 15) of pixels by pose and
     camera, ``square`` the sum of squared residuals of the corners used."""
 

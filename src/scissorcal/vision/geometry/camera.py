@@ -79,8 +79,8 @@ class Camera:
         ahead = given[:, 2] > 0.0
         if ahead.any():
             still = np.zeros(3)
-            found, _ = cv2.projectPoints(given[ahead], still, still, self.matrix, self.coefficients)
-            pixels[ahead] = found.reshape(-1, 2)
+            there, _ = cv2.projectPoints(given[ahead], still, still, self.matrix, self.coefficients)
+            pixels[ahead] = there.reshape(-1, 2)
         return pixels
 
     def rays(self, pixels: ArrayLike) -> Array:
@@ -94,13 +94,13 @@ class Camera:
         if not len(given):
             return np.empty((0, 2))
         criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, _UNDISTORT_STEPS, 1e-12)
-        found = cv2.undistortPoints(
+        directions = cv2.undistortPoints(
             given[:, None, :], self.matrix, self.coefficients, criteria=criteria
         ).reshape(-1, 2)
-        back = self.project(np.column_stack([found, np.ones(len(found))]))
+        back = self.project(np.column_stack([directions, np.ones(len(directions))]))
         missed = ~(np.abs(back - given).max(axis=1) < _ROUND_TRIP_PX)
-        found[missed] = np.nan
-        return np.asarray(found, dtype=np.float64)
+        directions[missed] = np.nan
+        return np.asarray(directions, dtype=np.float64)
 
     def scaled(self, width: int, height: int) -> "Camera":
         """Give the camera of the same photographs read at another size (same shape of picture)."""

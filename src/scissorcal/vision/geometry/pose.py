@@ -126,22 +126,22 @@ class Pose:
         matrix, moved = self.matrix, self.apply([other.translation_m])[0]
         covariance = None
         if self.covariance is not None or other.covariance is not None:
-            own = np.zeros((6, 6)) if self.covariance is None else self.covariance
+            mine = np.zeros((6, 6)) if self.covariance is None else self.covariance
             its = np.zeros((6, 6)) if other.covariance is None else other.covariance
-            by_own, by_its = _product_slopes(self, other)
-            covariance = by_own @ own @ by_own.T + by_its @ its @ by_its.T
+            by_mine, by_its = _product_slopes(self, other)
+            covariance = by_mine @ mine @ by_mine.T + by_its @ its @ by_its.T
         return Pose.from_matrix(matrix @ other.matrix, moved, covariance)
 
 
 def between(a: Pose, b: Pose, shared: Array) -> Pose:
     """T_a_b of T_c_a and T_c_b with the cross-covariance ``shared`` (6, 6)."""
     back = a.inverse()
-    found = back.after(b)
-    if found.covariance is None:
-        return found
+    pose = back.after(b)
+    if pose.covariance is None:
+        return pose
     by_back, by_b = _product_slopes(back, b)
     both = by_back @ _inverse_slope(a) @ shared @ by_b.T
-    return Pose(found.quaternion, found.translation_m, found.covariance + both + both.T)
+    return Pose(pose.quaternion, pose.translation_m, pose.covariance + both + both.T)
 
 
 def difference(a: Pose, b: Pose) -> Array:

@@ -4,6 +4,7 @@ With it, the plate's pose in one picture: what is new in that picture, and what 
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,8 +57,7 @@ MOST_OF_A_VIEW = 0.25
 single corners that are wrong, but the position that was stated: then none is left out."""
 
 
-@dataclass(frozen=True)
-class CardView:
+class CardView(NamedTuple):
     """The card in one picture, and the rig's position: ``advance_m`` and, for a card on a moving
     blade, that blade's angle ``blade_angle_rad`` (zero for a card on the carriage)."""
 
@@ -317,9 +317,5 @@ def picture_pose(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | No
     assert pose.covariance is not None
     assert alone.covariance is not None
     shared = pose.covariance - alone.covariance
-    return PicturePose(
-        pose=pose,
-        other=placed(board.other) if board.other else None,
-        noise=alone.covariance,
-        shared=0.5 * (shared + shared.T),
-    )
+    other = placed(board.other) if board.other else None
+    return PicturePose(pose, other, alone.covariance, 0.5 * (shared + shared.T))

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +19,7 @@ _STEP_M = 1e-4
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 241)[:-1]
 
 
-@dataclass(frozen=True)
-class Nick:
+class Nick(NamedTuple):
     """A notch in the edge: where from the pivot, how wide and how deep."""
 
     station_m: float

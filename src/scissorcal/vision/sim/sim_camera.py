@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.recipe.library import specimen_path
+from scissorcal.recipe.load import specimen_path
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.sim.optics import Lens, Looks, SimPose, about, as_jpeg
 from scissorcal.vision.sim.photograph import PaintLayer, render
@@ -78,10 +78,9 @@ def render_board_photographs(
     paths = []
     for number in range(count):
         rng = np.random.default_rng([seed, 8, number])
-        tilt = 0.6 if number else 0.05
         near = float(rng.uniform(0.55, 1.0))
         aside = _CORNERS[number // 2 % 4] if number % 2 else (0.0, 0.0)
-        pose = _view_of(board, rng, tilt=tilt, nearness=near, aside=aside)
+        pose = _view_of(board, rng, tilt=0.6 if number else 0.05, nearness=near, aside=aside)
         path = folder / f"{name}-{number + 1:02d}.jpg"
         paths.append(_write(target_layers(board, pose), rng, path))
     return tuple(paths)

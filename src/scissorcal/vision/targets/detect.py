@@ -178,11 +178,12 @@ def _marker_board(grey: Picture, board: MarkerBoard) -> tuple[Integers, Array]:
 
 def _chessboard(grey: Picture, board: Chessboard, window_px: int | None) -> tuple[Integers, Array]:
     size = (board.columns, board.rows)
-    flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-    found, corners = cv2.findChessboardCorners(grey, size, flags=flags)
-    if not found:
-        found, corners = cv2.findChessboardCornersSB(grey, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE)
-    if not found:
+    even = cv2.CALIB_CB_NORMALIZE_IMAGE
+    adaptive = cv2.CALIB_CB_ADAPTIVE_THRESH | even
+    good, corners = cv2.findChessboardCorners(grey, size, flags=adaptive)
+    if not good:
+        good, corners = cv2.findChessboardCornersSB(grey, size, flags=even)
+    if not good:
         return np.zeros(0, np.int64), np.zeros((0, 2))
     rough = np.asarray(corners, dtype=np.float64).reshape(board.rows, board.columns, 2)
     windows = _windows(rough, window_px)
@@ -211,8 +212,8 @@ def _windows(corners: Array, window_px: int | None) -> Array:
 def _refined(grey: Picture, corner: Array, window: int) -> Array:
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
     given = corner.astype(np.float32).reshape(1, 1, 2)
-    found = cv2.cornerSubPix(grey, given, (window, window), (-1, -1), criteria)
-    return np.asarray(found, dtype=np.float64).reshape(2)
+    moved = cv2.cornerSubPix(grey, given, (window, window), (-1, -1), criteria)
+    return np.asarray(moved, dtype=np.float64).reshape(2)
 
 
 def _side_px(board: Board, ids: Integers, pixels: Array) -> float:

@@ -6,7 +6,8 @@ columns and rows swapped, and other numbers of columns.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -44,8 +45,7 @@ _SEARCHES = 200
 MOST_COLUMNS = 40
 
 
-@dataclass(frozen=True)
-class _Markers:
+class _Markers(NamedTuple):
     """Markers of a picture: numbers (n,) and corners (n, 4, 2) in pixels."""
 
     ids: NDArray[np.int64]

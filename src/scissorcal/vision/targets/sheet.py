@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import cv2
 import numpy as np
@@ -47,8 +47,7 @@ RULERS_MM = (200.0, 150.0)
 _PIVOT_GREY = 0.6
 
 
-@dataclass(frozen=True)
-class Rectangle:
+class Rectangle(NamedTuple):
     """A filled rectangle in mm from the sheet's upper left corner; level 0 is black, 1 white."""
 
     x: float
@@ -58,8 +57,7 @@ class Rectangle:
     level: float = 0.0
 
 
-@dataclass(frozen=True)
-class Words:
+class Words(NamedTuple):
     """A line of text: its left end and baseline in mm, and the height of its letters' body."""
 
     x: float
@@ -274,8 +272,9 @@ def _sheet_picture(sheet: Sheet) -> "Image.Image":
         low = round((shape.y + shape.height) * scale) - 1
         draw.rectangle((left, top, right, low), fill=round(255 * shape.level))
     for words in sheet.words:
-        font = ImageFont.load_default(words.size * scale)
-        draw.text((words.x * scale, words.y * scale), words.text, fill=0, font=font, anchor="ls")
+        place = (words.x * scale, words.y * scale)
+        letters = ImageFont.load_default(words.size * scale)
+        draw.text(place, words.text, fill=0, font=letters, anchor="ls")
     return picture
 
 

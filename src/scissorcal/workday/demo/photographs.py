@@ -36,7 +36,7 @@ def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Prog
     from scissorcal.vision.targets.boards import CAMERA_BOARD
     from scissorcal.workday.demo.sim_photographs import specimen_blade
 
-    wanted = [item.name for item in requirements(recipe).photographs]
+    wanted = [item.name for item in requirements(recipe).geometry]
     for index, what in enumerate(wanted):
         share = index / len(wanted)
 

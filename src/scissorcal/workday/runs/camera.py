@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError
+from scissorcal.vision.overlay import ViewCoverage, detection_words
 from scissorcal.vision.photo import Photo, PictureShape, read_photo, same_shape
 from scissorcal.vision.targets.boards import CharucoBoard, Chessboard
-from scissorcal.vision.view_coverage import ViewCoverage, detection_words
 from scissorcal.workday.history import save_version
 from scissorcal.workday.photographs import (
     PhotoCapture,

@@ -6,10 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.load import parse_recipe, read_text
-from scissorcal.recipe.pace import capture_cost, refuse_long
-from scissorcal.recipe.requirements import CaptureKind, DesignedKind, requirements
-from scissorcal.recipe.show import with_designed_captures
+from scissorcal.recipe.load import parse_recipe, read_text, with_designed_captures
+from scissorcal.recipe.requirements import (
+    CaptureKind,
+    DesignedKind,
+    capture_cost,
+    refuse_long,
+    requirements,
+)
 from scissorcal.workday.options import CaptureOptions, RigOptions
 from scissorcal.workday.rigs import open_session
 from scissorcal.workday.runs.design import designed_for
@@ -26,7 +30,7 @@ if TYPE_CHECKING:
     from scissorcal.device.session import Operator, RigSession
     from scissorcal.recipe.schema import Recipe
     from scissorcal.recording import Recording
-    from scissorcal.recording.until import UntilMark
+    from scissorcal.recording.header import UntilMark
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.until import Earlier
 
@@ -177,7 +181,7 @@ def _capture_until(
     capture shows that the tolerance was not reached.
     """
     from scissorcal.device.capture import capture_by_parts, open_writer, planned
-    from scissorcal.recording.until import UNTIL_MARK
+    from scissorcal.recording.header import UNTIL_MARK
     from scissorcal.workday.stock import seconds_at_rig
     from scissorcal.workday.until import Limits, UntilTolerance
 

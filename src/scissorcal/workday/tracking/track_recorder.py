@@ -20,7 +20,7 @@ from scissorcal.recording import (
     read_recording,
     read_telemetry,
 )
-from scissorcal.recording.telemetry import (
+from scissorcal.recording.layout import (
     FRAME,
     OUTCOMES,
     PICTURE,

@@ -210,7 +210,6 @@ export class App {
     return html("header", {},
       html("h1", {}, scene.name),
       ...scene.warnings.map((sentence) => html("p", { class: "warning" }, sentence)),
-      ...scene.notes.map((sentence) => html("p", { class: "note" }, sentence)),
       html("p", { class: "note" }, "Blue is the fitted model, orange what if, grey measured, and the last closing stroke that of the blades on this page: a model, too, on the C core that renders on the rig."));
   }
 

@@ -80,7 +80,6 @@ export interface Scene {
   made_utc: string;
   version: string;
   warnings: string[];
-  notes: string[];
   bound_Nm: number;
   torque_limit_Nm: number;
   opening_rad: [number, number];
