@@ -73,3 +73,48 @@ def test_sentences_use_the_words_of_the_glossary(room):
         pytest.skip("the documentation is not installed")
     files = [path for path in HELD if path.relative_to(PACKAGE).parts[0] == room]
     assert not [word for path in files for word in words_found(path)]
+
+
+OLD_NAMES = ("believed", "belief", "rung", "sledge", "stance", "told", "untold")
+STILL_READ = {"stances"}
+"""Names of options that version 0.2 no longer reads."""
+
+
+def names_of(source: str) -> set[str]:
+    """Names that a module gives: functions, classes, parameters, fields and variables."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.arg):
+            names.add(node.arg)
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            names.add(node.attr)
+    return names
+
+
+def parts_of(name: str) -> set[str]:
+    """The words of a name, in small letters, without a plural's s."""
+    words = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name)
+    return {form for word in words for form in (word.lower(), word.lower().removesuffix("s"))}
+
+
+def test_a_name_has_words():
+    assert {"edge", "belief"} <= parts_of("EdgeBelief")
+    assert "rung" in parts_of("RUNGS") & parts_of("best_rung")
+    assert not parts_of("isinstance") & {"stance"}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_names_are_the_fields_nouns(room):
+    files = [path for path in HELD if path.relative_to(PACKAGE).parts[0] == room]
+    old = set(OLD_NAMES)
+    named = {
+        f"{path.relative_to(PACKAGE)}: {name}"
+        for path in files
+        for name in names_of(path.read_text(encoding="utf-8")) - STILL_READ
+        if parts_of(name) & old and name != "OLD_LAW_KEY"
+    }
+    assert not named

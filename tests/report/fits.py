@@ -280,7 +280,7 @@ def _candidate(name: str, bic: float, error: float, *, chosen: bool = False) -> 
         "parameters": 4 + len(name.split("+")),
         "bic": bic,
         "held_out_rms": error,
-        "held_out_score": -0.5 * bic,
+        "held_out_elpd": -0.5 * bic,
         "chosen": chosen,
     }
 

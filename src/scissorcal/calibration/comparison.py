@@ -125,13 +125,13 @@ def candidate_rows(
 ) -> tuple[dict[str, Any], ...]:
     """Rows for the report and the file, simplest first.
 
-    Those of :class:`~.candidates.CandidateRow`, and bic, held_out_rms, held_out_score, loo, loo_se,
-    loo_k_hat. ``bic``, ``held_out_score`` and ``loo`` count only as many observations as are
-    independent, the same share for every candidate. ``loo`` is the log density of all strokes, each
-    by the posterior without it, ``loo_se`` its standard error over strokes, ``loo_k_hat`` the worst
-    stroke's tail index. They are NaN for a single candidate, as there is nothing to compare, and
-    for those that are no :func:`contenders`. ``key`` and ``values`` (by name, at the best point)
-    are what a candidate's law is drawn from.
+    Those of :class:`~.candidates.CandidateRow`, and bic, held_out_rms, held_out_elpd, loo, loo_se,
+    loo_k_hat. ``bic``, ``held_out_elpd`` (expected log predictive density of unseen strokes) and
+    ``loo`` count only as many observations as are independent, the same share for every candidate.
+    ``loo`` is the log density of all strokes, each by the posterior without it, ``loo_se`` its
+    standard error over strokes, ``loo_k_hat`` the worst stroke's tail index. They are NaN for a
+    single candidate, as there is nothing to compare, and for those that are no :func:`contenders`.
+    ``key`` and ``values`` (by name, at the best point) are what a candidate's law is drawn from.
     """
     share = best_of(fitted).share
     near = [id(candidate) for candidate in contenders(fitted)] if len(fitted) > 1 else []
@@ -146,7 +146,7 @@ def candidate_rows(
                 **asdict(row),
                 "bic": -2 * candidate.log_likelihood * share + row.parameters * count,
                 "held_out_rms": candidate.held_out_rms,
-                "held_out_score": row.score,
+                "held_out_elpd": row.score,
                 **_loo(candidate, share if id(candidate) in near else float("nan")),
                 "key": dict(candidate.candidate.key),
                 "values": {name: float(value) for name, value in natural.items()},

@@ -299,7 +299,7 @@ class FitResult(Result):
     ``structure`` holds the discrete choices that, with a draw, define the model (the package
     compiler reads them). ``draws`` (draws, parameters) are in SI, columns in the order of
     ``parameters``; ``map_point`` has shape (parameters,). ``candidates`` lists the laws that were
-    compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms``, ``held_out_score``,
+    compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms``, ``held_out_elpd``,
     ``loo``, ``loo_se``, ``loo_k_hat``, ``chosen`` (it is the one used) and ``equivalent`` (not
     distinguishable from the best); ``selection`` is the same in words. ``critic`` holds the terms
     that the critic proposes, ``proposed`` (n,) what they add to the law at the points of

@@ -210,7 +210,9 @@ def plate(
             "where the rig stood in each: file,advance_mm,opening_deg. sim goes with --camera sim.",
         ),
     ] = None,
-    stances: Annotated[str | None, typer.Option(hidden=True)] = None,
+    stances: Annotated[
+        str | None, typer.Option(hidden=True, help="The old name of --positions.")
+    ] = None,
     folder: Folder = None,
 ) -> Answer:
     """Take in photographs of the plate's target, or of the rig's card at known positions.

@@ -65,10 +65,11 @@ def verify(
 ) -> Answer:
     """Check whether a fit's intervals mean what they say.
 
-    sbc (simulation-based calibration): recordings are simulated with your motion and sensor noise,
-    from parameters around your fit, and fitted again. The intervals must contain the truth as often
-    as they state. halves: your strokes are split into two halves, whose fits must agree within
-    their intervals. prior: the sensitivity of the result to the recipe's prior.
+    sbc (simulation-based calibration, Talts et al. 2018, doi 10.48550/arXiv.1804.06788): recordings
+    are simulated with your motion and sensor noise, from parameters around your fit, and fitted
+    again. The intervals must contain the truth as often as they state. halves: your strokes are
+    split into two halves, whose fits must agree within their intervals. prior: the sensitivity of
+    the result to the recipe's prior.
 
     Each fit is stored when it is done: the command can be interrupted and repeated to continue. A
     failed verdict gives exit code 3; the false alarm rate of all checks together is 1 %.

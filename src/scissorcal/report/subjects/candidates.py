@@ -36,7 +36,7 @@ class Candidate:
     parameters: int | None
     bic: Number
     held_out_rms: Number
-    held_out_score: Number
+    held_out_elpd: Number
     loo: Number
     loo_se: Number
     equivalent: bool
@@ -68,7 +68,7 @@ def candidates_panel(fit: FitResult, part: str) -> Panel:
                 number("BIC", one.bic, digits=6),
                 number("above the lowest BIC", _less(one.bic, lowest), digits=3),
                 number("hold-out rms", one.held_out_rms, fit.effort_unit),
-                number("hold-out log score", one.held_out_score, digits=6),
+                number("hold-out ELPD", one.held_out_elpd, digits=6),
                 number("PSIS-LOO", one.loo, digits=6, sd=one.loo_se),
                 words("outcome", one.outcome),
             ),
@@ -77,9 +77,9 @@ def candidates_panel(fit: FitResult, part: str) -> Panel:
         for one in found
     )
     caption = (
-        "The simplest first. Lower BIC, lower hold-out rms, higher hold-out score and PSIS-LOO "
-        "are better. Equivalent candidates do not differ from the best in these data; the "
-        "simplest of them is used."
+        "The simplest first. Lower BIC, lower hold-out rms, higher ELPD (expected log predictive "
+        "density, of hold-out strokes and by PSIS-LOO) are better. Equivalent candidates do not "
+        "differ from the best in these data; the simplest of them is used."
     )
     return Panel(id_, part, title, fit.selection, rows, caption=caption)
 
@@ -199,7 +199,7 @@ def _candidate(entry: Mapping[str, Any]) -> Candidate:
         None if size is None else int(size),
         finite(entry.get("bic")),
         finite(entry.get("held_out_rms")),
-        finite(entry.get("held_out_score")),
+        finite(entry.get("held_out_elpd", entry.get("held_out_score"))),  # as earlier files name it
         finite(entry.get("loo")),
         finite(entry.get("loo_se")),
         bool(entry.get("equivalent", chosen)),

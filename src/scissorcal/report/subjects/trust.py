@@ -30,12 +30,16 @@ LOOKS: tuple[tuple[Look, Style], ...] = (
     ("orange", "dotted"),
 )
 LARGE_Z = 3.0
+METHOD = "simulation-based calibration, Talts et al. 2018, doi 10.48550/arXiv.1804.06788"
 
 
 def trust_panels(fit: FitResult, check: VerifyResult | None, part: str) -> tuple[Panel, ...]:
     """The trust check of a fit in the report; how to make it where it was not made."""
     if check is None:
-        why = f"It has not been made for this fit: run `scissorcal verify {fit.words}`."
+        why = (
+            f"It has not been made for this fit: run `scissorcal verify {fit.words}`. It simulates "
+            f"recordings, refits them and counts the coverage of the intervals ({METHOD})."
+        )
         return (absent(f"{part}-verify", part, "Trust check", why),)
     return check_panels(check, part)
 
@@ -105,8 +109,8 @@ def _calibration(calibration: Calibration, part: str, id_: str) -> Panel:
         f"diagnostics, {len(calibration.broken)} gave no result."
     )
     caption = (
-        "Share of intervals that held the truth; in brackets the range that correct intervals "
-        "keep to."
+        f"{METHOD[0].upper()}{METHOD[1:]}: share of intervals that held the truth; in brackets the "
+        "range that correct intervals keep to."
     )
     title = "Trust check: intervals on simulated data"
     charts = (_ranks(calibration, f"{id_}-ranks"),)
