@@ -16,7 +16,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.recipe.requirements import GeometryKind
 from scissorcal.recipe.schema import Recipe
-from scissorcal.report import Geometry, build_report
+from scissorcal.report import Evidence, Geometry, build_report
 from scissorcal.report.pictures import PICTURE_BYTES, PictureFile, place_pictures
 from tests.report.conftest import CREATED, Built, paper
 from tests.report.fits import friction_fit
@@ -58,7 +58,7 @@ def report_of(
     fits: Sequence[FitResult] = (),
 ) -> Built:
     files = build_report(
-        recipe or photographed(), fits, [], folder, created=CREATED, geometry=found
+        recipe or photographed(), fits, Evidence(geometry=found), folder, created=CREATED
     )
     return Built(folder, read_page(files.html), read_twin(files.json))
 

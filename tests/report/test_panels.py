@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.result import FitResult
-from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
-from scissorcal.report import RecordingSummary, sheet_from_mapping, summarise_recording
+from scissorcal.recording.recording import Recording, Stroke
 from scissorcal.report.headline import Headline, geometry_headline, write_headline
 from scissorcal.report.inputs import Cell, Evidence
 from scissorcal.report.panel import Panel, Row, Value, columns
@@ -331,32 +330,12 @@ def test_a_panel_in_the_terminal_has_its_numbers_units_and_limits() -> None:
 
 def test_sources_whose_recording_is_missing_are_named_all_the_same() -> None:
     fits = {"cut": cut_fit(), "friction": friction_fit()}
-    origin = trace(paper(), "", fits, [friction_recording()])
+    origin = trace(paper(), fits, Evidence((friction_recording(),)))
     assert [row.used_by for row in origin.sources] == [("friction",), ("cut",)]
     assert origin.sources[1].content_hash
 
 
-def test_a_recording_is_reduced_to_what_is_printed() -> None:
-    samples = np.zeros(3, SAMPLE_DTYPE)
-    samples["device_time_us"] = [0, 1000, 2500]
-    recording = Recording("cut", samples, (Stroke(0, "press"),), Joint("linear"), source="a/b.mcap")
-    summary = summarise_recording(recording)
-    assert (summary.name, summary.samples, summary.joint) == ("b.mcap", 3, "linear")
-    assert summary.duration_s == pytest.approx(0.0025)
-
-
-def test_a_sheet_takes_units_from_names() -> None:
-    facts = {"range": {"rate_rad_per_s": (0.05, 1.0)}, "file": "x.zip", "share": float("nan")}
-    sheet = sheet_from_mapping("Package", "package", facts)
-    told = [(fact.label, fact.value, fact.unit) for fact in sheet.facts]
-    assert told == [
-        ("range rate", "0.05, 1", "rad/s"),
-        ("file", "x.zip", ""),
-        ("share", None, ""),
-    ]
-
-
-def _summary(source: str, digest: str, strokes: tuple[Stroke, ...]) -> RecordingSummary:
+def _summary(source: str, digest: str, strokes: tuple[Stroke, ...]) -> Recording:
     return replace(cut_recording(), source=source, content_hash=digest, strokes=strokes)
 
 

@@ -10,15 +10,7 @@ from scissorcal.report.build import (
 )
 from scissorcal.report.comparison import Comparison, Side, compare
 from scissorcal.report.document import ReportDocument
-from scissorcal.report.inputs import (
-    Cell,
-    Fact,
-    FactSheet,
-    Geometry,
-    RecordingSummary,
-    sheet_from_mapping,
-    summarise_recording,
-)
+from scissorcal.report.inputs import Cell, Evidence, Geometry
 from scissorcal.report.panel import Panel
 from scissorcal.report.subjects.closing import posterior_sha256, trust_check_sha256
 from scissorcal.report.text import panel_text, panels_text
@@ -27,11 +19,9 @@ from scissorcal.report.twin import read_twin
 __all__ = [
     "Cell",
     "Comparison",
-    "Fact",
-    "FactSheet",
+    "Evidence",
     "Geometry",
     "Panel",
-    "RecordingSummary",
     "ReportDocument",
     "ReportFiles",
     "Side",
@@ -43,9 +33,7 @@ __all__ = [
     "panels_text",
     "posterior_sha256",
     "read_twin",
-    "sheet_from_mapping",
     "sign_page",
-    "summarise_recording",
     "trust_check_sha256",
     "write_comparison",
 ]

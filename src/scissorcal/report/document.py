@@ -9,11 +9,12 @@ from typing import Literal
 
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
+from scissorcal.identity import VERSION
 from scissorcal.package.scene_torque import SceneTorque, scene_torque
 from scissorcal.recipe.requirements import GeometryKind, requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report.headline import Headline, geometry_headline, write_headline
-from scissorcal.report.inputs import Evidence, FactSheet, Geometry
+from scissorcal.report.inputs import Evidence, Geometry
 from scissorcal.report.panel import Panel, absent, clean
 from scissorcal.report.strokes import StrokeSamples, strokes_of
 from scissorcal.report.subjects import candidates, closing, cut, decision, posterior, torque
@@ -92,11 +93,7 @@ def compose(
     recipe: Recipe,
     fits: Sequence[FitResult],
     evidence: Evidence,
-    sheets: Sequence[FactSheet],
-    *,
-    recipe_text: str,
     created: datetime,
-    version: str,
 ) -> ReportDocument:
     """Gather all panels; draws nothing and touches no file."""
     named: dict[str, FitResult] = {}
@@ -123,7 +120,6 @@ def compose(
     sliding = recipe.rig.joint == "linear" or any(opens)
     if sliding:
         found, why = None, "A sliding joint carries no blades, so nothing is felt."
-    sheet_panels = [closing.sheet_panel(sheet) for sheet in sheets]
     scene = [] if sliding or not fits else scene_panels(found, why, recipe, named.get("cut"))
     if evidence.choice is not None:
         from scissorcal.report.subjects.simplest import simplest_panel
@@ -137,7 +133,7 @@ def compose(
         from scissorcal.report.subjects.layers import layers_panel
 
         scene = [*scene, layers_panel(recipe, evidence.pieces)]
-    provenance = closing.trace(recipe, recipe_text, keyed, evidence.recordings, geometry, checks)
+    provenance = closing.trace(recipe, keyed, replace(evidence, geometry=geometry, checks=checks))
     photographed = _geometry_panels(geometry, evidence.geometry, missing)
     cells = decision.cells_of(
         [(fit, strokes[part]) for part, fit in keyed.items()], replace(evidence, geometry=geometry)
@@ -146,7 +142,7 @@ def compose(
     verdicts = [v for kind in geometry.fits.values() for v in kind.verdicts]
     verdicts += [v for fit in fits for v in fit.verdicts]
     verdicts += [v for check in checks.values() for v in check.verdicts]
-    verdicts += [v for sheet in sheets for v in sheet.verdicts]
+    verdicts += [v for panel in evidence.panels for v in panel.verdicts]
     origin = decision.origin_of(evidence.recordings)
     panels = (
         decision.origin_panel(origin, evidence.recordings),
@@ -160,20 +156,19 @@ def compose(
         *scene,
         *photographed,
         *own,
-        *sheet_panels,
+        *evidence.panels,
         closing.left_out_panel(recipe, fits, dict(missing.items())),
         closing.provenance_panel(provenance, evidence.recordings),
         *rig_panels(evidence.recordings),
     )
     return ReportDocument(
-        FORMAT, created, version, recipe.name, recipe.description, recipe.material.name, origin,
+        FORMAT, created, VERSION, recipe.name, recipe.description, recipe.material.name, origin,
         scene_facts(recipe), _parts(panels, headlines, keyed), panels, provenance,
+        evidence.inputs_hash,
     )  # fmt: skip
 
 
-def compose_fit(
-    fit: FitResult, recipe: Recipe | None, *, created: datetime, version: str
-) -> ReportDocument:
+def compose_fit(fit: FitResult, recipe: Recipe | None, created: datetime) -> ReportDocument:
     """A fit alone; ``recipe`` says what it is of, if that is known."""
     part = fit.what
     panels = (
@@ -183,7 +178,7 @@ def compose_fit(
     return ReportDocument(
         FORMAT,
         created,
-        version,
+        VERSION,
         recipe.name if recipe else "",
         recipe.description if recipe else "",
         recipe.material.name if recipe else "",
@@ -191,7 +186,7 @@ def compose_fit(
         scene_facts(recipe) if recipe else None,
         (),
         panels,
-        closing.trace(recipe, "", {part: fit}),
+        closing.trace(recipe, {part: fit}, Evidence()),
     )
 
 
@@ -207,7 +202,7 @@ def fit_panels(
     if fit.what == "cut":
         physics += [
             cut.response_panel(fit, part),
-            cut.work_panel(fit, friction, evidence.raw, strokes, part),
+            cut.work_panel(fit, friction, evidence.recordings, strokes, part),
             cut.edge_panel(fit, strokes, part),
         ]
     return (

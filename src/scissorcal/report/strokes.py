@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.calibration.result import FitResult
-from scissorcal.recording.recording import Stroke, StrokeKind
-from scissorcal.report.inputs import RecordingSummary
+from scissorcal.recording.recording import Recording, Stroke, StrokeKind
 from scissorcal.report.numbers import Number, finite, short
 from scissorcal.report.panel import Look
 from scissorcal.report.reduce import median
@@ -95,7 +94,7 @@ class StrokeSamples:
 
 
 def strokes_of(
-    fit: FitResult, fit_anchor: str, recordings: Sequence[RecordingSummary]
+    fit: FitResult, fit_anchor: str, recordings: Sequence[Recording]
 ) -> tuple[StrokeSamples, ...]:
     """Part a fit's series into strokes, in order of recording and stroke."""
     series = fit.series
@@ -162,8 +161,8 @@ def kind_word(kind: str, position_unit: str) -> str:
     return kind
 
 
-def summary_of(source: str, recordings: Sequence[RecordingSummary]) -> RecordingSummary | None:
-    """Find the summary of a fit's source: by hash where both state one, else by file."""
+def recording_of(source: str, recordings: Sequence[Recording]) -> Recording | None:
+    """Find the recording that a fit names: by hash where both state one, else by file."""
     path, digest = split_source(source)
     for recording in recordings:
         if digest and recording.content_hash == digest:
@@ -172,19 +171,23 @@ def summary_of(source: str, recordings: Sequence[RecordingSummary]) -> Recording
         if not digest and recording.source and recording.source == path:
             return recording
     for recording in recordings:
-        if not digest and recording.source and recording.name == PurePath(path).name:
+        if (
+            not digest
+            and recording.source
+            and PurePath(recording.source).name == PurePath(path).name
+        ):
             return recording
     return None
 
 
-def _planned_strokes(fit: FitResult, recordings: Sequence[RecordingSummary]) -> dict[int, Stroke]:
+def _planned_strokes(fit: FitResult, recordings: Sequence[Recording]) -> dict[int, Stroke]:
     """Planned strokes by the number the fit gives them: they count on over its recordings."""
     planned: list[Stroke] = []
     for source in fit.sources:
-        summary = summary_of(source, recordings)
-        if summary is None:
+        recording = recording_of(source, recordings)
+        if recording is None:
             break
-        planned += summary.strokes
+        planned += recording.strokes
     return dict(enumerate(planned))
 
 

@@ -1,9 +1,8 @@
-"""What closes a report: package and other sheets, what was left out, provenance."""
+"""What closes a report: what was left out, provenance."""
 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
@@ -15,10 +14,11 @@ from scissorcal.identity import bytes_digest
 from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.probe import PROBE_KEY
-from scissorcal.report.inputs import FactSheet, Geometry, RecordingSummary
+from scissorcal.recording.recording import Recording
+from scissorcal.report.inputs import Evidence
 from scissorcal.report.numbers import display, scalar
-from scissorcal.report.panel import Panel, Row, Value, count, number, words
-from scissorcal.report.strokes import split_source, summary_of
+from scissorcal.report.panel import Panel, Row, count, number, words
+from scissorcal.report.strokes import recording_of, split_source
 from scissorcal.report.subjects.candidates import passed_over
 
 PHOTOGRAPHED = ("blade photographs", "plate pose")
@@ -84,34 +84,28 @@ class Provenance:
     recipe_text_origin: str
 
 
-def trace(
-    recipe: Recipe | None,
-    recipe_text: str,
-    fits: Mapping[str, FitResult],
-    recordings: Sequence[RecordingSummary] = (),
-    geometry: Geometry | None = None,
-    checks: Mapping[str, VerifyResult] | None = None,
-) -> Provenance:
+def trace(recipe: Recipe | None, fits: Mapping[str, FitResult], evidence: Evidence) -> Provenance:
     """Tie recordings to fits (by part), and name sources whose recording was not handed in."""
-    every = list(fits.values())
+    recordings, geometry = evidence.recordings, evidence.geometry
     sources = [
         Source(
-            one.source or "recording without a file",
-            one.content_hash,
+            recording.source or "recording without a file",
+            recording.content_hash,
             tuple(
-                f.what for f in every if any(summary_of(s, recordings) is one for s in f.sources)
+                fit.what
+                for fit in fits.values()
+                if any(recording_of(source, recordings) is recording for source in fit.sources)
             ),
         )
-        for one in recordings
+        for recording in recordings
     ]
-    for source in dict.fromkeys(source for fit in every for source in fit.sources):
-        if summary_of(source, recordings) is None:
-            users = tuple(fit.what for fit in every if source in fit.sources)
+    for source in dict.fromkeys(source for fit in fits.values() for source in fit.sources):
+        if recording_of(source, recordings) is None:
+            users = tuple(fit.what for fit in fits.values() if source in fit.sources)
             sources.append(Source(*split_source(source), users))
-    text, origin = recipe_text, "as written"
+    text, origin = evidence.recipe_text, "as written"
     if not text and recipe is not None:
         text, origin = recipe.model_dump_json(indent=2), "as read, in JSON"
-    geometry = geometry or Geometry()
     return Provenance(
         tuple(sources),
         tuple(
@@ -127,7 +121,7 @@ def trace(
         ),
         tuple(
             TrustCheckOrigin(what, check.fit_hash, trust_check_sha256(check))
-            for what, check in sorted((checks or {}).items())
+            for what, check in sorted(evidence.checks.items())
         ),
         text,
         origin,
@@ -144,9 +138,9 @@ def trust_check_sha256(check: VerifyResult) -> str:
     return bytes_digest(json.dumps(asdict(check), sort_keys=True).encode())
 
 
-def provenance_panel(provenance: Provenance, recordings: Sequence[RecordingSummary]) -> Panel:
+def provenance_panel(provenance: Provenance, recordings: Sequence[Recording]) -> Panel:
     """Recordings with their devices, fits with their hashes."""
-    known = {one.source: one for one in recordings}
+    known = {recording.source: recording for recording in recordings}
     rows = [_source_row(source, known.get(source.source)) for source in provenance.sources]
     rows += [
         Row(
@@ -155,55 +149,39 @@ def provenance_panel(provenance: Provenance, recordings: Sequence[RecordingSumma
         )
         for fit in provenance.fits
     ]
-    for one in provenance.geometry:
-        rows.append(
-            Row(
-                f"{one.fit} fit",
-                (
-                    words("inputs", one.inputs_hash or " "),
-                    words("file", one.file_sha256 or " "),
-                    words("photographs", ", ".join(one.sources) or " "),
-                ),
-            )
+    rows += [
+        Row(
+            f"{fit.fit} fit",
+            (
+                words("inputs", fit.inputs_hash or " "),
+                words("file", fit.file_sha256 or " "),
+                words("photographs", ", ".join(fit.sources) or " "),
+            ),
         )
+        for fit in provenance.geometry
+    ]
     return Panel("provenance-sources", "provenance", "Recordings and fits", rows=tuple(rows))
 
 
-def _source_row(source: Source, summary: RecordingSummary | None) -> Row:
+def _source_row(source: Source, recording: Recording | None) -> Row:
     values = [
         words("SHA-256", source.content_hash or "not available"),
         words("used by", ", ".join(source.used_by) or "no fit"),
     ]
-    if summary is None:
+    if recording is None:
         note = "The recording was not handed to this report."
         return Row(source.source, tuple(values), note)
     device = ", ".join(
-        f"{key} {display(scalar(v))}" for key, v in summary.device.items() if key != PROBE_KEY
+        f"{key} {display(scalar(v))}" for key, v in recording.device.items() if key != PROBE_KEY
     )
     values += [
-        words("kind", f"{summary.kind}, {summary.joint} joint"),
-        number("length", summary.duration_s, "s", digits=4),
-        count("samples", summary.samples),
-        count("strokes", len(summary.strokes)),
+        words("kind", f"{recording.kind}, {recording.joint.kind} joint"),
+        number("length", recording.duration_s, "s", digits=4),
+        count("samples", len(recording.samples)),
+        count("strokes", len(recording.strokes)),
         words("device", device or " "),
     ]
-    return Row(source.source, tuple(values), " ".join(summary.notes))
-
-
-def sheet_panel(sheet: FactSheet) -> Panel:
-    """Take a sheet of facts over; its part's name holds only letters, digits and hyphens."""
-    part = "sheet-" + re.sub(r"[^A-Za-z0-9]+", "-", sheet.anchor).strip("-")
-    rows = tuple(Row(fact.label, (_fact(scalar(fact.value), fact.unit),)) for fact in sheet.facts)
-    return Panel(f"{part}-facts", part, sheet.title, rows=rows, notes=sheet.notes)
-
-
-def _fact(value: object, unit: str) -> Value:
-    if isinstance(value, str | bool):
-        said = display(value)
-        return words("value", f"{said} {unit}".strip() or " ")
-    if isinstance(value, int):
-        return Value("value", value, unit)
-    return number("value", value, unit, digits=4)
+    return Row(source.source, tuple(values), " ".join(recording.notes))
 
 
 def left_out_panel(recipe: Recipe, fits: Sequence[FitResult], geometry: Mapping[str, str]) -> Panel:

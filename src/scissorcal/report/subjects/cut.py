@@ -118,7 +118,9 @@ def work_panel(
     title, id_ = "Fracture work by stroke", f"{part}-work"
     names = {one.name.stroke: one.name for one in strokes if one.name.kind != "opening"}
     try:
-        found = fracture_work(fit, friction, recordings, sorted(names))
+        found = fracture_work(
+            fit, friction, [r for r in recordings if len(r.samples)], sorted(names)
+        )
     except ScissorcalError as error:
         return absent(id_, part, title, str(error))
     rows = tuple(

@@ -12,8 +12,9 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.package.scene_torque import SceneTorque
 from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.recording import Recording
 from scissorcal.report.headline import SAID, STANCES, Headline, Stance
-from scissorcal.report.inputs import Cell, Evidence, Geometry, RecordingSummary
+from scissorcal.report.inputs import Cell, Evidence, Geometry
 from scissorcal.report.numbers import finite, percent
 from scissorcal.report.panel import Panel, Row, Value, count, percent_of, words
 from scissorcal.report.strokes import StrokeSamples, kind_word, stroke_label
@@ -47,7 +48,7 @@ PHOTOGRAPHS_PASSED = "✓ checks passed"
 """Of a fit of photographs, for which there is no trust check that could be missing."""
 
 
-def origin_of(recordings: Sequence[RecordingSummary]) -> Origin:
+def origin_of(recordings: Sequence[Recording]) -> Origin:
     """Whether recordings come from a simulator, as their devices state it."""
     flags = {_simulated(one) for one in recordings} - {None}
     if len(flags) != 1:
@@ -55,7 +56,7 @@ def origin_of(recordings: Sequence[RecordingSummary]) -> Origin:
     return "simulated" if flags.pop() else "real"
 
 
-def origin_panel(origin: Origin, recordings: Sequence[RecordingSummary]) -> Panel:
+def origin_panel(origin: Origin, recordings: Sequence[Recording]) -> Panel:
     """Simulated or real, as far as it is stated."""
     said = {
         "simulated": "All recordings that state their device come from a virtual rig: no value of "
@@ -72,7 +73,7 @@ def origin_panel(origin: Origin, recordings: Sequence[RecordingSummary]) -> Pane
     return Panel(f"{PART}-origin", PART, TITLES[origin], said + device)
 
 
-def _simulated(recording: RecordingSummary) -> bool | None:
+def _simulated(recording: Recording) -> bool | None:
     """Whether the device states that it is a simulator; None where it states neither."""
     stated = recording.device.get("capabilities") if recording.device else None
     return bool(stated & SIMULATOR) if isinstance(stated, int) else None
@@ -125,21 +126,19 @@ def cells_of(
     for fit, strokes in fits:
         if fit.what in counted:
             continue
-        used = {one.name.stroke for one in strokes if len(one.places)}
+        used = {stroke.name.stroke for stroke in strokes if len(stroke.places)}
         planned: dict[str, list[int]] = {}
         recorded: set[int] = set()
         number = 0
-        own = [one for one in evidence.recordings if one.kind == fit.what]
-        raw = {one.source: one for one in evidence.raw}
-        for recording in own:
-            if recording.source in raw:
-                sampled = np.unique(raw[recording.source].samples["stroke"])
-                recorded.update(int(n) + number for n in sampled if n >= 0)
+        captures = [r for r in evidence.recordings if r.kind == fit.what]
+        for recording in captures:
+            sampled = np.unique(recording.samples["stroke"])
+            recorded.update(int(n) + number for n in sampled if n >= 0)
             for stroke in recording.strokes:
                 label = stroke_label(stroke, 0, fit.position_unit).partition(", ")[2]
                 planned.setdefault(label, []).append(number)
                 number += 1
-        known = bool(own) and all(one.source in raw for one in own)
+        known = bool(captures) and all(len(recording.samples) for recording in captures)
         for name, numbers in planned.items():
             kept = sum(n in used for n in numbers)
             returns = name.startswith(kind_word("opening", fit.position_unit))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from scissorcal.recording.probe import ESTIMATES, FACTS, Estimate, ProbeResult, Swing, newest_probe
-from scissorcal.report.inputs import RecordingSummary
+from scissorcal.recording.recording import Recording
 from scissorcal.report.panel import (
     Axis,
     Chart,
@@ -24,7 +24,7 @@ ID, PART, TITLE = "provenance-rig", "provenance", "The rig as it was probed"
 LOOKS: tuple[Look, ...] = ("blue", "vermillion", "green", "purple", "orange", "ink")
 
 
-def rig_panels(recordings: Sequence[RecordingSummary]) -> tuple[Panel, ...]:
+def rig_panels(recordings: Sequence[Recording]) -> tuple[Panel, ...]:
     """What the latest probe in the recordings says; none where none was probed."""
     last = newest_probe(recording.device for recording in recordings)
     return () if last is None else (rig_panel(last),)
