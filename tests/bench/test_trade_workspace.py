@@ -19,12 +19,10 @@ from scissorcal.bench.trade.study import Task
 from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, TOGETHER, Together
 from scissorcal.bench.trade.torque import WORST
 from scissorcal.errors import InputError, MissingError
-from scissorcal.recipe.library import schemas_dir
-from scissorcal.report.twin import twin_text
+from scissorcal.recipe import schemas_dir
+from scissorcal.report import twin_text
+from scissorcal.workday import ON_A_CLUSTER, TradeOutcome, TradeSettings, Workspace, trade_workspace
 from scissorcal.workday.runs import bench
-from scissorcal.workday.runs.bench import TradeOutcome, TradeSettings, trade_workspace
-from scissorcal.workday.runs.bench_case import ON_A_CLUSTER
-from scissorcal.workday.workspace import Workspace
 from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, Steps, made_case
 from tests.guard import GUARD_S
 from tests.workday.made import quick_workspace

@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 
-from scissorcal.calibration.result import FitResult
+from scissorcal.calibration import FitResult
 from scissorcal.package import Review
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.recording import Recording
+from scissorcal.recipe import Recipe, recipe_path
+from scissorcal.recording import Recording
 from scissorcal.report import Evidence, Panel, build_report
 from scissorcal.report.panel import Row, Value, count
 from scissorcal.verdicts import Verdict

@@ -2,11 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from scissorcal.recording.layout import empty_samples
-from scissorcal.recording.probe import PROBE_KEY, Estimate, ProbeResult, Swing
-from scissorcal.recording.recording import Recording
+from scissorcal.recording import PROBE_KEY, SAMPLE_DTYPE, Estimate, ProbeResult, Recording, Swing
 from scissorcal.report.subjects.rig import rig_panels
 
 EARLY, LATE = "2026-01-02T08:00:00+00:00", "2026-01-02T14:00:00+00:00"
@@ -19,7 +18,7 @@ def probed(made_at: str, inertia: float, swings: tuple[Swing, ...] = ()) -> Prob
 
 def recorded(probe: ProbeResult | None) -> Recording:
     device = {} if probe is None else {PROBE_KEY: probe.as_dict()}
-    return Recording("friction", empty_samples(1), device=device, source="a.mcap")
+    return Recording("friction", np.zeros(1, SAMPLE_DTYPE), device=device, source="a.mcap")
 
 
 def test_the_latest_probe_is_shown_with_its_interval() -> None:

@@ -62,7 +62,7 @@ def _facts(what: str, outcome: "PredictionOutcome") -> dict[str, object]:
     found, band = outcome.prediction, outcome.band
     return {
         "what": what,
-        "rung": outcome.rung,
+        "candidate": outcome.candidate,
         "effort_unit": outcome.effort_unit,
         "position_unit": outcome.position_unit,
         "band": band,
@@ -79,7 +79,7 @@ def _text(what: str, outcome: "PredictionOutcome") -> str:
     width = f"{band.level:.0%} band: +- {band.moving:.3g} {unit}"
     if band.resting is not None and band.resting != band.moving:
         width += f", {band.resting:.3g} {unit} near rest"
-    head = f"{what}: {outcome.rung}, over {_moving_s(outcome):.1f} s of motion"
+    head = f"{what}: {outcome.candidate}, over {_moving_s(outcome):.1f} s of motion"
     lines = [head, width, band.sentence, _new_recording(band, unit)]
     inside = _number(found.share_inside)
     if inside is None:

@@ -110,7 +110,7 @@ def trace(recipe: Recipe | None, fits: Mapping[str, FitResult], evidence: Eviden
         tuple(sources),
         tuple(
             FitOrigin(
-                fit.what, part, fit.rung, fit.effort, fit.effort_unit, fit.position_unit,
+                fit.what, part, fit.candidate, fit.effort, fit.effort_unit, fit.position_unit,
                 fit.inputs_hash, posterior_sha256(fit), fit.sources,
             )
             for part, fit in fits.items()

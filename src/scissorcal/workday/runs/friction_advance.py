@@ -1,4 +1,4 @@
-"""The fit of the sledge's friction: its run in a workspace."""
+"""The fit of the carriage's friction: its run in a workspace."""
 
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ STREAM = 5
 
 
 def fit(engine: "Engine", request: "Request") -> "Made":
-    """Fit mass and friction to the used recordings of the sledge's empty motion."""
+    """Fit mass and friction to the used recordings of the carriage's empty motion."""
     from scissorcal.calibration.friction.advance import fit_friction_advance
 
     settings = engine.recipe.fit.advance

@@ -34,7 +34,7 @@ class PredictionOutcome:
 
     prediction: "Prediction"
     band: "Band"
-    rung: str
+    candidate: str
     effort_unit: str
     position_unit: str
     files: tuple[Path, ...]
@@ -85,7 +85,7 @@ def predict_workspace(
         files.append(plot)
     tell(1.0, "prediction: done")
     return PredictionOutcome(
-        found, band, fit.rung, fit.effort_unit, fit.position_unit, tuple(files)
+        found, band, fit.candidate, fit.effort_unit, fit.position_unit, tuple(files)
     )
 
 

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from scissorcal.recipe.plate_surface import PlateTracking
     from scissorcal.recipe.schema import Recipe
     from scissorcal.recording import RecordingWriter
-    from scissorcal.render import PoseSource, RenderResult, RigFacts
+    from scissorcal.render import RenderResult, RigFacts
+    from scissorcal.tracking.plate_pose import PoseSource
     from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
 
