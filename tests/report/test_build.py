@@ -17,9 +17,9 @@ from scissorcal.errors import InputError, MissingError
 from scissorcal.package import REPORT_PAGE, REPORT_TWIN, Review
 from scissorcal.recipe import schemas_dir
 from scissorcal.report import Evidence, Panel, build_report, sign_page
+from scissorcal.report.build import schema_text
 from scissorcal.report.panel import Row, words
 from scissorcal.report.signature_block import unsigned_digest
-from scissorcal.report.twin import schema_text
 from scissorcal.verdicts import Verdict
 from tests.report.conftest import CREATED, Built, built, paper
 from tests.report.fits import cut_fit, linear_fit, linear_recording

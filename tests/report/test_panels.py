@@ -7,11 +7,9 @@ import pytest
 
 from scissorcal.calibration import FitResult
 from scissorcal.recording import Recording, Stroke
-from scissorcal.report.headline import Headline, geometry_headline, write_headline
 from scissorcal.report.inputs import Cell, Evidence
-from scissorcal.report.panel import Panel, Row, Value, columns
-from scissorcal.report.reduce import block_means
-from scissorcal.report.strokes import strokes_of
+from scissorcal.report.panel import LARGEST_WIDTH, Panel, Row, Value, columns, panel_text
+from scissorcal.report.strokes import block_means, strokes_of
 from scissorcal.report.subjects.closing import left_out_panel, trace
 from scissorcal.report.subjects.decision import (
     cells_of,
@@ -22,7 +20,7 @@ from scissorcal.report.subjects.decision import (
     weaknesses_panel,
 )
 from scissorcal.report.subjects.torque import group_strokes, torque_panel
-from scissorcal.report.text import LARGEST_WIDTH, panel_text
+from scissorcal.report.subjects.trust import Headline, geometry_headline, write_headline
 from scissorcal.verdicts import Verdict
 from tests.report.conftest import paper
 from tests.report.fits import (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.recording import PROBE_KEY, SAMPLE_DTYPE, Estimate, ProbeResult, Recording, Swing
-from scissorcal.report.subjects.rig import rig_panels
+from scissorcal.report.subjects.closing import rig_panels
 
 EARLY, LATE = "2026-01-02T08:00:00+00:00", "2026-01-02T14:00:00+00:00"
 

@@ -118,8 +118,8 @@ def build_package(
     failed a check or the tables are further from the model than the scene allows.
     """
     # the report imports this module to read packages; only a build needs what follows
-    from scissorcal.package.by_load import rendered_fits
     from scissorcal.package.check import check_built
+    from scissorcal.package.friction_tables import rendered_fits
     from scissorcal.package.reach import data_reach
     from scissorcal.package.simplest.model import simplest_model
     from scissorcal.package.stated_bound import stated_bound

@@ -27,8 +27,7 @@ from scissorcal.package.bound import PARALLEL
 from scissorcal.package.compile import STRONGEST_N, Compiled, kernel_tables, table_file
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.manifest import Ranges
-from scissorcal.package.profile import profiles
-from scissorcal.package.proved_tables import ProvedTable
+from scissorcal.package.proved_tables import ProvedTable, profiles
 from scissorcal.package.tables import TableLaw
 
 OPENINGS, CONTACTS = 240, 240

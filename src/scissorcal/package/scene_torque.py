@@ -13,7 +13,6 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.model import edge_height
 from scissorcal.model.cutting import within_thickness
-from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.exact import (
     ExactModel,
     FitDraws,
@@ -22,6 +21,7 @@ from scissorcal.package.exact import (
     pick_draws,
     torque_quantiles,
 )
+from scissorcal.package.friction_tables import rendered_fits
 from scissorcal.package.grid import FELT_SHARE
 from scissorcal.package.reach import data_reach, reach_sentences
 from scissorcal.recipe.schema import Recipe

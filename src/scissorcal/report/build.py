@@ -1,12 +1,15 @@
-"""Build a report: one offline HTML file to review, and its JSON twin."""
+"""Build a report: one offline HTML file to review, its JSON twin, and the twin's JSON Schema."""
 
 from __future__ import annotations
 
+import json
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, MissingError, file_error
@@ -19,7 +22,10 @@ from scissorcal.recipe.schema import Recipe
 from scissorcal.report.comparison import Comparison
 from scissorcal.report.document import ReportDocument, compose, compose_fit
 from scissorcal.report.inputs import Evidence
-from scissorcal.report.twin import twin_text
+
+if TYPE_CHECKING:
+    from scissorcal.bench.trade.result import Trade
+    from scissorcal.report.comparison import Comparison
 
 
 @dataclass(frozen=True)
@@ -166,3 +172,67 @@ def _write_both(files: ReportFiles, page: str, twin: str) -> None:
             f"The report cannot be written to {folder}: {error.strerror or error}. Free that "
             "place or name another output folder."
         ) from error
+
+
+def twin_text(document: ReportDocument | Comparison | Trade) -> str:
+    """The document as JSON: what has its default is left out, what is not finite is null."""
+    from pydantic import TypeAdapter
+
+    adapter: TypeAdapter[Any] = TypeAdapter(type(document))
+    plain = adapter.dump_python(document, mode="json", exclude_defaults=True)
+    return json.dumps(plain, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
+
+
+def read_twin(text: str | bytes) -> ReportDocument:
+    """Read a report's twin back. Raises ValueError where it is none of this version."""
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(ReportDocument).validate_json(text)
+
+
+def schema_text() -> str:
+    """The schema as it stands in ``data_schemas/report.schema.json``."""
+    return _schema_text(ReportDocument, "scissorcal report")
+
+
+def comparison_schema_text() -> str:
+    """The schema as it stands in ``data_schemas/comparison.schema.json``."""
+    from scissorcal.report.comparison import Comparison
+
+    return _schema_text(Comparison, "scissorcal comparison of two reports")
+
+
+def _schema_text(kind: type, title: str) -> str:
+    """JSON Schema (draft 2020-12) of a twin, generated from its dataclasses."""
+    from pydantic import TypeAdapter
+
+    schema: dict[str, Any] = TypeAdapter(kind).json_schema(mode="serialization")
+    for definition in (schema, *schema.get("$defs", {}).values()):
+        if definition.get("type") == "object":
+            definition["additionalProperties"] = False
+            definition["required"] = sorted(
+                name for name, entry in definition["properties"].items() if "default" not in entry
+            )
+        for entry in definition.get("properties", {}).values():
+            entry.pop("title", None)
+    whole = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": title,
+        **{name: value for name, value in schema.items() if name != "title"},
+    }
+    text = json.dumps(_short(whole), indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    return re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text)
+
+
+def _short(schema: Any) -> Any:
+    """The schema with "a number or null" as one type."""
+    if isinstance(schema, list):
+        return [_short(entry) for entry in schema]
+    if not isinstance(schema, dict):
+        return schema
+    plain = {name: _short(entry) for name, entry in schema.items()}
+    kinds = plain.get("anyOf", [])
+    if kinds and all(set(kind) == {"type"} for kind in kinds):
+        del plain["anyOf"]
+        plain["type"] = [kind["type"] for kind in kinds]
+    return plain

@@ -13,19 +13,23 @@ from scissorcal.identity import VERSION
 from scissorcal.package.scene_torque import SceneTorque, scene_torque
 from scissorcal.recipe.requirements import GeometryKind, requirements
 from scissorcal.recipe.schema import Recipe
-from scissorcal.report.headline import Headline, geometry_headline, write_headline
 from scissorcal.report.inputs import Evidence, Geometry
 from scissorcal.report.panel import Panel, absent, clean
 from scissorcal.report.strokes import StrokeSamples, strokes_of
 from scissorcal.report.subjects import candidates, closing, cut, decision, posterior, torque
 from scissorcal.report.subjects.blade import blade_panels
 from scissorcal.report.subjects.camera import camera_panels
-from scissorcal.report.subjects.closing import Provenance
+from scissorcal.report.subjects.closing import Provenance, rig_panels
 from scissorcal.report.subjects.friction import friction_panel
 from scissorcal.report.subjects.plate_pose import plate_panels
-from scissorcal.report.subjects.rig import rig_panels
 from scissorcal.report.subjects.scene import scene_panels
-from scissorcal.report.subjects.trust import trust_panels
+from scissorcal.report.subjects.stated import layers_panel, simplest_panel, stated_edge_panel
+from scissorcal.report.subjects.trust import (
+    Headline,
+    geometry_headline,
+    trust_panels,
+    write_headline,
+)
 from scissorcal.verdicts import Verdict
 
 Format = Literal["scissorcal-report/2"]
@@ -122,16 +126,10 @@ def compose(
         found, why = None, "A sliding joint carries no blades, so nothing is felt."
     scene = [] if sliding or not fits else scene_panels(found, why, recipe, named.get("cut"))
     if evidence.choice is not None:
-        from scissorcal.report.subjects.simplest import simplest_panel
-
         scene = [*scene, simplest_panel(evidence.choice, list(named.values()))]
     if recipe.rig.edge.points_mm is not None and not sliding:
-        from scissorcal.report.subjects.stated_edge import stated_edge_panel
-
         scene = [*scene, stated_edge_panel(recipe)]
     if evidence.pieces:
-        from scissorcal.report.subjects.layers import layers_panel
-
         scene = [*scene, layers_panel(recipe, evidence.pieces)]
     provenance = closing.trace(recipe, keyed, replace(evidence, geometry=geometry, checks=checks))
     photographed = _geometry_panels(geometry, evidence.geometry, missing)

@@ -22,8 +22,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.reduce import median
-from scissorcal.report.strokes import StrokeSamples
+from scissorcal.report.strokes import StrokeSamples, median
 
 SAME_WITHIN = 1e-3
 

@@ -1,8 +1,9 @@
-"""What closes a report: what was left out, provenance."""
+"""What closes a report: what was left out, provenance, the rig as it was probed."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
@@ -13,14 +14,36 @@ from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.identity import bytes_digest
 from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.probe import PROBE_KEY
+from scissorcal.recording.probe import (
+    ESTIMATES,
+    FACTS,
+    PROBE_KEY,
+    Estimate,
+    ProbeResult,
+    Swing,
+    newest_probe,
+)
 from scissorcal.recording.recording import Recording
 from scissorcal.report.inputs import Evidence
 from scissorcal.report.numbers import display, scalar
-from scissorcal.report.panel import Panel, Row, count, number, words
+from scissorcal.report.panel import (
+    Axis,
+    Chart,
+    Look,
+    Panel,
+    Row,
+    Series,
+    Value,
+    count,
+    curve,
+    number,
+    points,
+    words,
+)
 from scissorcal.report.strokes import recording_of, split_source
 from scissorcal.report.subjects.candidates import passed_over
 
+LOOKS: tuple[Look, ...] = ("blue", "vermillion", "green", "purple", "orange", "ink")
 PHOTOGRAPHED = ("blade photographs", "plate pose")
 """What photographs would give, as requirements name it where a scene does without."""
 
@@ -231,3 +254,61 @@ def _not_needed(recipe: Recipe) -> Iterable[tuple[str, str, str]]:
     ):
         if target not in scene.render:
             yield what, "not needed", f"The scene's `render` list does not name `{target}`."
+
+
+def rig_panels(recordings: Sequence[Recording]) -> tuple[Panel, ...]:
+    """What the latest probe in the recordings says; none where none was probed."""
+    last = newest_probe(recording.device for recording in recordings)
+    return () if last is None else (rig_panel(last),)
+
+
+def rig_panel(probe: ProbeResult) -> Panel:
+    """Estimates with their intervals, the facts that people ask for, pushes beside the model."""
+    values = [
+        (name, _estimated(estimate, scale, unit))
+        for name, key, scale, unit in ESTIMATES
+        if (estimate := getattr(probe, key)) is not None
+    ]
+    values += [
+        (name, number("value", scale * probe.facts[key], unit))
+        for name, key, scale, unit in FACTS
+        if math.isfinite(probe.facts.get(key, math.nan))
+    ]
+    rows = tuple(Row(name, (value,)) for name, value in values)
+    sentence = f"{probe.device}, probed at {probe.made_at}."
+    return Panel(
+        "provenance-rig", "provenance", "The rig as it was probed", sentence, rows,
+        _charts(probe), caption="Estimates: intervals of 90 %.",
+    )  # fmt: skip
+
+
+def _estimated(estimate: Estimate, scale: float, unit: str) -> Value:
+    mean, sd, low, high = (scale * v for v in (estimate.mean, estimate.sd, *estimate.interval))
+    return number("value", mean, unit, sd=sd, low=low, high=high)
+
+
+def _charts(probe: ProbeResult) -> tuple[Chart, ...]:
+    if not probe.swings:
+        return ()
+    chart = Chart(
+        "provenance-rig-swings",
+        "Pushes of the probe",
+        Axis("time", "ms"),
+        Axis("opening, from where it stood", "mrad"),
+        tuple(
+            series
+            for place, (swing, look) in enumerate(zip(probe.swings, LOOKS, strict=False), start=1)
+            for series in _series(place, swing, look)
+        ),
+        "The strongest pushes of the probe, as the encoder showed them (marks), and as the fitted "
+        "joint goes (lines).",
+    )
+    return (chart,)
+
+
+def _series(place: int, swing: Swing, look: Look) -> tuple[Series, Series]:
+    times = [1e3 * value for value in swing.times_s]
+    name = f"{place}: {1e3 * swing.torque_Nm:+.3g} mN m"
+    places = [1e3 * value for value in swing.places_rad]
+    goes = [1e3 * value for value in swing.model_rad]
+    return points(name, times, places, look), curve(f"{name}, model", times, goes, look)

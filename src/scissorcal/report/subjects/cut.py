@@ -37,8 +37,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.reduce import thinned
-from scissorcal.report.strokes import StrokeSamples, look_of
+from scissorcal.report.strokes import StrokeSamples, look_of, thinned
 
 MOST_DOTS = 400
 MOST_BARS = 24

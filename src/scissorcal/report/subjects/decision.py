@@ -13,13 +13,12 @@ from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.package.scene_torque import SceneTorque
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
-from scissorcal.report.headline import ASSESSMENTS, SAID, Assessment, Headline
 from scissorcal.report.inputs import Cell, Evidence, Geometry
 from scissorcal.report.numbers import finite, percent
 from scissorcal.report.panel import Panel, Row, Value, count, percent_of, words
 from scissorcal.report.strokes import StrokeSamples, kind_word, stroke_label
 from scissorcal.report.subjects.torque import held_out_summary
-from scissorcal.report.subjects.trust import coverage_found
+from scissorcal.report.subjects.trust import ASSESSMENTS, SAID, Assessment, Headline, coverage_found
 from scissorcal.verdicts import Verdict, failed
 
 PART = "decision"

@@ -15,8 +15,7 @@ from scissorcal.calibration.friction.curve import (
 from scissorcal.calibration.result import FitResult
 from scissorcal.report.numbers import finite, finite_each, percent, short, with_unit
 from scissorcal.report.panel import Axis, Chart, Panel, Series, band, curve, points
-from scissorcal.report.reduce import thinned
-from scissorcal.report.strokes import StrokeSamples, channels_of, kind_word, look_of
+from scissorcal.report.strokes import StrokeSamples, channels_of, kind_word, look_of, thinned
 
 MOST_DOTS = 900
 

@@ -29,7 +29,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.reduce import thinned
+from scissorcal.report.strokes import thinned
 
 MOST_PAIRS = 6
 MOST_DOTS = 150

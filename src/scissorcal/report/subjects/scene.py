@@ -24,7 +24,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.reduce import thinned
+from scissorcal.report.strokes import thinned
 
 PART = "scene"
 TITLE = "Rendered torque over the scene"

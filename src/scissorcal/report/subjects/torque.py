@@ -27,16 +27,21 @@ from scissorcal.report.panel import (
     percent_of,
     points,
 )
-from scissorcal.report.reduce import block_means, limits_of, mean, median, rms, thinned
 from scissorcal.report.strokes import (
     BETWEEN,
     KINDS,
     StrokeName,
     StrokeSamples,
+    block_means,
     channels_of,
     kind_word,
+    limits_of,
     look_of,
+    mean,
+    median,
+    rms,
     stroke_label,
+    thinned,
 )
 
 MOST_DOTS = 600
