@@ -60,7 +60,7 @@ class ProvedTable:
         """
         first = np.clip(np.searchsorted(self.high, low, side="left"), 0, len(part) - 1)
         last = np.clip(np.searchsorted(self.low, high, side="right"), 1, len(part))
-        stacked = running_maxima(part)
+        stacked = _running_maxima(part)
         length = np.maximum(last - first, 1)
         level = np.log2(length).astype(np.int64)
         both = stacked[level, first], stacked[level, first + length - 2**level]
@@ -153,7 +153,7 @@ def _second_derivative(
     return index, ends[0], ends[1]
 
 
-def running_maxima(part: Array) -> Array:
+def _running_maxima(part: Array) -> Array:
     """Maxima over 1, 2, 4, ... entries from each on: (levels, n), for maxima of any range."""
     rows = [part]
     while 2 ** len(rows) <= len(part):
@@ -215,7 +215,7 @@ class Profile:
         length = np.maximum(last - first, 1)
         level = np.log2(length).astype(np.int64)
         start, end = first, first + length - 2**level
-        lows, highs = running_maxima(-self.lows), running_maxima(self.highs)
+        lows, highs = _running_maxima(-self.lows), _running_maxima(self.highs)
         return Span(
             -np.maximum(lows[level, start], lows[level, end]),
             np.maximum(highs[level, start], highs[level, end]),

@@ -8,7 +8,7 @@ from scissorcal.package.compile import Compiled, scene_ranges, table_file, table
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.proved_tables import ProvedTable, proved_table, seen_deviation
 from scissorcal.package.proved_torque import proved_torque
-from scissorcal.package.table_record import Bound, TableBound
+from scissorcal.package.records import Bound, TableBound
 from scissorcal.package.tables import TableLaw
 from scissorcal.recipe.schema import Recipe
 

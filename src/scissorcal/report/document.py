@@ -149,7 +149,7 @@ def compose(
         decision.checked_panel(list(named.values()), checks),
         decision.felt_panel(found, why, fits, recipe),
         decision.weaknesses_panel(fits, found, verdicts, cells),
-        verdict_panel(verdicts),
+        _verdict_panel(verdicts),
         every_cell,
         *scene,
         *photographed,
@@ -161,7 +161,7 @@ def compose(
     )
     return ReportDocument(
         FORMAT, created, VERSION, recipe.name, recipe.description, recipe.material.name, origin,
-        scene_facts(recipe), _parts(panels, headlines, keyed), panels, provenance,
+        _scene_facts(recipe), _parts(panels, headlines, keyed), panels, provenance,
         evidence.inputs_hash,
     )  # fmt: skip
 
@@ -170,7 +170,7 @@ def compose_fit(fit: FitResult, recipe: Recipe | None, created: datetime) -> Rep
     """A fit alone; ``recipe`` says what it is of, if that is known."""
     part = fit.what
     panels = (
-        verdict_panel(fit.verdicts),
+        _verdict_panel(fit.verdicts),
         *fit_panels(fit, strokes_of(fit, part, ()), part, Evidence(), None),
     )
     return ReportDocument(
@@ -181,7 +181,7 @@ def compose_fit(fit: FitResult, recipe: Recipe | None, created: datetime) -> Rep
         recipe.description if recipe else "",
         recipe.material.name if recipe else "",
         "unknown",
-        scene_facts(recipe) if recipe else None,
+        _scene_facts(recipe) if recipe else None,
         (),
         panels,
         closing.trace(recipe, {part: fit}, Evidence()),
@@ -218,7 +218,7 @@ def fit_panels(
     )
 
 
-def verdict_panel(verdicts: Sequence[Verdict]) -> Panel:
+def _verdict_panel(verdicts: Sequence[Verdict]) -> Panel:
     """Every verdict, failures first; within an outcome they keep their order."""
     ordered = sorted(map(clean, verdicts), key=lambda verdict: ORDER.index(verdict.status))
     counts = {status: sum(v.status == status for v in ordered) for status in ORDER}
@@ -231,7 +231,7 @@ def verdict_panel(verdicts: Sequence[Verdict]) -> Panel:
     return Panel("verdicts-all", "verdicts", "Every check", sentence, verdicts=tuple(ordered))
 
 
-def scene_facts(recipe: Recipe) -> SceneFacts:
+def _scene_facts(recipe: Recipe) -> SceneFacts:
     """What of a recipe two reports must agree in."""
     return SceneFacts(
         recipe.rig.joint,

@@ -77,7 +77,7 @@ def panels_page(
     body = (
         f'<main><section id="decision" class="plain"><p class="kicker">{escape(kicker)}</p>'
         f"<h1>{prose(heading)}</h1>{f'<dl>{listed}</dl>' if listed else ''}{said}"
-        f"{made_line(when.strftime('%Y-%m-%d %H:%M %Z'), version)}</section>"
+        f"{_made_line(when.strftime('%Y-%m-%d %H:%M %Z'), version)}</section>"
         f"{parts_nav([(panel.id, panel.title) for panel in panels])}"
     )
     for panel in panels:
@@ -145,7 +145,7 @@ def _asset(name: str) -> str:
     return resources.files("scissorcal.report").joinpath("assets", name).read_text("utf-8")
 
 
-def made_line(when: str, version: str) -> str:
+def _made_line(when: str, version: str) -> str:
     """When and by which version a page was made."""
     return f'<p class="meta">Made {escape(when)} by scissorcal {escape(version)}</p>'
 
@@ -154,7 +154,7 @@ def _decision(document: ReportDocument) -> str:
     """The decision page: one screen, one printed page."""
     origin, *others = document.panels_of("decision")
     lead = ". ".join(part for part in (document.material, document.recipe_description) if part)
-    made = made_line(document.created.strftime("%Y-%m-%d %H:%M %Z"), document.scissorcal_version)
+    made = _made_line(document.created.strftime("%Y-%m-%d %H:%M %Z"), document.scissorcal_version)
     cards = "".join(_card(panel) for panel in others)
     return (
         f'<section id="decision" aria-labelledby="report-title"><header><div>'

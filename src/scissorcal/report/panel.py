@@ -283,7 +283,7 @@ def panel_text(panel: Panel) -> str:
       coulomb  0.02130 ± 0.00020
     """
     head = f"{panel.title}: {panel.sentence}" if panel.sentence else panel.title
-    lines = [head, *_rows(panel), *(verdict_line(verdict) for verdict in panel.verdicts)]
+    lines = [head, *_rows(panel), *(_verdict_line(verdict) for verdict in panel.verdicts)]
     lines += [f"  {note}" for note in panel.notes]
     return "\n".join(lines)
 
@@ -295,7 +295,7 @@ def limit_text(verdict: Verdict) -> str:
     return f"{verdict.limit} {short(verdict.threshold)}".strip()
 
 
-def verdict_line(verdict: Verdict) -> str:
+def _verdict_line(verdict: Verdict) -> str:
     """One verdict: outcome, check, value with its limit, reason."""
     check = f"{verdict.scope} {verdict.check}"
     parts = (f"  {MARKS[verdict.status]}", check, verdict.limited, verdict.why)

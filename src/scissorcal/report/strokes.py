@@ -114,7 +114,7 @@ def strokes_of(
         name = StrokeName(
             f"{fit_anchor}-r{recording}-s{label if label >= 0 else 'between'}",
             words,
-            source_of(fit, int(recording)),
+            _source_of(fit, int(recording)),
             int(label),
             stroke.kind,
             finite(stroke.speed),
@@ -124,7 +124,7 @@ def strokes_of(
     return tuple(found)
 
 
-def source_of(fit: FitResult, recording: int) -> str:
+def _source_of(fit: FitResult, recording: int) -> str:
     """The file that a recording's index in the series stands for."""
     if 0 <= recording < len(fit.sources):
         return split_source(fit.sources[recording])[0]

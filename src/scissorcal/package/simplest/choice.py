@@ -118,7 +118,7 @@ def scene_choice(
     result by.
     """
     omitted = [one for one in simplified.walked if one.after is not one.before]
-    times = step_times(simplified.tables, recipe)
+    times = _step_times(simplified.tables, recipe)
     savings = tuple(
         Saving(
             aspect=one.aspect,
@@ -188,7 +188,7 @@ class StepTime:
     ratio: float
 
 
-def step_times(
+def _step_times(
     tables: Sequence[Compiled], recipe: Recipe, repeats: int = REPEATS
 ) -> tuple[StepTime, ...]:
     """Time the kernel's step with each, over a stroke that closes and opens the scene's range.

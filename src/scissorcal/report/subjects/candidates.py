@@ -47,7 +47,7 @@ class Candidate:
         return "✓ used" if self.chosen else "≈ equivalent" if self.equivalent else "✗ worse"
 
 
-def candidates_of(fit: FitResult) -> tuple[Candidate, ...]:
+def _candidates_of(fit: FitResult) -> tuple[Candidate, ...]:
     """Candidates in the fit's order, the simplest first."""
     return tuple(_candidate(entry) for entry in fit.candidates)
 
@@ -55,7 +55,7 @@ def candidates_of(fit: FitResult) -> tuple[Candidate, ...]:
 def candidates_panel(fit: FitResult, part: str) -> Panel:
     """Every candidate with its scores."""
     title, id_ = "Candidate models", f"{part}-candidates"
-    found = candidates_of(fit)
+    found = _candidates_of(fit)
     if not found:
         return absent(id_, part, title, "No candidates were compared.")
     lowest = min((one.bic for one in found if one.bic is not None), default=None)
@@ -85,7 +85,7 @@ def candidates_panel(fit: FitResult, part: str) -> Panel:
 
 def passed_over(fit: FitResult) -> tuple[tuple[str, str], ...]:
     """Candidates that were not chosen, each with what choosing it would change."""
-    found = candidates_of(fit)
+    found = _candidates_of(fit)
     chosen = next((one for one in found if one.chosen), None)
     return tuple((one.name, _cost(one, chosen)) for one in found if not one.chosen)
 

@@ -89,7 +89,7 @@ def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
         )
         for one in headlines
     )
-    overall = overall_assessment(headlines, rig)
+    overall = _overall_assessment(headlines, rig)
     own = [one for one in headlines if one.assessment == overall]
     first = next((one for one in own if one.fit in rig), own[0] if own else None)
     sentence = f"Next: {first.next_steps[0]}" if first and first.next_steps else ""
@@ -105,7 +105,7 @@ def _photographs_passed(one: Headline, rig: Sequence[str]) -> bool:
     return one.fit not in rig and one.assessment == "unverified"
 
 
-def overall_assessment(headlines: Sequence[Headline], rig: Sequence[str]) -> Assessment:
+def _overall_assessment(headlines: Sequence[Headline], rig: Sequence[str]) -> Assessment:
     """The worst assessment; photographs that passed their checks do not lower that of the rig."""
     counted = [h.assessment for h in headlines if not (rig and _photographs_passed(h, rig))]
     return min(counted or ["unverified"], key=ASSESSMENTS.index)

@@ -107,12 +107,12 @@ def group_strokes(fit: FitResult, strokes: Sequence[StrokeSamples]) -> tuple[Tor
     for stroke in strokes:
         grouped.setdefault(_key(fit, stroke.name, pace), []).append(stroke)
     return tuple(
-        TorqueGroup(_title(fit, members), against_of(members[0].name), tuple(members))
+        TorqueGroup(_title(fit, members), _against_of(members[0].name), tuple(members))
         for _, members in sorted(grouped.items())
     )
 
 
-def against_of(name: StrokeName) -> Against:
+def _against_of(name: StrokeName) -> Against:
     """A movement with a direction is shown over opening, any other over time."""
     return "time" if name.label.startswith(BETWEEN) or name.kind == "excitation" else "opening"
 
@@ -217,7 +217,7 @@ def _held_out_chart(fit: FitResult, marks: Sequence[tuple[float, float, str]], i
 
 
 def _key(fit: FitResult, name: StrokeName, pace: Mapping[float, float]) -> tuple[str, float]:
-    if against_of(name) == "time":
+    if _against_of(name) == "time":
         return f"z {name.anchor}", 0.0
     kind = name.kind if fit.what == "cut" else ""
     return kind, np.inf if name.speed is None else pace[name.speed]
@@ -236,7 +236,7 @@ def _common_speeds(speeds: Iterable[Number]) -> dict[float, float]:
 
 def _title(fit: FitResult, members: Sequence[StrokeSamples]) -> str:
     first = members[0].name
-    if against_of(first) == "time":
+    if _against_of(first) == "time":
         return first.label
     kinds = " and ".join(sorted({kind_word(m.name.kind, fit.position_unit) for m in members}))
     if first.speed is None:
@@ -315,7 +315,7 @@ def _drawn(fit: FitResult, stroke: StrokeSamples, against: Against, dots: int) -
 
 
 def _card(fit: FitResult, stroke: StrokeSamples) -> Chart:
-    against = against_of(stroke.name)
+    against = _against_of(stroke.name)
     x, y = _axes(fit, against)
     residual = with_unit(finite(_rms(fit, stroke)), fit.effort_unit, 2)
     series = tuple(
