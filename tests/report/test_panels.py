@@ -9,7 +9,7 @@ from scissorcal.calibration import FitResult
 from scissorcal.recording import Recording, Stroke
 from scissorcal.report.inputs import Cell, Evidence
 from scissorcal.report.panel import LARGEST_WIDTH, Panel, Row, Value, columns, panel_text
-from scissorcal.report.strokes import block_means, strokes_of
+from scissorcal.report.strokes import block_means, group_strokes, strokes_of
 from scissorcal.report.subjects.closing import left_out_panel, trace
 from scissorcal.report.subjects.decision import (
     cells_of,
@@ -19,7 +19,7 @@ from scissorcal.report.subjects.decision import (
     trust_panel,
     weaknesses_panel,
 )
-from scissorcal.report.subjects.torque import group_strokes, torque_panel
+from scissorcal.report.subjects.torque import torque_panel
 from scissorcal.report.subjects.trust import Headline, geometry_headline, write_headline
 from scissorcal.verdicts import Verdict
 from tests.report.conftest import paper
@@ -120,7 +120,7 @@ def test_strokes_are_numbered_on_over_recordings() -> None:
         _summary("b.mcap", "bb", strokes[6:]),
         _summary("elsewhere/a.mcap", "aa", strokes[:6]),
     ]
-    found = [stroke.name for stroke in strokes_of(fit, "cut", halves)]
+    found = list(strokes_of(fit, "cut", halves))
     assert [name.stroke for name in found] == list(range(12))
     assert [name.speed for name in found] == [stroke.speed for stroke in strokes]
     assert found[7].label == "stroke 7, closing at 0.25 rad/s, recording 2"
@@ -140,7 +140,7 @@ def test_samples_of_a_stroke_stand_in_order_of_time() -> None:
 
 
 def test_without_recordings_the_direction_names_a_stroke() -> None:
-    named = [stroke.name for stroke in strokes_of(replace(friction_fit(), held_out=()), "f", [])]
+    named = list(strokes_of(replace(friction_fit(), held_out=()), "f", []))
     assert [name.kind for name in named[:4]] == ["closing", "opening", "closing", "opening"]
     assert all(name.speed is None for name in named)
 
@@ -149,7 +149,7 @@ def test_what_slides_moves_forward_and_backward() -> None:
     fit = linear_fit()
     way = np.where(fit.series.opening_rate > 0, 1, 0).astype(np.int64)
     fit = replace(fit, series=replace(fit.series, stroke=way), held_out=())
-    labels = [stroke.name.label for stroke in strokes_of(fit, "f", [])]
+    labels = [stroke.label for stroke in strokes_of(fit, "f", [])]
     assert labels == ["stroke 0, backward", "stroke 1, forward"]
 
 

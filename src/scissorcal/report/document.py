@@ -15,7 +15,7 @@ from scissorcal.recipe.requirements import GeometryKind, requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report.inputs import Evidence, Geometry
 from scissorcal.report.panel import Panel, absent, clean
-from scissorcal.report.strokes import StrokeSamples, strokes_of
+from scissorcal.report.strokes import FittedStroke, strokes_of
 from scissorcal.report.subjects import candidates, closing, cut, decision, posterior, torque
 from scissorcal.report.subjects.blade import blade_panels
 from scissorcal.report.subjects.camera import camera_panels
@@ -190,7 +190,7 @@ def compose_fit(fit: FitResult, recipe: Recipe | None, created: datetime) -> Rep
 
 def fit_panels(
     fit: FitResult,
-    strokes: tuple[StrokeSamples, ...],
+    strokes: tuple[FittedStroke, ...],
     part: str,
     evidence: Evidence,
     friction: FitResult | None,

@@ -1,8 +1,9 @@
 """Which samples of a fit belong to which stroke, and the words and units of its channels."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,9 @@ LOOKS: dict[str, Look] = {
 }
 """Each kind of stroke has colour and mark of a name (doi:10.1038/nmeth.1618)."""
 BETWEEN = "between strokes"
+SAME_SPEED = 0.05
+
+Against = Literal["opening", "time"]
 
 
 @dataclass(frozen=True)
@@ -68,12 +72,13 @@ def look_of(kind: str) -> Look:
 
 
 @dataclass(frozen=True)
-class StrokeName:
-    """A stroke's identity: ``anchor`` is its address on the page, ``label`` its name in words.
+class FittedStroke:
+    """A stroke of a fit, with its ``places`` in the fit's series, (n,), in order of time.
 
-    ``recording`` is the file that the fit names; ``stroke`` the number that the fit gives, which
-    counts on over its recordings; ``speed`` the planned rate's magnitude in the fit's position
-    unit per second, None where the stroke has no planned or no single speed.
+    ``anchor`` is its address on the page, ``label`` its name in words, ``recording`` the file that
+    the fit names, ``stroke`` the number that the fit gives, which counts on over its recordings;
+    ``speed`` is the planned rate's magnitude in the fit's position unit per second, None where the
+    stroke has no planned or no single speed.
     """
 
     anchor: str
@@ -83,19 +88,36 @@ class StrokeName:
     kind: str
     speed: Number
     sheet: int
+    places: NDArray[np.int64]
+
+    @property
+    def against(self) -> Against:
+        """What it is shown over: a movement with a direction over opening, any other over time."""
+        between = self.label.startswith(BETWEEN) or self.kind == "excitation"
+        return "time" if between else "opening"
 
 
 @dataclass(frozen=True)
-class StrokeSamples:
-    """A stroke's name and its places in the fit's series, shape (n,), in order of time."""
+class TorqueGroup:
+    """Strokes that are shown together: all closing and opening at one speed, say."""
 
-    name: StrokeName
-    places: NDArray[np.int64]
+    title: str
+    strokes: tuple[FittedStroke, ...]
+
+    @property
+    def against(self) -> Against:
+        """What its strokes are shown over."""
+        return self.strokes[0].against
+
+    @property
+    def places(self) -> NDArray[np.int64]:
+        """Places of all its strokes in the fit's series."""
+        return np.concatenate([stroke.places for stroke in self.strokes])
 
 
 def strokes_of(
     fit: FitResult, fit_anchor: str, recordings: Sequence[Recording]
-) -> tuple[StrokeSamples, ...]:
+) -> tuple[FittedStroke, ...]:
     """Part a fit's series into strokes, in order of recording and stroke."""
     series = fit.series
     if len(series.stroke) == 0:
@@ -111,17 +133,30 @@ def strokes_of(
         words = stroke_label(stroke, int(label), fit.position_unit)
         if several:
             words += f", recording {recording + 1}"
-        name = StrokeName(
-            f"{fit_anchor}-r{recording}-s{label if label >= 0 else 'between'}",
-            words,
-            _source_of(fit, int(recording)),
-            int(label),
-            stroke.kind,
-            finite(stroke.speed),
-            stroke.sheet,
+        found.append(
+            FittedStroke(
+                f"{fit_anchor}-r{recording}-s{label if label >= 0 else 'between'}",
+                words,
+                _source_of(fit, int(recording)),
+                int(label),
+                stroke.kind,
+                finite(stroke.speed),
+                stroke.sheet,
+                places,
+            )
         )
-        found.append(StrokeSamples(name, places))
     return tuple(found)
+
+
+def group_strokes(fit: FitResult, strokes: Sequence[FittedStroke]) -> tuple[TorqueGroup, ...]:
+    """Group strokes by speed (those of a cut also by kind); an excitation stands alone."""
+    grouped: dict[tuple[str, float], list[FittedStroke]] = {}
+    pace = _common_speeds([stroke.speed for stroke in strokes])
+    for stroke in strokes:
+        grouped.setdefault(_key(fit, stroke, pace), []).append(stroke)
+    return tuple(
+        TorqueGroup(_title(fit, members), tuple(members)) for _, members in sorted(grouped.items())
+    )
 
 
 def _source_of(fit: FitResult, recording: int) -> str:
@@ -178,6 +213,35 @@ def recording_of(source: str, recordings: Sequence[Recording]) -> Recording | No
         ):
             return recording
     return None
+
+
+def _key(fit: FitResult, stroke: FittedStroke, pace: Mapping[float, float]) -> tuple[str, float]:
+    if stroke.against == "time":
+        return f"z {stroke.anchor}", 0.0
+    kind = stroke.kind if fit.what == "cut" else ""
+    return kind, np.inf if stroke.speed is None else pace[stroke.speed]
+
+
+def _common_speeds(speeds: Iterable[Number]) -> dict[float, float]:
+    """Each speed with the slowest of those that are nearly the same, within ``SAME_SPEED``."""
+    common: dict[float, float] = {}
+    slowest = -np.inf
+    for speed in sorted({speed for speed in speeds if speed is not None}):
+        if speed > (1.0 + SAME_SPEED) * slowest:
+            slowest = speed
+        common[speed] = slowest
+    return common
+
+
+def _title(fit: FitResult, members: Sequence[FittedStroke]) -> str:
+    first = members[0]
+    if first.against == "time":
+        return first.label
+    kinds = " and ".join(sorted({kind_word(m.kind, fit.position_unit) for m in members}))
+    if first.speed is None:
+        return f"{kinds}, no planned speed"
+    speed = median(np.array([member.speed or np.nan for member in members]))
+    return f"{kinds} at {short(speed)} {fit.position_unit}/s"
 
 
 def _planned_strokes(fit: FitResult, recordings: Sequence[Recording]) -> dict[int, Stroke]:

@@ -22,7 +22,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.strokes import StrokeSamples, median
+from scissorcal.report.strokes import FittedStroke, median
 
 SAME_WITHIN = 1e-3
 
@@ -123,7 +123,7 @@ def critic_panel(fit: FitResult, part: str) -> Panel:
     return Panel(id_, part, title, sentence, rows, notes=(note,))
 
 
-def replay_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
+def replay_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> Panel:
     """Errors of replaying one stroke and of the model, by unseen stroke."""
     title, id_ = "Replay of one recorded stroke", f"{part}-replay"
     replay = fit.replay
@@ -133,7 +133,7 @@ def replay_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) ->
             f"{fit.words} --force` makes it where there are strokes to compare."
         )
         return absent(id_, part, title, why)
-    names = {(one.name.stroke, one.name.recording): one.name for one in strokes}
+    names = {(stroke.stroke, stroke.recording): stroke for stroke in strokes}
     rows = []
     for one in replay.rows:
         name = names.get((one.stroke, one.recording))

@@ -37,7 +37,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.strokes import StrokeSamples, look_of, thinned
+from scissorcal.report.strokes import FittedStroke, look_of, thinned
 
 MOST_DOTS = 400
 MOST_BARS = 24
@@ -110,12 +110,12 @@ def work_panel(
     fit: FitResult,
     friction: FitResult | None,
     recordings: Sequence[Recording],
-    strokes: Sequence[StrokeSamples],
+    strokes: Sequence[FittedStroke],
     part: str,
 ) -> Panel:
     """Measured fracture work of each stroke against what the fit expects of it."""
     title, id_ = "Fracture work by stroke", f"{part}-work"
-    names = {one.name.stroke: one.name for one in strokes if one.name.kind != "opening"}
+    names = {stroke.stroke: stroke for stroke in strokes if stroke.kind != "opening"}
     try:
         found = fracture_work(
             fit, friction, [r for r in recordings if len(r.samples)], sorted(names)
@@ -207,7 +207,7 @@ def _work_chart(found: Sequence[StrokeWork], names: dict, id_: str) -> Chart:  #
     )
 
 
-def edge_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
+def edge_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> Panel:
     """Measured over modelled force by place along the edge."""
     title, id_ = "Force along the blade", f"{part}-edge"
     try:

@@ -16,7 +16,7 @@ from scissorcal.recording.recording import Recording
 from scissorcal.report.inputs import Cell, Evidence, Geometry
 from scissorcal.report.numbers import finite, percent
 from scissorcal.report.panel import Panel, Row, Value, count, percent_of, words
-from scissorcal.report.strokes import StrokeSamples, kind_word, stroke_label
+from scissorcal.report.strokes import FittedStroke, kind_word, stroke_label
 from scissorcal.report.subjects.torque import held_out_summary
 from scissorcal.report.subjects.trust import ASSESSMENTS, SAID, Assessment, Headline, coverage_found
 from scissorcal.verdicts import Verdict, failed
@@ -112,7 +112,7 @@ def _overall_assessment(headlines: Sequence[Headline], rig: Sequence[str]) -> As
 
 
 def cells_of(
-    fits: Sequence[tuple[FitResult, Sequence[StrokeSamples]]], evidence: Evidence
+    fits: Sequence[tuple[FitResult, Sequence[FittedStroke]]], evidence: Evidence
 ) -> tuple[Cell, ...]:
     """What was counted by cells of motion, where it was; else strokes; and photographs by fit.
 
@@ -125,7 +125,7 @@ def cells_of(
     for fit, strokes in fits:
         if fit.what in counted:
             continue
-        used = {stroke.name.stroke for stroke in strokes if len(stroke.places)}
+        used = {stroke.stroke for stroke in strokes if len(stroke.places)}
         planned: dict[str, list[int]] = {}
         recorded: set[int] = set()
         number = 0
