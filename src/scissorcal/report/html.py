@@ -15,7 +15,6 @@ from scissorcal.report.pictures import (
     PAGE_BYTES,
     PICTURE_BYTES,
     Image,
-    PictureFile,
     place_pictures,
 )
 from scissorcal.report.signature_block import SIGNATURE, signature_block
@@ -24,6 +23,7 @@ from scissorcal.verdicts import Verdict
 
 if TYPE_CHECKING:
     from datetime import datetime
+    from pathlib import Path
 
     from scissorcal.report.document import ReportDocument
     from scissorcal.report.inputs import Geometry
@@ -44,10 +44,10 @@ def report_page(document: ReportDocument, geometry: Geometry) -> str:
     """Write the page with as many pictures as it can carry and stay below `PAGE_BYTES`."""
     page = _report(document)
     shown = [(panel.part, picture) for panel in document.panels for picture in panel.pictures]
-    files: dict[str, list[PictureFile]] = {}
+    files: dict[str, list[tuple[Path, int]]] = {}
     for part, picture in shown:
         paths = (path for path in geometry.pictures.get(part, ()) if path.name == picture.file)  # type: ignore[call-overload]
-        files.setdefault(part, []).append(PictureFile(next(paths), picture.widest_px))
+        files.setdefault(part, []).append((next(paths), picture.widest_px))
     # the words around pictures take room too: some hundred bytes each
     room = min(PAGE_BYTES - len(page.encode()) - 1000 * len(shown), PICTURE_BYTES)
     images = {part: iter(own) for part, own in place_pictures(files, room).items()}

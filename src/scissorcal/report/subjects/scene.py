@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scissorcal.calibration.result import FitResult
-from scissorcal.package.scene_torque import Along, Places, SceneTorque, Slice
+from scissorcal.package.scene_torque import Along, Places, SceneTorque
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report.numbers import finite, percent, short, with_unit
 from scissorcal.report.panel import (
@@ -54,7 +54,12 @@ def scene_panels(
         "where the model extrapolates. Marks are measured: they lie off the line by their "
         "difference from the model where they were taken."
     )
-    rows = tuple(_slice_row(one) for one in found.slices if np.any(np.isfinite(one.places.torque)))
+    rows = tuple(
+        _slice_row(along, places)
+        for along, slices in found.slices.items()
+        for places in slices
+        if np.any(np.isfinite(places.torque))
+    )
     torque = Panel(
         "scene-torque", PART, TITLE, scene_sentence(found), rows,
         (*charts, _support(found)), notes=(note,), caption="The slices that are drawn.",
@@ -97,30 +102,29 @@ def _held(places: Places, at: int, without: tuple[Along, ...]) -> str:
     return ", ".join(said)
 
 
-def _slice_row(one: Slice) -> Row:
-    torque = one.places.torque
+def _slice_row(along: Along, places: Places) -> Row:
+    torque = places.torque
     at = int(np.nanargmax(np.abs(torque)))
-    half = 0.5 * (one.places.high[at] - one.places.low[at])
+    half = 0.5 * (places.high[at] - places.low[at])
     return Row(
-        f"over {AXES[one.along][0]}, {_held(one.places, at, (one.along,))}",
+        f"over {AXES[along][0]}, {_held(places, at, (along,))}",
         (
             number("largest torque", torque[at], "N m"),
             percent_of("band there, ±", half / abs(torque[at]) if torque[at] else None),
-            percent_of("has data", float(np.mean(one.places.supported))),
+            percent_of("has data", float(np.mean(places.supported))),
         ),
     )
 
 
 def _along(found: SceneTorque, along: Along, recipe: Recipe, cut: FitResult) -> Chart:
     name, unit, scale = AXES[along]
-    slices = [one for one in found.slices if one.along == along]
+    slices = found.slices[along]
     series: list[Series] = []
     shown: Along = "contact" if along == "opening" else "opening"
-    for one, look in zip(slices, LOOKS, strict=True):
-        places = one.places
+    for places, look in zip(slices, LOOKS, strict=True):
         x = scale * getattr(places, along)
         label = _label(places, shown)
-        series.append(_marks(one, along, recipe, cut, look, label))
+        series.append(_marks(places, along, recipe, cut, look, label))
         for way in (x < 0, x >= 0) if along == "opening_rate" else (np.ones(len(x), bool),):
             full = np.where(places.supported, places.torque, np.nan)
             ends = (places.low[way], places.high[way])
@@ -128,7 +132,7 @@ def _along(found: SceneTorque, along: Along, recipe: Recipe, cut: FitResult) -> 
             beyond = curve(f"without data, {label}", x[way], places.torque[way], look,
                            style="dashed", group=label)  # fmt: skip
             series += [beyond, curve(label, x[way], full[way], look, group=label, toggle=True)]
-    held = slices[0].places
+    held = slices[0]
     at = (
         f"contact {short(1e3 * float(held.contact[0]))} mm, or where the crack stands"
         if along == "opening_rate"
@@ -149,10 +153,10 @@ def _label(places: Places, shown: Along) -> str:
 
 
 def _marks(
-    one: Slice, along: Along, recipe: Recipe, cut: FitResult, look: Look, label: str
+    places: Places, along: Along, recipe: Recipe, cut: FitResult, look: Look, label: str
 ) -> Series:
     """Measured minus model of samples near a slice, set on the slice."""
-    series, scene, places = cut.series, recipe.scene, one.places
+    series, scene = cut.series, recipe.scene
     near = np.isfinite(series.measured) & np.isfinite(series.predicted)
     for name, span in (("opening", scene.opening_rad), ("contact", scene.contact_m)):
         if name != along:
