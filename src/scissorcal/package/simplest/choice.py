@@ -15,11 +15,11 @@ from pydantic import Field
 from scissorcal.calibration.result import FitResult
 from scissorcal.kernel import Kernel
 from scissorcal.package.compile import Compiled, kernel_tables, scene_ranges
+from scissorcal.package.records import Section
 from scissorcal.package.simplest.model import Simplified
 from scissorcal.package.simplest.record import (
     AspectRecord,
     NonNegative,
-    Record,
     Simplification,
     TriedCandidate,
 )
@@ -28,7 +28,7 @@ from scissorcal.recipe.schema import Recipe
 FORMAT: Literal["scissorcal-scene-choice/1"] = "scissorcal-scene-choice/1"
 
 
-class Saving(Record):
+class Saving(Section):
     """What one omission saves besides bytes.
 
     ``step_ns`` is how much less a step of the kernel takes (below 0: more), as measured.
@@ -40,7 +40,7 @@ class Saving(Record):
     capture_s: NonNegative
 
 
-class SceneChoice(Record):
+class SceneChoice(Section):
     """The record of a simplification with what it saves, as measured when this was written.
 
     Times of a step (ns, median of repeats) are of the tables of the fitted laws and of those used,
