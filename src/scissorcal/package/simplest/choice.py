@@ -15,11 +15,10 @@ from pydantic import Field
 from scissorcal.calibration.result import FitResult
 from scissorcal.kernel import Kernel
 from scissorcal.package.compile import Compiled, kernel_tables, scene_ranges
-from scissorcal.package.records import Section
+from scissorcal.package.records import NonNegative, Section
 from scissorcal.package.simplest.model import Simplified
 from scissorcal.package.simplest.record import (
     AspectRecord,
-    NonNegative,
     Simplification,
     TriedCandidate,
 )
