@@ -89,21 +89,21 @@ def document_of_fit(fit: FitResult, recipe: Recipe | None) -> ReportDocument:
     return compose_fit(fit, recipe, datetime.now(UTC))
 
 
-def write_comparison(found: Comparison, output_dir: str | os.PathLike[str]) -> ReportFiles:
+def write_comparison(comparison: Comparison, output_dir: str | os.PathLike[str]) -> ReportFiles:
     """Write ``comparison.html`` and ``comparison.json``; InputError where that cannot be done."""
     from scissorcal.report.html import panels_page
 
     folder = Path(output_dir)
-    files = ReportFiles(folder / "comparison.html", folder / "comparison.json", found)
+    files = ReportFiles(folder / "comparison.html", folder / "comparison.json", comparison)
     page = panels_page(
         "Comparison of two runs",
         "A and B",
-        found.panels,
-        made=(found.created, found.scissorcal_version),
-        facts={"A": found.first, "B": found.second},
-        findings=(found.sentence,),
+        comparison.panels,
+        made=(comparison.created, comparison.scissorcal_version),
+        facts={"A": comparison.first, "B": comparison.second},
+        findings=(comparison.sentence,),
     )
-    _write_both(files, page, twin_text(found))
+    _write_both(files, page, twin_text(comparison))
     return files
 
 

@@ -112,19 +112,19 @@ def compose(
         Headline(kind, "care", f"The {kind} fit is not there yet.", "not there yet", (why,))
         for kind, why in missing.items()
     ]
-    own: list[Panel] = []
+    fit_parts: list[Panel] = []
     for part, fit in keyed.items():
         check = checks.get(fit.what) if named[fit.what] is fit else None
         headlines.append(write_headline(fit, check.verdicts if check else ()))
-        own.append(_outcome(headlines[-1], part))
-        own += fit_panels(fit, strokes[part], part, evidence, named.get("friction"))
-        own += trust_panels(fit, check, part)
-    found, why = _scene(recipe, named)
+        fit_parts.append(_outcome(headlines[-1], part))
+        fit_parts += fit_panels(fit, strokes[part], part, evidence, named.get("friction"))
+        fit_parts += trust_panels(fit, check, part)
+    rendered, why = _scene(recipe, named)
     opens = (fit.position_unit == "m" for fit in fits if fit.what != "friction-advance")
     sliding = recipe.rig.joint == "linear" or any(opens)
     if sliding:
-        found, why = None, "A sliding joint carries no blades, so nothing is felt."
-    scene = [] if sliding or not fits else scene_panels(found, why, recipe, named.get("cut"))
+        rendered, why = None, "A sliding joint carries no blades, so nothing is felt."
+    scene = [] if sliding or not fits else scene_panels(rendered, why, recipe, named.get("cut"))
     if evidence.choice is not None:
         scene = [*scene, simplest_panel(evidence.choice, list(named.values()))]
     if recipe.rig.edge.points_mm is not None and not sliding:
@@ -147,13 +147,13 @@ def compose(
         decision.trust_panel(headlines, list(named)),
         totals,
         decision.checked_panel(list(named.values()), checks),
-        decision.felt_panel(found, why, fits, recipe),
-        decision.weaknesses_panel(fits, found, verdicts, cells),
+        decision.felt_panel(rendered, why, fits, recipe),
+        decision.weaknesses_panel(fits, rendered, verdicts, cells),
         _verdict_panel(verdicts),
         every_cell,
         *scene,
         *photographed,
-        *own,
+        *fit_parts,
         *evidence.panels,
         closing.left_out_panel(recipe, fits, dict(missing.items())),
         closing.provenance_panel(provenance, evidence.recordings),
@@ -320,9 +320,9 @@ def _parts(
     for part, fit in fits.items():
         again = f" {part.rpartition('-')[2]}" if part != fit.what else ""
         titles[part] = f"{fit.what.capitalize()} fit{again}: {fit.candidate}, {fit.effort} effort"
-    found = []
+    parts = []
     for part in dict.fromkeys(p.part for p in panels if p.part != decision.PART):
         first = next(panel for panel in panels if panel.part == part)
         sentence = said.get(part) or first.sentence
-        found.append(Part(part, titles.get(part, first.title), sentence))
-    return tuple(found)
+        parts.append(Part(part, titles.get(part, first.title), sentence))
+    return tuple(parts)

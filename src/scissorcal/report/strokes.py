@@ -125,7 +125,7 @@ def strokes_of(
     keys = np.unique(np.stack([series.recording, series.stroke]), axis=1).T
     planned = _planned_strokes(fit, recordings)
     several = len({int(recording) for recording, _ in keys}) > 1
-    found = []
+    strokes = []
     for recording, label in keys:
         places = np.flatnonzero((series.recording == recording) & (series.stroke == label))
         places = places[np.argsort(series.time_s[places], kind="stable")]
@@ -133,7 +133,7 @@ def strokes_of(
         words = stroke_label(stroke, int(label), fit.position_unit)
         if several:
             words += f", recording {recording + 1}"
-        found.append(
+        strokes.append(
             FittedStroke(
                 f"{fit_anchor}-r{recording}-s{label if label >= 0 else 'between'}",
                 words,
@@ -145,7 +145,7 @@ def strokes_of(
                 places,
             )
         )
-    return tuple(found)
+    return tuple(strokes)
 
 
 def group_strokes(fit: FitResult, strokes: Sequence[FittedStroke]) -> tuple[TorqueGroup, ...]:

@@ -49,7 +49,7 @@ PHOTOGRAPHS_PASSED = "✓ checks passed"
 
 def origin_of(recordings: Sequence[Recording]) -> Origin:
     """Whether recordings come from a simulator, as their devices state it."""
-    flags = {_simulated(one) for one in recordings} - {None}
+    flags = {_simulated(recording) for recording in recordings} - {None}
     if len(flags) != 1:
         return "mixed" if flags else "unknown"
     return "simulated" if flags.pop() else "real"
@@ -64,7 +64,7 @@ def origin_panel(origin: Origin, recordings: Sequence[Recording]) -> Panel:
         "mixed": "Some recordings come from a virtual rig and some from a real one.",
         "unknown": "No recording states the device that it comes from.",
     }[origin]
-    silent = sum(_simulated(one) is None for one in recordings)
+    silent = sum(_simulated(recording) is None for recording in recordings)
     if silent and origin != "unknown":
         said += f" {silent} of {len(recordings)} recordings do not state it."
     names = sorted({str(r.device["serial"]) for r in recordings if r.device.get("serial")})
@@ -82,27 +82,29 @@ def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
     """The overall outcome, and one row per fit; ``rig`` names the fits of recordings."""
     rows = tuple(
         Row(
-            one.fit,
-            (words("decision", _decision(one, rig)), words("why", one.brief)),
-            link=one.fit,
-            marked=one.assessment in {"reject", "care"},
+            headline.fit,
+            (words("decision", _decision(headline, rig)), words("why", headline.brief)),
+            link=headline.fit,
+            marked=headline.assessment in {"reject", "care"},
         )
-        for one in headlines
+        for headline in headlines
     )
     overall = _overall_assessment(headlines, rig)
-    own = [one for one in headlines if one.assessment == overall]
-    first = next((one for one in own if one.fit in rig), own[0] if own else None)
+    worst = [headline for headline in headlines if headline.assessment == overall]
+    first = next(
+        (headline for headline in worst if headline.fit in rig), worst[0] if worst else None
+    )
     sentence = f"Next: {first.next_steps[0]}" if first and first.next_steps else ""
     title = "Checks passed" if first and _photographs_passed(first, rig) else OUTCOMES[overall]
     return Panel(f"{PART}-trust", PART, title, sentence, rows)
 
 
-def _decision(one: Headline, rig: Sequence[str]) -> str:
-    return PHOTOGRAPHS_PASSED if _photographs_passed(one, rig) else SAID[one.assessment]
+def _decision(headline: Headline, rig: Sequence[str]) -> str:
+    return PHOTOGRAPHS_PASSED if _photographs_passed(headline, rig) else SAID[headline.assessment]
 
 
-def _photographs_passed(one: Headline, rig: Sequence[str]) -> bool:
-    return one.fit not in rig and one.assessment == "unverified"
+def _photographs_passed(headline: Headline, rig: Sequence[str]) -> bool:
+    return headline.fit not in rig and headline.assessment == "unverified"
 
 
 def _overall_assessment(headlines: Sequence[Headline], rig: Sequence[str]) -> Assessment:
@@ -149,22 +151,22 @@ def cells_of(
 
 
 def _photographs(geometry: Geometry) -> list[Cell]:
-    found = []
+    cells = []
     for what, fit in geometry.fits.items():
         views = getattr(fit, "views", None)
         if views is None:
             views = {view.source for blade in fit.blades for view in blade.photographs}  # type: ignore[union-attr]
         if fit.sources:
-            found.append(Cell(what, "all", None, len(fit.sources), len(views), "photographs"))
-    return found
+            cells.append(Cell(what, "all", None, len(fit.sources), len(views), "photographs"))
+    return cells
 
 
 def data_panels(cells: Sequence[Cell]) -> tuple[Panel, Panel]:
     """Totals per capture with the incomplete cells, for the decision page; and every cell."""
     rows = []
     for capture, unit in dict.fromkeys((cell.capture, cell.unit) for cell in cells):
-        own = [cell for cell in cells if (cell.capture, cell.unit) == (capture, unit)]
-        rows.append(Row(f"{capture} {unit}", _counts(own), link="data"))
+        counted = [cell for cell in cells if (cell.capture, cell.unit) == (capture, unit)]
+        rows.append(Row(f"{capture} {unit}", _counts(counted), link="data"))
     said = []
     for head, odd in (
         ("Incomplete", [cell for cell in cells if cell.incomplete]),
@@ -231,14 +233,14 @@ def _outcome(check: VerifyResult) -> str:
 
 
 def felt_panel(
-    found: SceneTorque | None, why: str, fits: Sequence[FitResult], recipe: Recipe
+    torque: SceneTorque | None, why: str, fits: Sequence[FitResult], recipe: Recipe
 ) -> Panel:
     """What is uncertain of the torque that is felt, as a share of it, against the tolerance."""
     tolerance = f"tolerance {percent(recipe.scene.tolerance_percent / 100)}"
     rows = []
     sentence = why
-    if found is not None:
-        share = found.share[np.isfinite(found.share)]
+    if torque is not None:
+        share = torque.share[np.isfinite(torque.share)]
         middle, worst = (
             (float(np.median(share)), float(share.max())) if len(share) else (None, None)
         )
@@ -250,7 +252,7 @@ def felt_panel(
         )
         sentence = (
             f"± {percent(middle)} of the scene's torque (median place; worst ± {percent(worst)}), "
-            f"{tolerance}: {percent(finite(found.within_tolerance))} of the places are within it."
+            f"{tolerance}: {percent(finite(torque.within_tolerance))} of the places are within it."
         )
     for fit in fits:
         middle, worst = held_out_summary(fit)
@@ -262,7 +264,7 @@ def felt_panel(
 
 def weaknesses_panel(
     fits: Sequence[FitResult],
-    found: SceneTorque | None,
+    torque: SceneTorque | None,
     verdicts: Sequence[Verdict] = (),
     cells: Sequence[Cell] = (),
 ) -> Panel:
@@ -279,10 +281,10 @@ def weaknesses_panel(
         for fit in fits
         for caveat in caveats_of(fit)
     ]
-    if found is not None:
+    if torque is not None:
         notes += [
             f"Not measured, and not in the band: {name}, up to {percent(share)} of the mean torque."
-            for name, share in found.not_in_band
+            for name, share in torque.not_in_band
         ]
     sentence = "" if notes else NO_WEAKNESS
     title = "Known weaknesses of this fit"

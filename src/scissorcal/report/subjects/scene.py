@@ -41,53 +41,53 @@ AXES: dict[Along, tuple[str, str, float]] = {
 
 
 def scene_panels(
-    found: SceneTorque | None, why: str, recipe: Recipe, cut: FitResult | None
+    rendered: SceneTorque | None, why: str, recipe: Recipe, cut: FitResult | None
 ) -> tuple[Panel, ...]:
     """The slices with the map of support, and the torque at every place of the grid."""
-    if found is None or cut is None:
+    if rendered is None or cut is None:
         return (absent("scene-torque", PART, TITLE, why),)
-    charts = tuple(_along(found, along, recipe, cut) for along in AXES)
-    friction = "with friction, as the scene asks" if found.with_friction else "without friction"
+    charts = tuple(_along(rendered, along, recipe, cut) for along in AXES)
+    friction = "with friction, as the scene asks" if rendered.with_friction else "without friction"
     note = (
         f"What a loop would render from these fits, {friction}. The shade holds it with "
-        f"{percent(found.confidence)} probability. Lines are full where data lie nearby and dashed "
-        "where the model extrapolates. Marks are measured: they lie off the line by their "
+        f"{percent(rendered.confidence)} probability. Lines are full where data lie nearby and "
+        "dashed where the model extrapolates. Marks are measured: they lie off the line by their "
         "difference from the model where they were taken."
     )
     rows = tuple(
         _slice_row(along, places)
-        for along, slices in found.slices.items()
+        for along, slices in rendered.slices.items()
         for places in slices
         if np.any(np.isfinite(places.torque))
     )
     torque = Panel(
-        "scene-torque", PART, TITLE, scene_sentence(found), rows,
-        (*charts, _support(found)), notes=(note,), caption="The slices that are drawn.",
+        "scene-torque", PART, TITLE, scene_sentence(rendered), rows,
+        (*charts, _support(rendered)), notes=(note,), caption="The slices that are drawn.",
     )  # fmt: skip
-    return torque, _grid_panel(found)
+    return torque, _grid_panel(rendered)
 
 
-def scene_sentence(found: SceneTorque) -> str:
+def scene_sentence(scene: SceneTorque) -> str:
     """How well the torque is known over the scene, in words."""
     said = [
-        f"The torque is known to within the tolerance of {percent(found.tolerance)} (with "
-        f"{percent(found.confidence)} probability) at {percent(found.within_tolerance)} of the "
-        f"places that can be felt; {percent(found.supported)} of them have data nearby."
+        f"The torque is known to within the tolerance of {percent(scene.tolerance)} (with "
+        f"{percent(scene.confidence)} probability) at {percent(scene.within_tolerance)} of the "
+        f"places that can be felt; {percent(scene.supported)} of them have data nearby."
     ]
-    at = found.worst
+    at = scene.worst
     if at is not None:
-        grid = found.grid
+        grid = scene.grid
         said.append(
             f"It is least certain at {_held(grid, at, ())}: "
-            f"{with_unit(finite(grid.torque[at]), 'N m')} ± {percent(found.share[at])}."
+            f"{with_unit(finite(grid.torque[at]), 'N m')} ± {percent(scene.share[at])}."
         )
-    if found.not_in_band:
-        named = ", ".join(f"{name} up to {percent(share)}" for name, share in found.not_in_band)
+    if scene.not_in_band:
+        named = ", ".join(f"{name} up to {percent(share)}" for name, share in scene.not_in_band)
         said.append(
             f"The band does not include what was not measured, as shares of the mean torque: "
             f"{named}. The verdicts say what to measure."
         )
-    said += found.beyond_data
+    said += scene.beyond_data
     return " ".join(said)
 
 
@@ -116,9 +116,9 @@ def _slice_row(along: Along, places: Places) -> Row:
     )
 
 
-def _along(found: SceneTorque, along: Along, recipe: Recipe, cut: FitResult) -> Chart:
+def _along(scene: SceneTorque, along: Along, recipe: Recipe, cut: FitResult) -> Chart:
     name, unit, scale = AXES[along]
-    slices = found.slices[along]
+    slices = scene.slices[along]
     series: list[Series] = []
     shown: Along = "contact" if along == "opening" else "opening"
     for places, look in zip(slices, LOOKS, strict=True):
@@ -171,14 +171,14 @@ def _marks(
     return points(f"measured, {label}", AXES[along][2] * where, line + offset, look, group=label)
 
 
-def _support(found: SceneTorque) -> Chart:
+def _support(scene: SceneTorque) -> Chart:
     """Where data support the torque of a closing motion, at one rate of the grid."""
-    grid = found.grid
+    grid = scene.grid
     rates = np.unique(grid.opening_rate)
     pace = rates[len(rates) // 4]
     here = grid.opening_rate == pace
-    share, known = found.share[here], np.isfinite(grid.torque[here])
-    wide = known & (share > found.tolerance)
+    share, known = scene.share[here], np.isfinite(grid.torque[here])
+    wide = known & (share > scene.tolerance)
     touching, supported = grid.touching[here], grid.supported[here]
     x, y = DEGREES * grid.opening[here], 1e3 * grid.contact[here]
     kinds: tuple[tuple[str, np.ndarray, Look, Style], ...] = (
@@ -200,8 +200,8 @@ def _support(found: SceneTorque) -> Chart:
     return Chart("scene-support", "Where data support the torque", *axes, series, caption)
 
 
-def _grid_panel(found: SceneTorque) -> Panel:
-    grid = found.grid
+def _grid_panel(scene: SceneTorque) -> Panel:
+    grid = scene.grid
     rows = []
     for at in np.flatnonzero(np.isfinite(grid.torque)):
         nearby = "yes" if grid.supported[at] else "no"
@@ -217,6 +217,6 @@ def _grid_panel(found: SceneTorque) -> Panel:
         )
     caption = (
         f"Torque at each place of a grid over the scene, with the interval that holds it with "
-        f"{percent(found.confidence)} probability. Negative rates close."
+        f"{percent(scene.confidence)} probability. Negative rates close."
     )
     return Panel("scene-grid", PART, "Rendered torque by place", rows=tuple(rows), caption=caption)

@@ -200,5 +200,7 @@ def _aspect_row(row: AspectRecord, choice: SceneChoice) -> Row:
             count("evaluations of its fit", choice.evaluations.get(what)),
             count("candidates compared", choice.candidates.get(what)),
         ]
-    tried = "; ".join(f"{one.name} {one.verdict} ({one.cost.words})" for one in row.tried)
+    tried = "; ".join(
+        f"{candidate.name} {candidate.verdict} ({candidate.cost.words})" for candidate in row.tried
+    )
     return Row(row.aspect, tuple(values), note=tried, marked=row.omitted)
