@@ -19,7 +19,8 @@ import cv2
 import numpy as np
 from benchmarks.photographs import Glare, GlaringLayer, centreline_turn, random_looks
 
-from scissorcal.calibration.edge.fit import BladeFit, fit_blade
+from scissorcal.calibration.edge.fit import fit_blade
+from scissorcal.calibration.edge.result import BladeFit
 from scissorcal.errors import InputError
 from scissorcal.vision.blade.photo import BladePhoto, photograph_blade
 from scissorcal.vision.geometry.camera import Camera

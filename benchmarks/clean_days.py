@@ -21,6 +21,7 @@ import sys
 import tempfile
 import warnings
 from collections import defaultdict
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -202,7 +203,7 @@ def tabulated(rows: list[Row]) -> str:
     return "\n".join(lines)
 
 
-DAYS: dict[str, Any] = {
+DAYS: dict[str, Callable[[int], Row]] = {
     "own": own_day,
     "second": second_day,
     "coarse": partial(second_day, counts_per_turn=20_000),
@@ -210,7 +211,7 @@ DAYS: dict[str, Any] = {
 }
 
 
-def _safely(day: Any, seed: int) -> Row:
+def _safely(day: Callable[[int], Row], seed: int) -> Row:
     warnings.simplefilter("ignore")
     try:
         return day(seed)

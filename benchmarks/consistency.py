@@ -17,8 +17,8 @@ def nees(error: Array, covariance: Array) -> float:
 
 def mean_band(runs: int, share: float = 0.95) -> tuple[float, float]:
     """Band that a consistent filter keeps of the mean NEES over runs (5.5 to 6.5 of 200)."""
-    low, high = chi2.ppf([0.5 - share / 2, 0.5 + share / 2], 6 * runs) / runs
-    return float(low), float(high)
+    low, high = (float(chi2.ppf(0.5 + side * share / 2, 6 * runs)) / runs for side in (-1, 1))
+    return low, high
 
 
 def share_held(values: ArrayLike) -> float:

@@ -123,6 +123,7 @@ class SecondRig:
         self._capture = capture
         rng = np.random.default_rng(seed)
         drawn = {"paper": presets.paper, "cotton": presets.cotton}[material]()
+        assert drawn.fracture_energy_N is not None
         sheet = replace(
             drawn,
             force_N=drawn.force_N * _within(rng),

@@ -101,7 +101,7 @@ def signals_of(scouted: Scouted, recipe: Recipe) -> tuple[teeth.PhaseSignal, ...
     for stretch in scouted.segments.stretches:
         opening = scouted.segments.motions[stretch.motion].opening
         middle = 0.5 * (opening[stretch.ends[1:]] + opening[stretch.ends[:-1]])
-        period, torque = tooth_periods(geometry, response, values, middle)
+        period, torque = tooth_periods(geometry, response, values, geometry.running(middle))
         periods.append(period)
         torques.append(torque)
     growth = 1.0 / values["response_exponent"]
@@ -166,7 +166,7 @@ def spectrum_figure(cuts: tuple[Cut, ...]) -> Any:
     largest = max(teeth.coherent_power(cuts[0].signals, float(f)) for f in FREQUENCIES)
     for cut in cuts:
         looks = {"color": cut.colour, "lw": 1.2, "label": cut.name}
-        gains = [teeth.coherent_gain(cut.signals, float(f)) for f in FREQUENCIES]
+        gains = [_gain(cut.signals, float(f)) for f in FREQUENCIES]
         above.semilogy(FREQUENCIES, gains, **looks)
         power = np.array([teeth.coherent_power(cut.signals, float(f)) for f in FREQUENCIES])
         below.plot(FREQUENCIES, power / largest, **looks)
@@ -180,6 +180,12 @@ def spectrum_figure(cuts: tuple[Cut, ...]) -> Any:
     )
     below.legend(frameon=False)
     return figure
+
+
+def _gain(signals: tuple[teeth.PhaseSignal, ...], frequency: float) -> float:
+    """Power that keeps its phase over what noise leaves, as the search works it out."""
+    pairs = teeth._pairs_of(signals, frequency)
+    return teeth._gain(pairs) if pairs else 0.0
 
 
 def _middle(opening: Array, ends: NDArray[np.int64]) -> Array:

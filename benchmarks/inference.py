@@ -190,9 +190,12 @@ def emcee_default(problem: Problem, seed: int) -> Row:
 def nuts(case: Case, seed: int) -> list[Row]:
     """NumPyro's NUTS on the same log-posterior, chain by chain; nothing if not installed."""
     try:
-        import jax
-        import numpyro
-        from numpyro.infer import MCMC, NUTS
+        import jax  # type: ignore[import-not-found, unused-ignore]
+        import numpyro  # type: ignore[import-not-found, unused-ignore]
+        from numpyro.infer import (  # type: ignore[import-not-found, unused-ignore]
+            MCMC,
+            NUTS,
+        )
     except ImportError:
         print("NUTS left out: install the extra 'reference' to measure it.")
         return []
@@ -239,7 +242,8 @@ def bulk_ess(chains: Array) -> float:
         warnings.simplefilter("ignore", FutureWarning)
         import arviz
 
-    return min(float(arviz.ess(chains[..., i], method="bulk")) for i in range(chains.shape[-1]))
+    ess: Any = arviz.ess
+    return min(float(ess(chains[..., i], method="bulk")) for i in range(chains.shape[-1]))
 
 
 def long_reference(problem: Problem, seed: int) -> Array:

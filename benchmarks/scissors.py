@@ -106,7 +106,7 @@ def photographed(
     length = rng.uniform(0.07, 0.085)
     left, right = (random_blade(rng, length * (1.0 + rng.normal(0, 0.004))) for _ in range(2))
     opening = rng.uniform(0.6, 1.4)
-    look = {
+    look: dict[str, Any] = {
         "reflectance": rng.uniform(0.06, 0.4),
         "shading": (rng.normal(0, 0.15), rng.normal(0, 0.15)),
         "brushed": 0.03,
@@ -121,7 +121,9 @@ def photographed(
     along = np.array([np.cos(turn), np.sin(turn)])
 
     def above(points: np.ndarray) -> np.ndarray:
-        return np.maximum(at_pivot + (at_tip - at_pivot) * (points @ along) / length, 2e-4)
+        return np.asarray(
+            np.maximum(at_pivot + (at_tip - at_pivot) * (points @ along) / length, 2e-4)
+        )
 
     white = rng.uniform(0.7, 0.9)
     far = 0.3 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -133,7 +135,7 @@ def photographed(
         texture_m=rng.uniform(0.3e-3, 2e-3),
     )
     blades = [outline for layer in metal[:2] for outline in layer.outlines_m]
-    layers = [sheet, CastShadow.of(blades, above, metal[0].pose, lamp), *metal]
+    layers: list[Laid] = [sheet, CastShadow.of(blades, above, metal[0].pose, lamp), *metal]
     looks = random_looks(rng, px_per_mm, rng.uniform(0.3, 0.8))
     picture = render(layers, lens, looks, rng, background=0.8)
     data = np.frombuffer(as_jpeg(picture, int(rng.integers(80, 97))), dtype=np.uint8)
@@ -197,7 +199,7 @@ def true_edge(shape: BladeShape, stations: np.ndarray, halved: tuple[float, floa
         middle = sum(0.5 * np.interp(along, c * s + n * y, c * y - n * s) for y in (lower, upper))
         turn += float(np.arctan(np.sum(middle * along) / np.sum(along**2)))
     c, n = np.cos(turn), np.sin(turn)
-    return np.interp(stations, c * s + n * lower, c * lower - n * s)
+    return np.asarray(np.interp(stations, c * s + n * lower, c * lower - n * s))
 
 
 def judged(pairs: list[Pair], seed: int) -> dict[str, Any]:
@@ -245,6 +247,7 @@ def judged(pairs: list[Pair], seed: int) -> dict[str, Any]:
                 "checks": {v.check: v.value for v in fit.verdicts},
             }
         )
+    assert photo.scissors is not None
     lengths = photo.lengths
     alike = abs(lengths.log_ratio) / lengths.sd if lengths else 0.0
     return {
@@ -270,7 +273,7 @@ def _measured(pairs: list[Pair]) -> list[BladePhoto]:
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """By band of tilt: photographs, refusals, coverage, errors, stated sds, failed verdicts."""
-    out = {"nominal": NOMINAL, "bands": [], "refused": {}}
+    out: dict[str, Any] = {"nominal": NOMINAL, "bands": [], "refused": {}}
     for row in rows:
         if "refused" in row:
             why = row["refused"].split(":")[-1].strip()[:70]

@@ -33,7 +33,11 @@ def main() -> None:
 
     print("| row | us | times the solution of 24 equations |")
     print("|---|---|---|")
-    surfaces = {"plane": Plane(), "cylinder": Cylinder(0.03), "probed": probed_surface()}
+    surfaces: dict[str, Surface] = {
+        "plane": Plane(),
+        "cylinder": Cylinder(0.03),
+        "probed": probed_surface(),
+    }
     for name, surface in surfaces.items():
         print(_line(f"contact, {name}", Fed(surface).contact, yardstick))
     for late in (0, LATE_ROWS):

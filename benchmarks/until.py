@@ -17,7 +17,6 @@ fitted by themselves, and the fits are compared with the specimen's truth:
 """
 
 import json
-import sys
 import tempfile
 import time
 from dataclasses import asdict, dataclass, replace
@@ -43,7 +42,7 @@ from scissorcal.device.trajectory import friction_plan
 from scissorcal.package.exact import FitDraws, exact_model, torque_quantiles
 from scissorcal.package.scene_torque import SceneTorque, scene_torque
 from scissorcal.recipe.load import builtin_recipe, recipe_path
-from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import Recording, read_recording
 from scissorcal.recording.header import UntilMark
@@ -148,7 +147,7 @@ def judged(day: Day, effort: Effort) -> Row:
 
 def _capture(
     session: RigSession,
-    kind: CaptureKind,
+    kind: DesignedKind,
     earlier: Earlier,
     minutes: float,
     spent: list[float],
@@ -266,4 +265,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -24,8 +24,7 @@ from scissorcal.bench.extremes.compare import OUTCOMES, Judgement
 from scissorcal.bench.extremes.states import State
 from scissorcal.report.extremes import map_chart, refusals_panel, totals_panel
 from scissorcal.report.numbers import short
-from scissorcal.report.panel import Row
-from scissorcal.report.text import panel_text
+from scissorcal.report.panel import Row, panel_text
 from scissorcal.report.trade import standalone_svg
 
 DOCS = Path(__file__).parents[2] / "docs"

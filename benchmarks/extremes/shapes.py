@@ -1,28 +1,30 @@
 """Cells of posteriors that are not normal: hills, funnels, valleys, boxes, tails, plateaus."""
 
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from benchmarks.extremes.cells import Cell, Found, judged
+from scipy.stats import cauchy, norm, uniform
+from scipy.stats import t as student
 
 from scissorcal.aliases import Array
 from scissorcal.inference import Posterior, Problem, infer
 
 Density = Callable[[Array], float]
 
-STATED = 0.3
-"""Stated error of quantiles, in sds. The standard error of a quantile of share p is
-sqrt(p (1 - p) / n) / f, f the density there. Of n = 1,000 effective draws, what adapted weights are
-drawn up to, it is 0.067 sd for a normal's 5 %, 0.086 for a Cauchy's quartile and 0.094 for the
-median of a hill that holds 0.3 of the mass: 0.3 is 3.2 to 4.5 of these, and all cells
-together give less than one false alarm in 100 runs. Half of it would be 1.6 to 2.2, and would call
-up to a tenth of right answers wrong."""
+COMPARED = 24
+"""Quantiles that the cells compare."""
+FALSE_ALARMS = 0.01
+"""Of runs of all cells, at most."""
+ERRORS = float(norm.isf(0.5 * FALSE_ALARMS / COMPARED))
+"""Standard errors by which a quantile may be off: 3.5 for 24 of them."""
 TRUTH = "closed form"
 
 
 def shape_cells() -> tuple[Cell, ...]:
     """Cells of posteriors whose quantiles are known."""
-    right = "quantiles to 0.3 sd, or flagged"
+    right = f"quantiles to {ERRORS:.1f} standard errors of the effective draws, or flagged"
 
     def cell(name: str, extreme: str, run: Callable[[np.random.Generator], Found]) -> Cell:
         return Cell(name, "inference", extreme, right, TRUTH, run)
@@ -59,17 +61,46 @@ def _problem(
     )
 
 
-def _judge(posterior: Posterior, quantiles: dict[float, float], sd: float, column: int) -> Found:
-    """Judge draws of one parameter by its quantiles, errors in units of ``sd``."""
-    error = max(
-        abs(float(np.quantile(posterior.draws[:, column], share)) - value) / sd
-        for share, value in quantiles.items()
+class Quantile(NamedTuple):
+    """A share of the mass, the value below which it lies, and the density there."""
+
+    share: float
+    value: float
+    density: float
+
+
+def _of(distribution: Any, *shares: float) -> tuple[Quantile, ...]:
+    """Quantiles of a distribution of scipy.stats."""
+    values = [float(distribution.ppf(share)) for share in shares]
+    return tuple(
+        Quantile(share, value, float(distribution.pdf(value)))
+        for share, value in zip(shares, values, strict=True)
     )
-    if error > STATED and not posterior.optimum.success:
-        return Found("flagged", posterior.optimum.sentence, error, STATED)
-    if error > STATED and not posterior.status.trusted:
-        return Found("flagged", posterior.sentence, error, STATED)
-    return judged(error, STATED, "quantiles")
+
+
+def _judge(
+    posterior: Posterior, quantiles: tuple[Quantile, ...], sd: float, column: int = 0
+) -> Found:
+    """Judge draws of one parameter by its quantiles, errors in units of ``sd``.
+
+    The standard error of a quantile of share p is sqrt(p (1 - p) / n) / f, f the density there
+    (Serfling 1980, section 2.3.3, doi:10.1002/9780470316481). The draws are taken with equal
+    weights from the effective ones that the posterior states, so both numbers count:
+    1 / n = 1 / effective + 1 / draws.
+    """
+    draws = posterior.draws[:, column]
+    variance = 1.0 / posterior.effective + 1.0 / len(draws)
+    misses = []
+    for share, value, density in quantiles:
+        standard = np.sqrt(share * (1.0 - share) * variance) / density
+        miss = abs(float(np.quantile(draws, share)) - value)
+        misses.append((miss / sd, ERRORS * float(standard) / sd))
+    error, stated = max(misses, key=lambda miss: miss[0] / miss[1])
+    if error > stated and not posterior.optimum.success:
+        return Found("flagged", posterior.optimum.sentence, error, stated)
+    if error > stated and not posterior.status.trusted:
+        return Found("flagged", posterior.sentence, error, stated)
+    return judged(error, stated, "quantiles")
 
 
 def _hills(u: Array) -> float:
@@ -78,19 +109,22 @@ def _hills(u: Array) -> float:
     return float(np.logaddexp(near, far))
 
 
-HILLS = {0.15: -8.0, 0.65: 8.0}
+HILLS = (
+    Quantile(0.15, -8.0, 0.3 * float(norm.pdf(0.0))),
+    Quantile(0.65, 8.0, 0.7 * float(norm.pdf(0.0))),
+)
 """Medians of either hill: half of 0.3, and 0.3 and half of 0.7."""
 
 
 def _two_hills(rng: np.random.Generator) -> Found:
     starts = np.array([[-7.0, -7.0], [7.0, 7.0]])
-    return _judge(infer(_problem(("a", "b"), _hills, starts), "standard", rng), HILLS, 1.0, 0)
+    return _judge(infer(_problem(("a", "b"), _hills, starts), "standard", rng), HILLS, 1.0)
 
 
 def _one_start(rng: np.random.Generator) -> Found:
     """What no start leads to cannot be seen; a search with one start says that it had one."""
     posterior = infer(_problem(("a", "b"), _hills, np.array([[-7.0, -7.0]])), "standard", rng)
-    found = _judge(posterior, HILLS, 1.0, 0)
+    found = _judge(posterior, HILLS, 1.0)
     if found.outcome == "wrong" and posterior.optimum.starts == 1:
         said = "one start: the search says that 1 of 1 starts ended at its optimum"
         return Found("flagged", said, found.error, found.allowed)
@@ -103,8 +137,7 @@ def _funnel(rng: np.random.Generator) -> Found:
         return float(-0.5 * (v / 3.0) ** 2 - 0.5 * v - 0.5 * x**2 * np.exp(-v))
 
     posterior = infer(_problem(("v", "x"), density, np.zeros(2)), "standard", rng)
-    normal = {0.05: -4.934, 0.5: 0.0, 0.95: 4.934}  # of N(0, 3^2)
-    return _judge(posterior, normal, 3.0, 0)
+    return _judge(posterior, _of(norm(0.0, 3.0), 0.05, 0.5, 0.95), 3.0)
 
 
 def _bent(rng: np.random.Generator) -> Found:
@@ -112,7 +145,7 @@ def _bent(rng: np.random.Generator) -> Found:
         return float(-0.5 * u[0] ** 2 - 0.5 * ((u[1] - u[0] ** 2) / 0.05) ** 2)
 
     posterior = infer(_problem(("a", "b"), density, np.array([1.0, 1.0])), "standard", rng)
-    return _judge(posterior, {0.05: -1.645, 0.5: 0.0, 0.95: 1.645}, 1.0, 0)
+    return _judge(posterior, _of(norm(), 0.05, 0.5, 0.95), 1.0)
 
 
 def _box(rng: np.random.Generator) -> Found:
@@ -120,7 +153,7 @@ def _box(rng: np.random.Generator) -> Found:
         return 0.0 if 0.0 <= u[0] <= 1e-3 else -np.inf
 
     posterior = infer(_problem(("a",), density, np.array([3e-4])), "standard", rng)
-    return _judge(posterior, {0.05: 5e-5, 0.5: 5e-4, 0.95: 9.5e-4}, 2.89e-4, 0)
+    return _judge(posterior, _of(uniform(0.0, 1e-3), 0.05, 0.5, 0.95), 2.89e-4)
 
 
 def _cauchy(rng: np.random.Generator) -> Found:
@@ -128,7 +161,7 @@ def _cauchy(rng: np.random.Generator) -> Found:
         return -float(np.log1p(u[0] ** 2))
 
     posterior = infer(_problem(("a",), density, np.array([0.5])), "standard", rng)
-    return _judge(posterior, {0.25: -1.0, 0.5: 0.0, 0.75: 1.0}, 1.0, 0)
+    return _judge(posterior, _of(cauchy(), 0.25, 0.5, 0.75), 1.0)
 
 
 def _heavy(rng: np.random.Generator) -> Found:
@@ -137,8 +170,7 @@ def _heavy(rng: np.random.Generator) -> Found:
 
     names = ("a", "b", "c", "d", "e")
     posterior = infer(_problem(names, density, np.full(5, 0.5)), "standard", rng)
-    # quartiles of a Student-t of 1.5 degrees of freedom
-    return _judge(posterior, {0.25: -0.8726, 0.5: 0.0, 0.75: 0.8726}, 1.0, 0)
+    return _judge(posterior, _of(student(1.5), 0.25, 0.5, 0.75), 1.0)
 
 
 def _unheld(posterior: Posterior) -> Found:
@@ -178,4 +210,4 @@ def _no_spread(rng: np.random.Generator) -> Found:
         independent=True,
     )
     posterior = infer(problem, "standard", rng)
-    return _judge(posterior, {0.05: -count - 1.645, 0.95: -count + 1.645}, 1.0, 0)
+    return _judge(posterior, _of(norm(-count), 0.05, 0.95), 1.0)

@@ -8,7 +8,7 @@ import pytest
 from scissorcal.calibration import FitResult, FittedParameter
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.package import build_package, open_package
-from scissorcal.package.by_load import as_closing
+from scissorcal.package.friction_tables import as_closing
 from tests.calibration.cut.test_known import bent
 from tests.package.fits import cut_fit, friction_fit, recipe
 

@@ -1,6 +1,6 @@
 """Manifests that call a fit's candidate ``rung``."""
 
-from scissorcal.package.manifest import FitRecord
+from scissorcal.package.records import FitRecord
 
 
 def test_a_package_with_the_old_name_of_a_fits_candidate_is_read() -> None:

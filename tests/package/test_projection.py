@@ -8,9 +8,8 @@ import pytest
 
 from scissorcal.calibration import FitResult
 from scissorcal.package.exact import pick_draws
-from scissorcal.package.simplest.candidates import Aspect, Candidate, simpler_candidates
 from scissorcal.package.simplest.difference import Scene, difference, felt
-from scissorcal.package.simplest.law import Law, column
+from scissorcal.package.simplest.law import Aspect, Candidate, Law, column, simpler_candidates
 from scissorcal.package.simplest.project import Projection, Reference, project
 from scissorcal.recipe import Recipe
 from tests.package.fits import cut_fit, friction_fit, recipe, with_edge

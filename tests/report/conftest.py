@@ -10,8 +10,11 @@ from typing import Any
 import pytest
 
 from scissorcal.calibration import FitResult
+from scissorcal.package import Review
 from scissorcal.recipe import Recipe, recipe_path
-from scissorcal.report import RecordingSummary, build_report, sheet_from_mapping
+from scissorcal.recording import Recording
+from scissorcal.report import Evidence, Panel, build_report
+from scissorcal.report.panel import Row, Value, count
 from scissorcal.verdicts import Verdict
 from tests.report import fits
 from tests.report.pages import Page, read_page, read_twin
@@ -41,29 +44,36 @@ def paper_text() -> str:
 def built(
     folder: Path,
     shown: Sequence[FitResult],
-    recordings: Sequence[RecordingSummary],
+    recordings: Sequence[Recording],
+    review: Review | None = None,
     **more: Any,
 ) -> Built:
     """Build a report of the paper recipe, and read it back."""
-    files = build_report(paper(), shown, recordings, folder, created=CREATED, **more)
+    evidence = Evidence(tuple(recordings), **more)
+    files = build_report(paper(), shown, evidence, folder, created=CREATED, review=review)
     return Built(folder, read_page(files.html), read_twin(files.json))
 
 
 @pytest.fixture(scope="session")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Built:
     """Friction and cut with their recordings, the recipe's text, and a run of the loop."""
-    sheet = sheet_from_mapping(
+    loop = Panel(
+        "sheet-loop-facts",
+        "sheet-loop",
         "Loop",
-        "loop",
-        {"latency": {"p50_us": 61.2, "p99_us": 112.0}, "misses": 0},
-        verdicts=[Verdict("render", "misses", "pass", 0.0, 0.0, "No tick was missed.")],
+        rows=(
+            Row("latency p50", (Value("value", 61.2, "µs", digits=4),)),
+            Row("latency p99", (Value("value", 112.0, "µs", digits=4),)),
+            Row("misses", (count("value", 0),)),
+        ),
+        verdicts=(Verdict("render", "misses", "pass", 0.0, 0.0, "No tick was missed."),),
     )
     return built(
         tmp_path_factory.mktemp("whole"),
         [fits.friction_fit(), fits.cut_fit()],
         [fits.friction_recording(), fits.cut_recording()],
         recipe_text=paper_text(),
-        sheets=[sheet],
+        panels=(loop,),
     )
 
 

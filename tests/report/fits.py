@@ -6,8 +6,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult, FitSeries, FittedParameter, StrokeError
-from scissorcal.recording import Stroke, StrokeKind
-from scissorcal.report import RecordingSummary
+from scissorcal.recording import SAMPLE_DTYPE, Joint, Kind, Recording, Stroke, StrokeKind
 from scissorcal.verdicts import Verdict
 
 FRICTION_SOURCE = "captures/friction-20250131T140500Z.mcap"
@@ -21,19 +20,19 @@ HASHES = {
 RATE_HZ = 100.0
 
 
-def friction_recording() -> RecordingSummary:
+def friction_recording() -> Recording:
     """The empty strokes that :func:`friction_fit` is about."""
-    return _recording(FRICTION_SOURCE, "friction", "rotary", _friction_strokes())
+    return _recording(FRICTION_SOURCE, "friction", Joint(), _friction_strokes())
 
 
-def cut_recording() -> RecordingSummary:
+def cut_recording() -> Recording:
     """The cutting strokes that :func:`cut_fit` is about."""
-    return _recording(CUT_SOURCE, "cut", "rotary", _cut_strokes())
+    return _recording(CUT_SOURCE, "cut", Joint(), _cut_strokes())
 
 
-def linear_recording() -> RecordingSummary:
+def linear_recording() -> Recording:
     """A sliding joint moved back and forth, without planned strokes."""
-    return _recording(LINEAR_SOURCE, "friction", "linear", ())
+    return _recording(LINEAR_SOURCE, "friction", Joint("linear"), ())
 
 
 def friction_fit(seed: int = 1) -> FitResult:
@@ -194,17 +193,16 @@ def without_numbers(fit: FitResult) -> FitResult:
     )
 
 
-def _recording(source: str, kind: str, joint: str, strokes: tuple[Stroke, ...]) -> RecordingSummary:
-    return RecordingSummary(
+def _recording(source: str, kind: Kind, joint: Joint, strokes: tuple[Stroke, ...]) -> Recording:
+    """A recording without its samples."""
+    return Recording(
+        kind,
+        np.zeros(0, SAMPLE_DTYPE),
+        strokes,
+        joint,
         source=source,
         content_hash=HASHES[source],
-        kind=kind,
-        joint=joint,
-        samples=61234,
-        duration_s=61.233,
-        strokes=strokes,
         device={"name": "virtual rig", "serial": "VR-0001", "tick_us": 1000},
-        recipe_toml="",
         notes=("3 garbled frames were thrown away.",),
     )
 

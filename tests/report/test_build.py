@@ -16,9 +16,10 @@ from scissorcal.calibration import FitSeries, FittedParameter
 from scissorcal.errors import InputError, MissingError
 from scissorcal.package import REPORT_PAGE, REPORT_TWIN, Review
 from scissorcal.recipe import schemas_dir
-from scissorcal.report import Fact, FactSheet, build_report, sign_page
+from scissorcal.report import Evidence, Panel, build_report, sign_page
+from scissorcal.report.build import schema_text
+from scissorcal.report.panel import Row, words
 from scissorcal.report.signature_block import unsigned_digest
-from scissorcal.report.twin import schema_text
 from scissorcal.verdicts import Verdict
 from tests.report.conftest import CREATED, Built, built, paper
 from tests.report.fits import cut_fit, linear_fit, linear_recording
@@ -82,21 +83,21 @@ def test_the_same_input_gives_the_same_bytes(linear: Built, tmp_path: Path) -> N
 
 def test_without_a_fit_it_says_what_to_run(tmp_path: Path) -> None:
     with pytest.raises(MissingError, match="Run scissorcal fit"):
-        build_report(paper(), [], [], tmp_path, created=CREATED)
+        build_report(paper(), [], Evidence(), tmp_path, created=CREATED)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_time_without_a_zone_is_refused(tmp_path: Path) -> None:
     naive = datetime(2025, 1, 31)
     with pytest.raises(ValueError, match="time zone"):
-        build_report(paper(), [linear_fit()], [], tmp_path, created=naive)
+        build_report(paper(), [linear_fit()], Evidence(), tmp_path, created=naive)
 
 
 def test_a_place_that_cannot_be_written_is_named_and_old_files_stay(tmp_path: Path) -> None:
     taken = tmp_path / "report"
     taken.write_text("a file of mine")
     with pytest.raises(InputError, match="cannot be written") as refused:
-        build_report(paper(), [linear_fit()], [], taken, created=CREATED)
+        build_report(paper(), [linear_fit()], Evidence(), taken, created=CREATED)
     assert str(taken) in str(refused.value)
     assert taken.read_text() == "a file of mine"
 
@@ -111,7 +112,7 @@ def test_a_failure_half_way_leaves_the_old_report_whole(
     in_the_way = tmp_path / f"report.json.{host}.{os.getpid()}.00000000.part"
     in_the_way.mkdir()
     with pytest.raises(InputError):
-        build_report(paper(), [linear_fit()], [], tmp_path, created=CREATED)
+        build_report(paper(), [linear_fit()], Evidence(), tmp_path, created=CREATED)
     assert old.read_text() == "the old page"
 
 
@@ -129,10 +130,12 @@ def test_words_from_outside_never_become_markup(tmp_path: Path) -> None:
     recipe = paper()
     material = recipe.material.model_copy(update={"name": HOSTILE})
     recipe = recipe.model_copy(update={"material": material, "description": HOSTILE})
-    sheet = FactSheet(HOSTILE, HOSTILE, (Fact(HOSTILE, HOSTILE, HOSTILE),), notes=(HOSTILE,))
-    files = build_report(
-        recipe, [fit], [], tmp_path, created=CREATED, recipe_text=HOSTILE, sheets=[sheet]
+    row = Row(HOSTILE, (words(HOSTILE, HOSTILE),))
+    evidence = Evidence(
+        panels=(Panel(HOSTILE, HOSTILE, HOSTILE, rows=(row,), notes=(HOSTILE,)),),
+        recipe_text=HOSTILE,
     )
+    files = build_report(recipe, [fit], evidence, tmp_path, created=CREATED)
     page = files.html.read_text(encoding="utf-8")
     assert page.count("<script") == 1  # the page's own
     assert page.count("&lt;script&gt;") > 15

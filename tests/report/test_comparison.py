@@ -9,8 +9,7 @@ from scissorcal.errors import InputError
 from scissorcal.recipe import Recipe
 from scissorcal.report import Side, compare, document_of, document_of_fit
 from scissorcal.report.comparison import Comparison
-from scissorcal.report.panel import Panel
-from scissorcal.report.text import panel_text
+from scissorcal.report.panel import Panel, panel_text
 from tests.calibration.truth import Truth
 from tests.report.conftest import paper
 from tests.report.laws import known_cut, known_friction

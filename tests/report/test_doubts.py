@@ -22,7 +22,7 @@ from scissorcal.calibration import (
     SensitivityRow,
     VerifyResult,
 )
-from scissorcal.report import build_report
+from scissorcal.report import Evidence, build_report
 from scissorcal.report.subjects.posterior import correlate, prior_panel
 from scissorcal.verdicts import Verdict
 from tests.report.conftest import CREATED, Built, built, paper
@@ -171,7 +171,11 @@ def test_even_ranks_stay_inside(tmp_path: Path) -> None:
     fit = doubted()
     even = checked(fit, tuple(range(100)))
     files = build_report(
-        paper(), [fit], [friction_recording()], tmp_path, created=CREATED, checks={"friction": even}
+        paper(),
+        [fit],
+        Evidence((friction_recording(),), {"friction": even}),
+        tmp_path,
+        created=CREATED,
     )
     page = files.html.read_text(encoding="utf-8")
     assert "Intervals hold the truth as often as they claim" in page
@@ -199,10 +203,9 @@ def test_a_trust_check_of_another_fit_is_not_shown(tmp_path: Path) -> None:
     files = build_report(
         paper(),
         [fit],
-        [friction_recording()],
+        Evidence((friction_recording(),), {"friction": other}),
         tmp_path,
         created=CREATED,
-        checks={"friction": other},
     )
     page = files.html.read_text(encoding="utf-8")
     assert "The halves disagree." not in page
@@ -228,10 +231,10 @@ def test_correlations_and_priors_are_those_of_the_draws() -> None:
 
 def test_a_report_that_says_the_same_keeps_its_time(tmp_path: Path) -> None:
     fit = doubted()
-    first = build_report(paper(), [fit], [], tmp_path, created=CREATED)
+    first = build_report(paper(), [fit], Evidence(), tmp_path, created=CREATED)
     before = first.json.read_bytes()
     later = CREATED.replace(year=CREATED.year + 1)
-    build_report(paper(), [fit], [], tmp_path, created=later)
+    build_report(paper(), [fit], Evidence(), tmp_path, created=later)
     assert first.json.read_bytes() == before
-    build_report(paper(), [replace(fit, notes=("New.",))], [], tmp_path, created=later)
+    build_report(paper(), [replace(fit, notes=("New.",))], Evidence(), tmp_path, created=later)
     assert b"2026-01-31" in first.json.read_bytes()

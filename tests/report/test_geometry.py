@@ -13,8 +13,8 @@ import pytest
 
 from scissorcal.calibration import FitResult, SeenPair
 from scissorcal.recipe import GeometryKind, Recipe, schemas_dir
-from scissorcal.report import Geometry, build_report
-from scissorcal.report.pictures import PICTURE_BYTES, PictureFile, place_pictures
+from scissorcal.report import Evidence, Geometry, build_report
+from scissorcal.report.pictures import PICTURE_BYTES, place_pictures
 from tests.report.conftest import CREATED, Built, paper
 from tests.report.fits import friction_fit
 from tests.report.geometry_fits import (
@@ -55,7 +55,7 @@ def report_of(
     fits: Sequence[FitResult] = (),
 ) -> Built:
     files = build_report(
-        recipe or photographed(), fits, [], folder, created=CREATED, geometry=found
+        recipe or photographed(), fits, Evidence(geometry=found), folder, created=CREATED
     )
     return Built(folder, read_page(files.html), read_twin(files.json))
 
@@ -237,7 +237,7 @@ def test_many_pictures_are_dropped_and_named(tmp_path: Path) -> None:
 
 def test_the_first_of_each_fit_come_before_the_second_of_any(tmp_path: Path) -> None:
     files = {
-        kind: [PictureFile(noise(tmp_path / kind / f"{n}.png", (64, 48)), 1000) for n in range(3)]
+        kind: [(noise(tmp_path / kind / f"{n}.png", (64, 48)), 1000) for n in range(3)]
         for kind in ("camera", "blade")
     }
     whole = place_pictures(files, 10**9)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.report import inputs, numbers, panel, strokes, text
+from scissorcal.report import numbers, panel, strokes
 from scissorcal.report.numbers import (
     decimals_for,
     display,
@@ -33,7 +33,7 @@ def value_of(text: str) -> float:
     return float(f"{mantissa}e{power}" if times else mantissa)
 
 
-@pytest.mark.parametrize("module", [numbers, inputs, strokes, panel, text])
+@pytest.mark.parametrize("module", [numbers, strokes, panel])
 def test_examples_in_docstrings_hold(module: object) -> None:
     outcome = doctest.testmod(module)  # type: ignore[arg-type]
     assert outcome.attempted > 0

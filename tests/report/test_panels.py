@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import FitResult
-from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
-from scissorcal.report import RecordingSummary, sheet_from_mapping, summarise_recording
-from scissorcal.report.headline import Headline, geometry_headline, write_headline
+from scissorcal.recording import Recording, Stroke
 from scissorcal.report.inputs import Cell, Evidence
-from scissorcal.report.panel import Panel, Row, Value, columns
-from scissorcal.report.reduce import block_means
-from scissorcal.report.strokes import strokes_of
+from scissorcal.report.panel import LARGEST_WIDTH, Panel, Row, Value, columns, panel_text
+from scissorcal.report.strokes import block_means, group_strokes, strokes_of
 from scissorcal.report.subjects.closing import left_out_panel, trace
 from scissorcal.report.subjects.decision import (
     cells_of,
@@ -22,8 +19,8 @@ from scissorcal.report.subjects.decision import (
     trust_panel,
     weaknesses_panel,
 )
-from scissorcal.report.subjects.torque import group_strokes, torque_panel
-from scissorcal.report.text import LARGEST_WIDTH, panel_text
+from scissorcal.report.subjects.torque import torque_panel
+from scissorcal.report.subjects.trust import Headline, geometry_headline, write_headline
 from scissorcal.verdicts import Verdict
 from tests.report.conftest import paper
 from tests.report.fits import (
@@ -123,7 +120,7 @@ def test_strokes_are_numbered_on_over_recordings() -> None:
         _summary("b.mcap", "bb", strokes[6:]),
         _summary("elsewhere/a.mcap", "aa", strokes[:6]),
     ]
-    found = [stroke.name for stroke in strokes_of(fit, "cut", halves)]
+    found = list(strokes_of(fit, "cut", halves))
     assert [name.stroke for name in found] == list(range(12))
     assert [name.speed for name in found] == [stroke.speed for stroke in strokes]
     assert found[7].label == "stroke 7, closing at 0.25 rad/s, recording 2"
@@ -143,7 +140,7 @@ def test_samples_of_a_stroke_stand_in_order_of_time() -> None:
 
 
 def test_without_recordings_the_direction_names_a_stroke() -> None:
-    named = [stroke.name for stroke in strokes_of(replace(friction_fit(), held_out=()), "f", [])]
+    named = list(strokes_of(replace(friction_fit(), held_out=()), "f", []))
     assert [name.kind for name in named[:4]] == ["closing", "opening", "closing", "opening"]
     assert all(name.speed is None for name in named)
 
@@ -152,7 +149,7 @@ def test_what_slides_moves_forward_and_backward() -> None:
     fit = linear_fit()
     way = np.where(fit.series.opening_rate > 0, 1, 0).astype(np.int64)
     fit = replace(fit, series=replace(fit.series, stroke=way), held_out=())
-    labels = [stroke.name.label for stroke in strokes_of(fit, "f", [])]
+    labels = [stroke.label for stroke in strokes_of(fit, "f", [])]
     assert labels == ["stroke 0, backward", "stroke 1, forward"]
 
 
@@ -331,32 +328,12 @@ def test_a_panel_in_the_terminal_has_its_numbers_units_and_limits() -> None:
 
 def test_sources_whose_recording_is_missing_are_named_all_the_same() -> None:
     fits = {"cut": cut_fit(), "friction": friction_fit()}
-    origin = trace(paper(), "", fits, [friction_recording()])
+    origin = trace(paper(), fits, Evidence((friction_recording(),)))
     assert [row.used_by for row in origin.sources] == [("friction",), ("cut",)]
     assert origin.sources[1].content_hash
 
 
-def test_a_recording_is_reduced_to_what_is_printed() -> None:
-    samples = np.zeros(3, SAMPLE_DTYPE)
-    samples["device_time_us"] = [0, 1000, 2500]
-    recording = Recording("cut", samples, (Stroke(0, "press"),), Joint("linear"), source="a/b.mcap")
-    summary = summarise_recording(recording)
-    assert (summary.name, summary.samples, summary.joint) == ("b.mcap", 3, "linear")
-    assert summary.duration_s == pytest.approx(0.0025)
-
-
-def test_a_sheet_takes_units_from_names() -> None:
-    facts = {"range": {"rate_rad_per_s": (0.05, 1.0)}, "file": "x.zip", "share": float("nan")}
-    sheet = sheet_from_mapping("Package", "package", facts)
-    told = [(fact.label, fact.value, fact.unit) for fact in sheet.facts]
-    assert told == [
-        ("range rate", "0.05, 1", "rad/s"),
-        ("file", "x.zip", ""),
-        ("share", None, ""),
-    ]
-
-
-def _summary(source: str, digest: str, strokes: tuple[Stroke, ...]) -> RecordingSummary:
+def _summary(source: str, digest: str, strokes: tuple[Stroke, ...]) -> Recording:
     return replace(cut_recording(), source=source, content_hash=digest, strokes=strokes)
 
 

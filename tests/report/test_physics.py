@@ -120,7 +120,7 @@ def test_torque_over_the_scene_is_the_law_with_its_band() -> None:
     recipe = recipe.model_copy(update={"scene": scene})
     fit = swept_like(truth)
     section = scene_torque(recipe, fit, None)
-    cut = next(s for s in section.slices if s.along == "opening").places
+    cut = section.slices["opening"][0]
     opening, torque, low, high = cut.opening, cut.torque, cut.low, cut.high
     reached = np.array([_contact(truth, theta) for theta in opening])
     settled = reached > cut.contact + 5e-4

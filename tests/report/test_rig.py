@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from scissorcal.recording import PROBE_KEY, Estimate, ProbeResult, Swing
-from scissorcal.report.inputs import RecordingSummary
-from scissorcal.report.subjects.rig import rig_panels
+from scissorcal.recording import PROBE_KEY, SAMPLE_DTYPE, Estimate, ProbeResult, Recording, Swing
+from scissorcal.report.subjects.closing import rig_panels
 
 EARLY, LATE = "2026-01-02T08:00:00+00:00", "2026-01-02T14:00:00+00:00"
 
@@ -16,12 +16,9 @@ def probed(made_at: str, inertia: float, swings: tuple[Swing, ...] = ()) -> Prob
     return ProbeResult("a rig", "id", made_at, inertia_kg_m2=found, swings=swings)
 
 
-def recorded(probe: ProbeResult | None) -> RecordingSummary:
+def recorded(probe: ProbeResult | None) -> Recording:
     device = {} if probe is None else {PROBE_KEY: probe.as_dict()}
-    return RecordingSummary(
-        source="a.mcap", content_hash="", kind="friction", joint="rotary", samples=1,
-        duration_s=1.0, strokes=(), device=device, recipe_toml="", notes=(),
-    )  # fmt: skip
+    return Recording("friction", np.zeros(1, SAMPLE_DTYPE), device=device, source="a.mcap")
 
 
 def test_the_latest_probe_is_shown_with_its_interval() -> None:

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from scissorcal.recipe import parse_recipe
-from scissorcal.report.subjects.stated_edge import stated_edge_panel
+from scissorcal.report.subjects.stated import stated_edge_panel
 from tests.workday.made import RECIPE
 
 POINTS = "[[0.0, -8.0], [25.0, -7.2], [50.0, -6.3], [75.0, -5.4]]"

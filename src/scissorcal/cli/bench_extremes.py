@@ -46,7 +46,7 @@ def extremes(
       ...
     """
     from scissorcal.package import open_package
-    from scissorcal.report.text import panels_text
+    from scissorcal.report.panel import panels_text
     from scissorcal.workday.runs.bench_extremes import run_extremes
 
     if package_path is None:

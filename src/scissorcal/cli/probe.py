@@ -46,7 +46,7 @@ def probe(
     from scissorcal.device.probe.probe import ProbeRefusedError
     from scissorcal.recipe.load import load_recipe
     from scissorcal.report import panel_text
-    from scissorcal.report.subjects.rig import rig_panel
+    from scissorcal.report.subjects.closing import rig_panel
     from scissorcal.workday.runs.probe import probe_device
 
     workspace = None if recipe else open_workspace(folder)

@@ -86,8 +86,8 @@ def summarise(
     from scissorcal.identity import VERSION
     from scissorcal.recording import Joint, read_recording
     from scissorcal.recording.table_file import refuse_no_table
+    from scissorcal.report.panel import panels_text
     from scissorcal.report.summary import Shown, summary_page, summary_panels
-    from scissorcal.report.text import panels_text
 
     _refuse(logs, table, joint, output)
     channels = table.channels

@@ -16,6 +16,7 @@ from .keys import holds as holds
 from .keys import read_public_keys as read_public_keys
 from .keys import signer as signer
 from .layer_slopes import LayerSlopes as LayerSlopes
+from .layer_slopes import Tangent as Tangent
 from .manifest import Manifest as Manifest
 from .manifest import PoseRecord as PoseRecord
 from .manifest import RigRecord as RigRecord
@@ -33,11 +34,10 @@ from .review import Review as Review
 from .review import stamp as stamp
 from .review import stated_digest as stated_digest
 from .scene_slopes import torque_knowledge as torque_knowledge
-from .simplest.candidates import fitted_candidate as fitted_candidate
+from .simplest.law import fitted_candidate as fitted_candidate
 from .table_cost import cost_and_error as cost_and_error
 from .table_cost import table_bytes as table_bytes
 from .tables import hermite as hermite
-from .tangent import Tangent as Tangent
 from .variations import Variations as Variations
 from .variations import central_values as central_values
 

@@ -31,7 +31,7 @@ from scissorcal.package.manifest import (
     canonical,
     content_hash,
 )
-from scissorcal.package.table_record import StoredRow
+from scissorcal.package.records import StoredRow
 from scissorcal.package.tables import Rows
 
 MANIFEST_FILE = "manifest.json"
@@ -52,7 +52,7 @@ def write_archive(path: Path, manifest: Manifest, arrays: Arrays) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as part:
-            part.write_bytes(archive_bytes(manifest, arrays))
+            part.write_bytes(_archive_bytes(manifest, arrays))
     except OSError as error:
         raise InputError(
             f"{path} cannot be written ({error.strerror}): make room, move away a file that stands "
@@ -60,7 +60,7 @@ def write_archive(path: Path, manifest: Manifest, arrays: Arrays) -> None:
         ) from error
 
 
-def archive_bytes(manifest: Manifest, arrays: Arrays) -> bytes:
+def _archive_bytes(manifest: Manifest, arrays: Arrays) -> bytes:
     """The bytes of the package file: stored, in the manifest's order, without a date."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:

@@ -20,14 +20,9 @@ from scissorcal.package.exact import FitDraws, central_model, pick_draws
 from scissorcal.package.friction_tables import cut_left_out, left_out
 from scissorcal.package.layer_pieces import piece_records
 from scissorcal.package.manifest import (
-    CutRecord,
-    CutStructure,
     Fracture,
-    FrictionRecord,
-    FrictionStructure,
     Limits,
     Manifest,
-    Parameter,
     PoseRecord,
     Provenance,
     RigRecord,
@@ -36,9 +31,16 @@ from scissorcal.package.manifest import (
     units_of,
 )
 from scissorcal.package.model_package import ModelPackage
+from scissorcal.package.records import (
+    Bound,
+    CutRecord,
+    CutStructure,
+    FrictionRecord,
+    FrictionStructure,
+    Parameter,
+)
 from scissorcal.package.review import Review
 from scissorcal.package.signature import Sign, signed_text
-from scissorcal.package.table_record import Bound
 from scissorcal.recipe.edge import Edge, stated_curve
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict, failed
@@ -118,8 +120,8 @@ def build_package(
     failed a check or the tables are further from the model than the scene allows.
     """
     # the report imports this module to read packages; only a build needs what follows
-    from scissorcal.package.by_load import rendered_fits
     from scissorcal.package.check import check_built
+    from scissorcal.package.friction_tables import rendered_fits
     from scissorcal.package.reach import data_reach
     from scissorcal.package.simplest.model import simplest_model
     from scissorcal.package.stated_bound import stated_bound

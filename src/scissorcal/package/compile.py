@@ -96,10 +96,10 @@ def compile_model(
     """
     laws = table_laws(model, recipe)
     choice = TableChoice(tolerance, number_format)
-    return compile_tables(laws, scene_mechanics(model, recipe), dict.fromkeys(laws, choice))
+    return _compile_tables(laws, scene_mechanics(model, recipe), dict.fromkeys(laws, choice))
 
 
-def compile_tables(
+def _compile_tables(
     laws: Mapping[str, TableLaw], mechanics: Mechanics, choices: Mapping[str, TableChoice]
 ) -> Compiled:
     """Make a table of each law as chosen for it. Raises InputError as `compile_model` does."""

@@ -1,6 +1,7 @@
 """What a package's tables hold of a friction law, and what they cannot hold."""
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult
+from scissorcal.calibration.friction.layout import at_typical
 from scissorcal.calibration.parameters import FittedParameter
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque
@@ -131,8 +133,8 @@ def cut_left_out(
     """Sentences on what of a cut's law the tables leave out, and what that costs in torque.
 
     Friction that grows with the cut's torque is the rig's, so the fit keeps it apart from the
-    material; ``rendered`` says that the package has it with the material's torque
-    (:mod:`~scissorcal.package.by_load`). ``scene_torque`` (N m) is the largest that the scene
+    material; ``rendered`` says that the package has it with the material's torque.
+    ``scene_torque`` (N m) is the largest that the scene
     renders; a share that is certainly below ``allowed``, what the tables may be off by, is not
     reported.
     """
@@ -175,3 +177,42 @@ def _refuse_driving(law: FrictionLaw, sign: float, fastest: float) -> None:
             "scene.opening_rate_rad_per_s, or remove the term "
             f"{adopted or 'that falls with the speed'} from the fit."
         )
+
+
+GROWING = ("response_force", "fracture_energy")
+
+
+def rendered_fits(cut: FitResult, friction: FitResult | None) -> tuple[FitResult, FitResult | None]:
+    """The fits as a package renders them: typical friction, and a cut with its part by load."""
+    return (cut, None) if friction is None else (as_closing(cut), at_typical(friction))
+
+
+def as_closing(cut: FitResult) -> FitResult:
+    """The fit with friction by load in force and energy, draw by draw; itself where there is none.
+
+    A fit keeps no share at its MAP point, so that is scaled to the posterior's mean of what
+    running costs (of the force where nothing is cut).
+    """
+    if share_of(cut) is None or cut.nuisance_draws is None:
+        return cut
+    names = [p.name for p in cut.parameters]
+    place = [p.name for p in cut.nuisance].index(LOAD_SHARE)
+    growth = 1.0 + np.asarray(cut.nuisance_draws[:, place], dtype=np.float64)
+    columns = [names.index(name) for name in GROWING if name in names]
+    draws, point = np.array(cut.draws, dtype=np.float64), np.array(cut.map_point, dtype=np.float64)
+    cost = _cost(names, point[None, :])[0]
+    point[columns] *= float(np.mean(growth * _cost(names, draws))) / cost
+    draws[:, columns] *= growth[:, None]
+    parameters = tuple(
+        replace(p, **FittedParameter.summary_of(draws[:, i])) if i in columns else p
+        for i, p in enumerate(cut.parameters)
+    )
+    return replace(cut, parameters=parameters, draws=draws, map_point=point)
+
+
+def _cost(names: list[str], rows: Array) -> Array:
+    """Mean energy of a running crack (rows,), or the response's force where nothing is cut."""
+    if "fracture_energy" not in names:
+        return rows[:, names.index("response_force")]
+    kappa = rows[:, names.index("kappa")] if "kappa" in names else 1.0
+    return np.asarray(0.5 * (1.0 + kappa) * rows[:, names.index("fracture_energy")])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.kernel import ModelTables, Table
 from scissorcal.model.curvature import Span
-from scissorcal.package.profile import Profile
+from scissorcal.package.proved_tables import Profile
 
 Indices = NDArray[np.int64]
 

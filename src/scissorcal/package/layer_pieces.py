@@ -8,16 +8,12 @@ from pydantic import Field, Strict
 
 from scissorcal.errors import InputError
 from scissorcal.kernel import MOST_PIECES, MOST_STRIPS, Piece, Strip
-from scissorcal.recipe.priors import Section
+from scissorcal.package.records import Finite, NonNegative, Positive, Section
 
 if TYPE_CHECKING:
     from scissorcal.model.plate_pieces import LayerPiece
     from scissorcal.package.exact import ExactModel
     from scissorcal.recipe.schema import Recipe
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class StripRecord(Section):

@@ -21,13 +21,13 @@ tables as cubics in exact arithmetic.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.kernel import ModelTables, Piece
+from scissorcal.kernel import ModelTables, Piece, StepFlag
 from scissorcal.model.curvature import Span
 from scissorcal.package.law_boxes import (
     Boxes,
@@ -231,3 +231,40 @@ class LayerSlopes:
 def _some(stand: Stand, chosen: NDArray[np.bool_]) -> Stand:
     parts = (getattr(stand, name) for name in Stand.__dataclass_fields__ if name != "stands")
     return Stand(stand.stands[chosen], *(part(one, chosen) for one in parts))
+
+
+class Tangent:
+    """The elastic slope of torque over the opening, where steps of a model have come to."""
+
+    def __init__(self, tables: ModelTables) -> None:
+        self.tables = tables
+        self._edge, self._response = EdgeOver(tables.edge), ResponseOver(tables.response)
+
+    def at(self, opening: Array, steps: NDArray[np.void]) -> Array:
+        """By how much torque falls per opening (n,), N m/rad, with the crack held.
+
+        ``opening`` (n,) in rad, ``steps`` (n,) what `Kernel.step_many` gave there; of a response of
+        scale 1, without friction and at rest. 0 where the blades do not touch.
+        """
+        touching = (steps["flags"] & int(StepFlag.TOUCHING)) != 0
+        slope = np.zeros(len(opening))
+        if touching.any():
+            slope[touching] = self._touching(opening[touching], steps[touching])
+        return slope
+
+    def _touching(self, opening: Array, steps: Any) -> Array:
+        beta = np.asarray(opening, dtype=np.float64) / self.tables.moving_blades
+        x, y, depth = (
+            steps[name].astype(np.float64) for name in ("contact", "height", "indentation")
+        )
+        station = x * np.cos(beta) + y * np.sin(beta)  # the rotation by beta, turned back
+        places = Boxes(
+            np.zeros(len(beta), dtype=np.int64),
+            self._edge.stretches(station),
+            Span(beta, beta),
+            Span(station, station),
+        )
+        stiff, force = self._response.steepness(depth), self._response.at(depth)
+        stand = self._edge.stand(places)
+        slope = slope_of_opening(self.tables, stand, Span(stiff, stiff), Span(force, force))
+        return np.asarray(slope.low)

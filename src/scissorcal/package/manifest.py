@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, Field, Strict, model_validator
+from pydantic import Field, model_validator
 
 from scissorcal.identity import bytes_digest
 from scissorcal.package.layer_pieces import Pieces
-from scissorcal.package.review import Digest, KeySignature, Review
-from scissorcal.package.simplest.record import Simplification
-from scissorcal.package.table_record import (
+from scissorcal.package.records import (
     Bound,
-    Finite,
+    CutRecord,
+    FrictionRecord,
     Name,
     NonNegative,
     Positive,
@@ -23,8 +21,9 @@ from scissorcal.package.table_record import (
     StoredRow,
     Text,
 )
+from scissorcal.package.review import Digest, KeySignature, Review
+from scissorcal.package.simplest.record import Simplification
 from scissorcal.recipe.euler_angles import EulerAngles, Quaternion, angles_alone, one_rotation
-from scissorcal.recipe.schema import FrictionLawName, FrictionTerm
 
 FORMAT = "scissorcal-package/1"
 
@@ -119,96 +118,6 @@ class Mechanics(Section):
     render: tuple[Literal["torque", "handle_force", "translation_force"], ...]
     fracture: Fracture | None
     friction: Friction | None
-
-
-class EdgeStructure(Section):
-    """The edge that a cut was fitted with, from the recipe or photographs.
-
-    Parameters of the fit that begin with ``edge_`` take the place of what stands here.
-    """
-
-    family: Literal["line", "arc", "cubic", "spline"]
-    offset_m: Finite
-    taper_rad: Finite
-    length_m: Positive
-    curvature_per_m: Finite
-    bend_per_m2: Finite = 0.0
-    spline_m: Annotated[tuple[Finite, ...], Strict(False), Field(max_length=64)] = ()
-    spline_start_m: Finite = 0.0
-
-    @model_validator(mode="after")
-    def _spline_has_weights(self) -> EdgeStructure:
-        if (self.family == "spline") != (len(self.spline_m) > 0):
-            raise ValueError('an edge has weights in spline_m where its family is "spline" only')
-        return self
-
-
-class CutStructure(Section):
-    """The discrete choices of a cut fit."""
-
-    response: Literal["power", "exponential", "spline"]
-    response_knots_m: Annotated[tuple[Positive, ...], Strict(False), Field(max_length=16)] = ()
-    rate_damping: bool = False
-    fracture: Literal["none", "smooth", "rippled"]
-    closure: Literal["work", "eq4"]
-    reference_indentation_m: Positive
-    moving_blades: Literal[1, 2]
-    upper_face_m: NonNegative
-    edge: EdgeStructure
-
-    @model_validator(mode="after")
-    def _knots_ascend(self) -> CutStructure:
-        knots = self.response_knots_m
-        ascend = all(low < high for low, high in pairwise(knots))
-        if (self.response == "spline") != (len(knots) > 2) or not ascend:
-            raise ValueError("response_knots_m belong to a spline, ascend, and are three or more")
-        return self
-
-
-class FrictionStructure(Section):
-    """The discrete choices of a friction fit."""
-
-    law: FrictionLawName
-    symmetric: bool
-    angle_center: Finite
-    adopt: Annotated[tuple[FrictionTerm, ...], Strict(False)] = ()
-
-
-class Parameter(Section):
-    """A fitted parameter: ``value`` is what the tables were compiled at, the rest its posterior."""
-
-    name: Annotated[str, Field(pattern=r"^[a-z0-9_^*|()]{1,40}$")]
-    unit: Annotated[str, Field(max_length=40)]
-    value: Finite
-    mean: Finite
-    sd: NonNegative
-    q05: Finite
-    q50: Finite
-    q95: Finite
-
-
-class FitRecord(Section):
-    """A fit that went into the package; its draws stand in ``draws/<what>.npy``.
-
-    ``parameters`` are in the order of the draws' columns. ``warnings`` are the fit's failed
-    verdicts, word for word, ``left_out`` the parts of its law that the tables do not render.
-    """
-
-    candidate: Annotated[Text, Field(validation_alias=AliasChoices("candidate", "rung"))]
-    effort: Literal["draft", "standard", "thorough"]
-    inputs_hash: Annotated[str, Field(max_length=200)]
-    sources: tuple[Text, ...]
-    parameters: Annotated[tuple[Parameter, ...], Field(min_length=1, max_length=128)]
-    warnings: tuple[Text, ...]
-    left_out: tuple[Text, ...] = ()
-
-
-class CutRecord(FitRecord):
-    structure: CutStructure
-
-
-class FrictionRecord(FitRecord):
-    structure: FrictionStructure
 
 
 class Provenance(Section):
@@ -324,8 +233,8 @@ class Manifest(Section):
         files = [member.file for member in self.members]
         if len(set(files)) != len(files):
             raise ValueError("members name a file twice")
-        if set(files) != expected_files(self):
-            odd = sorted(set(files) ^ expected_files(self))
+        if set(files) != _expected_files(self):
+            odd = sorted(set(files) ^ _expected_files(self))
             raise ValueError(f"members do not fit what the package says it renders: {odd}")
         structure = self.provenance.cut.structure
         if (structure.fracture == "none") != (self.mechanics.fracture is None):
@@ -369,7 +278,7 @@ def units_of(mechanics: Mechanics) -> dict[str, str]:
     return units
 
 
-def expected_files(manifest: Manifest) -> set[str]:
+def _expected_files(manifest: Manifest) -> set[str]:
     """The arrays that a package with this manifest has: no more and no fewer."""
     files = {"tables/edge.npy", "tables/response.npy", "draws/cut.npy"}
     if manifest.mechanics.friction is not None:

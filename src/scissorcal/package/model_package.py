@@ -24,8 +24,9 @@ from scissorcal.package.exact import (
     torque_quantiles,
 )
 from scissorcal.package.layer_pieces import kernel_pieces
-from scissorcal.package.manifest import CutRecord, FrictionRecord, Manifest
+from scissorcal.package.manifest import Manifest
 from scissorcal.package.reach import reach_sentences
+from scissorcal.package.records import CutRecord, FrictionRecord
 from scissorcal.package.signature import against, signature_refusal
 from scissorcal.recipe.schema import Recipe
 

@@ -27,8 +27,7 @@ from scissorcal.package.bound import PARALLEL
 from scissorcal.package.compile import STRONGEST_N, Compiled, kernel_tables, table_file
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.manifest import Ranges
-from scissorcal.package.profile import profiles
-from scissorcal.package.proved_tables import ProvedTable
+from scissorcal.package.proved_tables import ProvedTable, profiles
 from scissorcal.package.tables import TableLaw
 
 OPENINGS, CONTACTS = 240, 240
@@ -48,14 +47,6 @@ class _NotProvedError(Exception):
     """Why there is no proof, as the end of a sentence."""
 
 
-@dataclass(frozen=True)
-class ProvedTorque:
-    """The proved bound in N m, None where there is none, and what it does not cover, in words."""
-
-    bound_Nm: float | None
-    not_proved: tuple[str, ...]
-
-
 def proved_torque(
     model: ExactModel,
     laws: Mapping[str, TableLaw],
@@ -63,21 +54,22 @@ def proved_torque(
     compiled: Compiled,
     scene: Ranges,
     limit: float,
-) -> ProvedTorque:
+) -> tuple[float | None, str]:
     """Bound |torque of the tables - torque of the model| over a scene, within the torque limit.
 
+    Gives the bound in N m, None where there is none, and what it does not cover, in words.
     ``proofs`` are those of the tables in ``compiled``, by name. The places that the measured bound
     leaves out (tip, parallel edges, beyond 1e5 N) are left out here too.
     """
     kept = {name: proof for name, proof in proofs.items() if proof is not None}
     if missing := " and ".join(name for name in proofs if name not in kept):
         why = f"torque: no bound is proved, as none is of the table of {missing.replace('_', ' ')}."
-        return ProvedTorque(None, (why,))
+        return None, why
     try:
         bound = _Scene(model, laws, kept, compiled, scene, limit).bound()
     except _NotProvedError as error:
-        return ProvedTorque(None, (f"torque: no bound is proved, as {error}.",))
-    return ProvedTorque(bound, (NO_ARITHMETIC,))
+        return None, f"torque: no bound is proved, as {error}."
+    return bound, NO_ARITHMETIC
 
 
 class _Scene:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,7 +14,6 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.model import edge_height
 from scissorcal.model.cutting import within_thickness
-from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.exact import (
     ExactModel,
     FitDraws,
@@ -22,6 +22,7 @@ from scissorcal.package.exact import (
     pick_draws,
     torque_quantiles,
 )
+from scissorcal.package.friction_tables import rendered_fits
 from scissorcal.package.grid import FELT_SHARE
 from scissorcal.package.reach import data_reach, reach_sentences
 from scissorcal.recipe.schema import Recipe
@@ -60,20 +61,13 @@ class Places:
 
 
 @dataclass(frozen=True)
-class Slice:
-    """Torque along one axis of the scene, the two others held; in curves without an end."""
-
-    along: Along
-    places: Places
-
-
-@dataclass(frozen=True)
 class SceneTorque:
     """The rendered torque over a grid of the scene, and along its axes.
 
     ``confidence`` and ``tolerance`` are the scene's, as shares. ``share`` (n,) is half of the band
     over the torque at each place of ``grid`` that can be felt, NaN elsewhere. ``not_in_band`` has
     what was not measured and may move the mean torque by more than the tolerance: check and share.
+    ``slices`` are along one axis, the two others held, in curves without an end.
     ``beyond_data`` says in sentences what of the scene no data reach (`reach`).
     """
 
@@ -82,7 +76,7 @@ class SceneTorque:
     with_friction: bool
     grid: Places
     share: Array
-    slices: tuple[Slice, ...]
+    slices: Mapping[Along, tuple[Places, ...]]
     not_in_band: tuple[tuple[str, float | None], ...]
     beyond_data: tuple[str, ...]
 
@@ -127,7 +121,7 @@ def scene_torque(recipe: Recipe, cut: FitResult | None, friction: FitResult | No
         rendered is not None,
         grid,
         share,
-        tuple(_slices(recipe, probe)),
+        _slices(recipe, probe),
         _not_in_band(probe.cut),
         reach_sentences(data_reach(recipe, probe.cut), str(probe.cut.structure["response"])),
     )
@@ -242,7 +236,7 @@ class _Probe:
         return np.asarray(found)
 
 
-def _slices(recipe: Recipe, probe: _Probe) -> list[Slice]:
+def _slices(recipe: Recipe, probe: _Probe) -> dict[Along, tuple[Places, ...]]:
     """Three slices along each axis, at three places of the others."""
     scene = recipe.scene
     fastest = scene.opening_rate_rad_per_s[1]
@@ -255,15 +249,17 @@ def _slices(recipe: Recipe, probe: _Probe) -> list[Slice]:
     rates = np.concatenate([-speeds[::-1], speeds])
     over_opening = np.linspace(*scene.opening_rad, SLICE_POINTS)
     over_contact = np.linspace(*scene.contact_m, SLICE_POINTS)
-    wanted: list[tuple[Along, tuple[float | Array, ...]]] = [
-        *(("opening", (over_opening, pace, contact)) for contact in contacts),
-        *(("opening_rate", (opening, rates, contacts[0])) for opening in openings),
-        *(("contact", (opening, pace, over_contact)) for opening in openings),
-    ]
-    return [
-        Slice(along, probe.at(*(np.array(a) for a in np.broadcast_arrays(*places))))
-        for along, places in wanted
-    ]
+    wanted: dict[Along, list[tuple[float | Array, ...]]] = {
+        "opening": [(over_opening, pace, contact) for contact in contacts],
+        "opening_rate": [(opening, rates, contacts[0]) for opening in openings],
+        "contact": [(opening, pace, over_contact) for opening in openings],
+    }
+    return {
+        along: tuple(
+            probe.at(*(np.array(a) for a in np.broadcast_arrays(*places))) for places in several
+        )
+        for along, several in wanted.items()
+    }
 
 
 def _slowest(recipe: Recipe) -> float:

@@ -38,7 +38,7 @@ def signature_refusal(manifest: Manifest, trusted: Sequence[str] | None = None) 
     signature = manifest.signature
     if signature is None:
         return "" if trusted is None else _UNSIGNED
-    why = unproved(signature, signed_text(manifest), "package")
+    why = _unproved(signature, signed_text(manifest), "package")
     if why:
         return f"has a signature {why}"
     if trusted is not None and signature.public_key not in trusted:
@@ -81,7 +81,7 @@ def against(
             "sign it, then 'scissorcal package build'"
         )
     if review.key is not None:
-        why = unproved(review.key, review.signed_text, "review")
+        why = _unproved(review.key, review.signed_text, "review")
         if why:
             return f"has a review ({review.words}) with a signature {why}"
     if trusted is not None and (review.key is None or review.key.public_key not in trusted):
@@ -94,7 +94,7 @@ def against(
     return ""
 
 
-def unproved(key: KeySignature, text: str, what: str) -> str:
+def _unproved(key: KeySignature, text: str, what: str) -> str:
     """Why a key's signature does not show who signed a text; empty where it does.
 
     ``what`` names what has the text, such as "review". The rest of a sentence on the signature.

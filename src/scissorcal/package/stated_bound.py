@@ -8,7 +8,7 @@ from scissorcal.package.compile import Compiled, scene_ranges, table_file, table
 from scissorcal.package.exact import ExactModel
 from scissorcal.package.proved_tables import ProvedTable, proved_table, seen_deviation
 from scissorcal.package.proved_torque import proved_torque
-from scissorcal.package.table_record import Bound, TableBound
+from scissorcal.package.records import Bound, TableBound
 from scissorcal.package.tables import TableLaw
 from scissorcal.recipe.schema import Recipe
 
@@ -33,7 +33,7 @@ def stated_bound(model: ExactModel, compiled: Compiled, recipe: Recipe) -> Bound
     proofs = {
         name: proved_table(law, compiled.arrays[table_file(name)]) for name, law in laws.items()
     }
-    proof = proved_torque(model, laws, proofs, compiled, scene, limit)
+    proved_Nm, not_proved = proved_torque(model, laws, proofs, compiled, scene, limit)
     return Bound(
         largest_seen_Nm=found.largest,
         stated_Nm=stated,
@@ -43,8 +43,8 @@ def stated_bound(model: ExactModel, compiled: Compiled, recipe: Recipe) -> Bound
         points=found.points,
         table_tolerance=max(choice.tolerance for choice in compiled.choices.values()),
         from_rate_rad_per_s=slowest,
-        proved_Nm=proof.bound_Nm,
-        not_proved=proof.not_proved + _unproved(proofs),
+        proved_Nm=proved_Nm,
+        not_proved=(not_proved, *_unproved(proofs)),
         tables=tuple(_table_bound(name, law, compiled, proofs[name]) for name, law in laws.items()),
     )
 

@@ -14,8 +14,9 @@ from scissorcal.package.average import energy_levels
 from scissorcal.package.compile import table_file
 from scissorcal.package.exact import exact_model, torque_quantiles
 from scissorcal.package.layer_pieces import PieceRecord
-from scissorcal.package.manifest import Parameter, PoseRecord
+from scissorcal.package.manifest import PoseRecord
 from scissorcal.package.model_package import ModelPackage, record_draws
+from scissorcal.package.records import Parameter
 from scissorcal.package.variations import Variations, central_values, variations
 from scissorcal.prototype.page_parts import (
     Band,

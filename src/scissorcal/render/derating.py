@@ -16,8 +16,7 @@ from scissorcal.kernel import (
     StepOutput,
     Table,
 )
-from scissorcal.package.layer_slopes import LayerSlopes
-from scissorcal.package.tangent import Tangent
+from scissorcal.package.layer_slopes import LayerSlopes, Tangent
 from scissorcal.render.drops import largest_drop
 from scissorcal.render.felt_cost import plate_strokes
 

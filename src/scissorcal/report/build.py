@@ -1,39 +1,31 @@
-"""Build a report: one offline HTML file to review, and its JSON twin."""
+"""Build a report: one offline HTML file to review, its JSON twin, and the twin's JSON Schema."""
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError, file_error
 from scissorcal.files import replacing
 from scissorcal.foreign import read_foreign, read_foreign_text
 from scissorcal.foreign.formats import PAGE, REPORT, SIGNATURE
-from scissorcal.identity import VERSION, bytes_digest
+from scissorcal.identity import bytes_digest
 from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN, Review
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.recording import Recording
 from scissorcal.report.comparison import Comparison
 from scissorcal.report.document import ReportDocument, compose, compose_fit
-from scissorcal.report.inputs import (
-    Cell,
-    Evidence,
-    FactSheet,
-    Geometry,
-    RecordingSummary,
-    summarise_recording,
-)
-from scissorcal.report.twin import twin_text
+from scissorcal.report.inputs import Evidence
 
 if TYPE_CHECKING:
-    from scissorcal.model.plate_pieces import LayerPiece
-    from scissorcal.package.simplest.choice import SceneChoice
+    from scissorcal.bench.trade.result import Trade
+    from scissorcal.report.comparison import Comparison
 
 
 @dataclass(frozen=True)
@@ -48,31 +40,16 @@ class ReportFiles:
 def build_report(
     recipe: Recipe,
     fits: Sequence[FitResult],
-    recordings: Sequence[RecordingSummary | Recording],
+    evidence: Evidence,
     output_dir: str | os.PathLike[str],
     *,
     created: datetime,
-    recipe_text: str = "",
-    sheets: Sequence[FactSheet] = (),
-    checks: Mapping[str, VerifyResult] | None = None,
-    geometry: Geometry | None = None,
-    inputs_hash: str = "",
-    completeness: Sequence[Cell] = (),
-    choice: SceneChoice | None = None,
-    pieces: tuple[LayerPiece, ...] = (),
     review: Review | None = None,
 ) -> ReportFiles:
     """Write ``report.html`` and ``report.json`` into ``output_dir``, replacing earlier ones.
 
-    The page needs nothing from outside itself; the twin holds the same panels. Recordings name the
-    strokes and their speeds, and are matched to ``FitResult.sources`` by path, file name or hash;
-    a fit can be reported without them, but only those with their samples give the work of each
-    stroke. ``recipe_text`` is the recipe as it was written; without it the values are printed as
-    read. ``sheets`` are further parts, such as what a package states (:func:`sheet_from_mapping`);
-    ``checks`` are trust checks by fit, ``geometry`` what photographs gave, whose pictures the page
-    carries as far as they leave it small. ``completeness`` counts what was planned, recorded and
-    used, cell by cell; ``choice`` says what of the fitted laws the scene needs; ``pieces`` are a
-    drawn plate's (`recipe.plate_layers.plate_pieces`). The page shows ``review`` (by default the
+    The page needs nothing from outside itself, and carries the pictures of ``evidence`` as far as
+    they leave it small; the twin holds the same panels. The page shows ``review`` (by default the
     one in ``signature.json`` there) where it was given to this very page and twin.
     ``created`` must carry its time zone. The same input gives the same bytes; a report that says
     the same as the one in ``output_dir`` keeps the time of that one.
@@ -84,36 +61,17 @@ def build_report(
 
     if created.tzinfo is None:
         raise ValueError("created needs a time zone, for example datetime.now(timezone.utc)")
-    geometry = geometry or Geometry()
-    if not fits and not geometry.fits:
+    if not fits and not evidence.geometry.fits:
         raise MissingError(
             "There is nothing to report yet: no fit was found. Run scissorcal fit, then "
             "scissorcal report again."
         )
-    evidence = Evidence(
-        tuple(r if isinstance(r, RecordingSummary) else summarise_recording(r) for r in recordings),
-        tuple(r for r in recordings if isinstance(r, Recording)),
-        checks or {},
-        geometry,
-        tuple(completeness),
-        choice,
-        pieces,
-    )
-    document = compose(
-        recipe,
-        fits,
-        evidence,
-        sheets,
-        recipe_text=recipe_text,
-        created=created,
-        version=VERSION,
-    )
-    document = replace(document, inputs_hash=inputs_hash)
+    document = compose(recipe, fits, evidence, created)
     files = ReportFiles(
         Path(output_dir) / "report.html", Path(output_dir) / "report.json", document
     )
     document, twin = _with_earlier_time(document, files.json)
-    page = report_page(document, geometry)
+    page = report_page(document, evidence.geometry)
     standing = _standing(review, page, twin, files)
     if standing:
         page = with_signature(page, standing)
@@ -123,30 +81,29 @@ def build_report(
 
 def document_of(recipe: Recipe, fits: Sequence[FitResult]) -> ReportDocument:
     """What a report of these fits would say, without recordings."""
-    now = datetime.now(UTC)
-    return compose(recipe, fits, Evidence(), (), recipe_text="", created=now, version=VERSION)
+    return compose(recipe, fits, Evidence(), datetime.now(UTC))
 
 
 def document_of_fit(fit: FitResult, recipe: Recipe | None) -> ReportDocument:
     """A fit alone, as one side of a comparison; ``recipe`` says what it is of, if known."""
-    return compose_fit(fit, recipe, created=datetime.now(UTC), version=VERSION)
+    return compose_fit(fit, recipe, datetime.now(UTC))
 
 
-def write_comparison(found: Comparison, output_dir: str | os.PathLike[str]) -> ReportFiles:
+def write_comparison(comparison: Comparison, output_dir: str | os.PathLike[str]) -> ReportFiles:
     """Write ``comparison.html`` and ``comparison.json``; InputError where that cannot be done."""
     from scissorcal.report.html import panels_page
 
     folder = Path(output_dir)
-    files = ReportFiles(folder / "comparison.html", folder / "comparison.json", found)
+    files = ReportFiles(folder / "comparison.html", folder / "comparison.json", comparison)
     page = panels_page(
         "Comparison of two runs",
         "A and B",
-        found.panels,
-        made=(found.created, found.scissorcal_version),
-        facts={"A": found.first, "B": found.second},
-        findings=(found.sentence,),
+        comparison.panels,
+        made=(comparison.created, comparison.scissorcal_version),
+        facts={"A": comparison.first, "B": comparison.second},
+        findings=(comparison.sentence,),
     )
-    _write_both(files, page, twin_text(found))
+    _write_both(files, page, twin_text(comparison))
     return files
 
 
@@ -215,3 +172,67 @@ def _write_both(files: ReportFiles, page: str, twin: str) -> None:
             f"The report cannot be written to {folder}: {error.strerror or error}. Free that "
             "place or name another output folder."
         ) from error
+
+
+def twin_text(document: ReportDocument | Comparison | Trade) -> str:
+    """The document as JSON: what has its default is left out, what is not finite is null."""
+    from pydantic import TypeAdapter
+
+    adapter: TypeAdapter[Any] = TypeAdapter(type(document))
+    plain = adapter.dump_python(document, mode="json", exclude_defaults=True)
+    return json.dumps(plain, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
+
+
+def read_twin(text: str | bytes) -> ReportDocument:
+    """Read a report's twin back. Raises ValueError where it is none of this version."""
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(ReportDocument).validate_json(text)
+
+
+def schema_text() -> str:
+    """The schema as it stands in ``data_schemas/report.schema.json``."""
+    return _schema_text(ReportDocument, "scissorcal report")
+
+
+def comparison_schema_text() -> str:
+    """The schema as it stands in ``data_schemas/comparison.schema.json``."""
+    from scissorcal.report.comparison import Comparison
+
+    return _schema_text(Comparison, "scissorcal comparison of two reports")
+
+
+def _schema_text(kind: type, title: str) -> str:
+    """JSON Schema (draft 2020-12) of a twin, generated from its dataclasses."""
+    from pydantic import TypeAdapter
+
+    schema: dict[str, Any] = TypeAdapter(kind).json_schema(mode="serialization")
+    for definition in (schema, *schema.get("$defs", {}).values()):
+        if definition.get("type") == "object":
+            definition["additionalProperties"] = False
+            definition["required"] = sorted(
+                name for name, entry in definition["properties"].items() if "default" not in entry
+            )
+        for entry in definition.get("properties", {}).values():
+            entry.pop("title", None)
+    whole = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": title,
+        **{name: value for name, value in schema.items() if name != "title"},
+    }
+    text = json.dumps(_short(whole), indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    return re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text)
+
+
+def _short(schema: Any) -> Any:
+    """The schema with "a number or null" as one type."""
+    if isinstance(schema, list):
+        return [_short(entry) for entry in schema]
+    if not isinstance(schema, dict):
+        return schema
+    plain = {name: _short(entry) for name, entry in schema.items()}
+    kinds = plain.get("anyOf", [])
+    if kinds and all(set(kind) == {"type"} for kind in kinds):
+        del plain["anyOf"]
+        plain["type"] = [kind["type"] for kind in kinds]
+    return plain

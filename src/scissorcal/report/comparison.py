@@ -69,7 +69,7 @@ class Comparison:
 
 def compare(first: Side, second: Side, *, created: datetime, version: str) -> Comparison:
     """Put two runs side by side. Raises InputError naming all that makes them incomparable."""
-    differences = incomparable(first.document, second.document)
+    differences = _incomparable(first.document, second.document)
     if differences:
         raise InputError(
             f"{first.source} and {second.source} cannot be compared: {'; '.join(differences)}. "
@@ -78,7 +78,7 @@ def compare(first: Side, second: Side, *, created: datetime, version: str) -> Co
         )
     torque = _torque(first, second)
     pairs = [(one, two) for one in first.document.panels if (two := second.document.panel(one.id))]
-    rows = [compare_rows(a, b) for a, b in pairs if a.part not in SKIPPED and a.id != "scene-grid"]
+    rows = [_compare_rows(a, b) for a, b in pairs if a.part not in SKIPPED and a.id != "scene-grid"]
     found = [panel for panel in rows if panel is not None]
     found.sort(key=lambda panel: not panel.id.endswith("-parameters"))
     changed = [
@@ -103,7 +103,7 @@ def compare(first: Side, second: Side, *, created: datetime, version: str) -> Co
     )
 
 
-def incomparable(first: ReportDocument, second: ReportDocument) -> list[str]:
+def _incomparable(first: ReportDocument, second: ReportDocument) -> list[str]:
     """What the two must share and do not, each as a clause; empty where they can be compared."""
     found: list[str] = []
     a, b = first.scene, second.scene
@@ -129,7 +129,7 @@ def incomparable(first: ReportDocument, second: ReportDocument) -> list[str]:
     return found
 
 
-def compare_rows(one: Panel, other: Panel) -> Panel | None:
+def _compare_rows(one: Panel, other: Panel) -> Panel | None:
     """The values of both panels, row by row: the parameters all, of others those that differ.
 
     Each row has A, B, their difference, and that in standard deviations of independent runs; runs

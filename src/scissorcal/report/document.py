@@ -9,22 +9,27 @@ from typing import Literal
 
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
+from scissorcal.identity import VERSION
 from scissorcal.package.scene_torque import SceneTorque, scene_torque
 from scissorcal.recipe.requirements import GeometryKind, requirements
 from scissorcal.recipe.schema import Recipe
-from scissorcal.report.headline import Headline, geometry_headline, write_headline
-from scissorcal.report.inputs import Evidence, FactSheet, Geometry
+from scissorcal.report.inputs import Evidence, Geometry
 from scissorcal.report.panel import Panel, absent, clean
-from scissorcal.report.strokes import StrokeSamples, strokes_of
+from scissorcal.report.strokes import FittedStroke, strokes_of
 from scissorcal.report.subjects import candidates, closing, cut, decision, posterior, torque
 from scissorcal.report.subjects.blade import blade_panels
 from scissorcal.report.subjects.camera import camera_panels
-from scissorcal.report.subjects.closing import Provenance
+from scissorcal.report.subjects.closing import Provenance, rig_panels
 from scissorcal.report.subjects.friction import friction_panel
 from scissorcal.report.subjects.plate_pose import plate_panels
-from scissorcal.report.subjects.rig import rig_panels
 from scissorcal.report.subjects.scene import scene_panels
-from scissorcal.report.subjects.trust import trust_panels
+from scissorcal.report.subjects.stated import layers_panel, simplest_panel, stated_edge_panel
+from scissorcal.report.subjects.trust import (
+    Headline,
+    geometry_headline,
+    trust_panels,
+    write_headline,
+)
 from scissorcal.verdicts import Verdict
 
 Format = Literal["scissorcal-report/2"]
@@ -92,11 +97,7 @@ def compose(
     recipe: Recipe,
     fits: Sequence[FitResult],
     evidence: Evidence,
-    sheets: Sequence[FactSheet],
-    *,
-    recipe_text: str,
     created: datetime,
-    version: str,
 ) -> ReportDocument:
     """Gather all panels; draws nothing and touches no file."""
     named: dict[str, FitResult] = {}
@@ -111,33 +112,26 @@ def compose(
         Headline(kind, "care", f"The {kind} fit is not there yet.", "not there yet", (why,))
         for kind, why in missing.items()
     ]
-    own: list[Panel] = []
+    fit_parts: list[Panel] = []
     for part, fit in keyed.items():
         check = checks.get(fit.what) if named[fit.what] is fit else None
         headlines.append(write_headline(fit, check.verdicts if check else ()))
-        own.append(_outcome(headlines[-1], part))
-        own += fit_panels(fit, strokes[part], part, evidence, named.get("friction"))
-        own += trust_panels(fit, check, part)
-    found, why = _scene(recipe, named)
+        fit_parts.append(_outcome(headlines[-1], part))
+        fit_parts += fit_panels(fit, strokes[part], part, evidence, named.get("friction"))
+        fit_parts += trust_panels(fit, check, part)
+    rendered, why = _scene(recipe, named)
     opens = (fit.position_unit == "m" for fit in fits if fit.what != "friction-advance")
     sliding = recipe.rig.joint == "linear" or any(opens)
     if sliding:
-        found, why = None, "A sliding joint carries no blades, so nothing is felt."
-    sheet_panels = [closing.sheet_panel(sheet) for sheet in sheets]
-    scene = [] if sliding or not fits else scene_panels(found, why, recipe, named.get("cut"))
+        rendered, why = None, "A sliding joint carries no blades, so nothing is felt."
+    scene = [] if sliding or not fits else scene_panels(rendered, why, recipe, named.get("cut"))
     if evidence.choice is not None:
-        from scissorcal.report.subjects.simplest import simplest_panel
-
         scene = [*scene, simplest_panel(evidence.choice, list(named.values()))]
     if recipe.rig.edge.points_mm is not None and not sliding:
-        from scissorcal.report.subjects.stated_edge import stated_edge_panel
-
         scene = [*scene, stated_edge_panel(recipe)]
     if evidence.pieces:
-        from scissorcal.report.subjects.layers import layers_panel
-
         scene = [*scene, layers_panel(recipe, evidence.pieces)]
-    provenance = closing.trace(recipe, recipe_text, keyed, evidence.recordings, geometry, checks)
+    provenance = closing.trace(recipe, keyed, replace(evidence, geometry=geometry, checks=checks))
     photographed = _geometry_panels(geometry, evidence.geometry, missing)
     cells = decision.cells_of(
         [(fit, strokes[part]) for part, fit in keyed.items()], replace(evidence, geometry=geometry)
@@ -146,58 +140,57 @@ def compose(
     verdicts = [v for kind in geometry.fits.values() for v in kind.verdicts]
     verdicts += [v for fit in fits for v in fit.verdicts]
     verdicts += [v for check in checks.values() for v in check.verdicts]
-    verdicts += [v for sheet in sheets for v in sheet.verdicts]
+    verdicts += [v for panel in evidence.panels for v in panel.verdicts]
     origin = decision.origin_of(evidence.recordings)
     panels = (
         decision.origin_panel(origin, evidence.recordings),
         decision.trust_panel(headlines, list(named)),
         totals,
         decision.checked_panel(list(named.values()), checks),
-        decision.felt_panel(found, why, fits, recipe),
-        decision.weaknesses_panel(fits, found, verdicts, cells),
-        verdict_panel(verdicts),
+        decision.felt_panel(rendered, why, fits, recipe),
+        decision.weaknesses_panel(fits, rendered, verdicts, cells),
+        _verdict_panel(verdicts),
         every_cell,
         *scene,
         *photographed,
-        *own,
-        *sheet_panels,
+        *fit_parts,
+        *evidence.panels,
         closing.left_out_panel(recipe, fits, dict(missing.items())),
         closing.provenance_panel(provenance, evidence.recordings),
         *rig_panels(evidence.recordings),
     )
     return ReportDocument(
-        FORMAT, created, version, recipe.name, recipe.description, recipe.material.name, origin,
-        scene_facts(recipe), _parts(panels, headlines, keyed), panels, provenance,
+        FORMAT, created, VERSION, recipe.name, recipe.description, recipe.material.name, origin,
+        _scene_facts(recipe), _parts(panels, headlines, keyed), panels, provenance,
+        evidence.inputs_hash,
     )  # fmt: skip
 
 
-def compose_fit(
-    fit: FitResult, recipe: Recipe | None, *, created: datetime, version: str
-) -> ReportDocument:
+def compose_fit(fit: FitResult, recipe: Recipe | None, created: datetime) -> ReportDocument:
     """A fit alone; ``recipe`` says what it is of, if that is known."""
     part = fit.what
     panels = (
-        verdict_panel(fit.verdicts),
+        _verdict_panel(fit.verdicts),
         *fit_panels(fit, strokes_of(fit, part, ()), part, Evidence(), None),
     )
     return ReportDocument(
         FORMAT,
         created,
-        version,
+        VERSION,
         recipe.name if recipe else "",
         recipe.description if recipe else "",
         recipe.material.name if recipe else "",
         "unknown",
-        scene_facts(recipe) if recipe else None,
+        _scene_facts(recipe) if recipe else None,
         (),
         panels,
-        closing.trace(recipe, "", {part: fit}),
+        closing.trace(recipe, {part: fit}, Evidence()),
     )
 
 
 def fit_panels(
     fit: FitResult,
-    strokes: tuple[StrokeSamples, ...],
+    strokes: tuple[FittedStroke, ...],
     part: str,
     evidence: Evidence,
     friction: FitResult | None,
@@ -207,7 +200,7 @@ def fit_panels(
     if fit.what == "cut":
         physics += [
             cut.response_panel(fit, part),
-            cut.work_panel(fit, friction, evidence.raw, strokes, part),
+            cut.work_panel(fit, friction, evidence.recordings, strokes, part),
             cut.edge_panel(fit, strokes, part),
         ]
     return (
@@ -225,7 +218,7 @@ def fit_panels(
     )
 
 
-def verdict_panel(verdicts: Sequence[Verdict]) -> Panel:
+def _verdict_panel(verdicts: Sequence[Verdict]) -> Panel:
     """Every verdict, failures first; within an outcome they keep their order."""
     ordered = sorted(map(clean, verdicts), key=lambda verdict: ORDER.index(verdict.status))
     counts = {status: sum(v.status == status for v in ordered) for status in ORDER}
@@ -238,7 +231,7 @@ def verdict_panel(verdicts: Sequence[Verdict]) -> Panel:
     return Panel("verdicts-all", "verdicts", "Every check", sentence, verdicts=tuple(ordered))
 
 
-def scene_facts(recipe: Recipe) -> SceneFacts:
+def _scene_facts(recipe: Recipe) -> SceneFacts:
     """What of a recipe two reports must agree in."""
     return SceneFacts(
         recipe.rig.joint,
@@ -327,9 +320,9 @@ def _parts(
     for part, fit in fits.items():
         again = f" {part.rpartition('-')[2]}" if part != fit.what else ""
         titles[part] = f"{fit.what.capitalize()} fit{again}: {fit.candidate}, {fit.effort} effort"
-    found = []
+    parts = []
     for part in dict.fromkeys(p.part for p in panels if p.part != decision.PART):
         first = next(panel for panel in panels if panel.part == part)
         sentence = said.get(part) or first.sentence
-        found.append(Part(part, titles.get(part, first.title), sentence))
-    return tuple(found)
+        parts.append(Part(part, titles.get(part, first.title), sentence))
+    return tuple(parts)

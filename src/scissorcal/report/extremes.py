@@ -35,7 +35,7 @@ def extremes_panels(tried: Tried, long_run: Judgement) -> list[Panel]:
     """All panels, in order: totals with the verdict, the long run, refusals, maps."""
     answers = [(state, answer) for state, judgements in tried for answer in judgements]
     subjects = dict.fromkeys(answer.subject for _, answer in answers)
-    maps = [maps_panel([a for a in answers if a[1].subject == name]) for name in subjects]
+    maps = [_maps_panel([a for a in answers if a[1].subject == name]) for name in subjects]
     said = f"{long_run.outcome.capitalize()}: {long_run.sentence}."
     run = Panel("long-run", PART, "A long run", said)
     return [totals_panel(answers, [long_run.outcome]), run, refusals_panel(answers), *maps]
@@ -94,7 +94,7 @@ def _total(name: str, answers: Sequence[Judgement]) -> Row:
     return Row(name, values)
 
 
-def maps_panel(answers: Answers) -> Panel:
+def _maps_panel(answers: Answers) -> Panel:
     """Maps of one subject's errors over pairs of quantities."""
     subject = answers[0][1].subject
     pairs = dict.fromkeys(state.swept for state, _ in answers if len(state.swept) == 2)

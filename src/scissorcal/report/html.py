@@ -10,21 +10,20 @@ from typing import TYPE_CHECKING
 
 from scissorcal.identity import bytes_digest
 from scissorcal.report.numbers import short, unit_text
-from scissorcal.report.panel import Chart, Panel, Picture, Row, columns
+from scissorcal.report.panel import Chart, Panel, Picture, Row, columns, limit_text
 from scissorcal.report.pictures import (
     PAGE_BYTES,
     PICTURE_BYTES,
     Image,
-    PictureFile,
     place_pictures,
 )
 from scissorcal.report.signature_block import SIGNATURE, signature_block
 from scissorcal.report.svg import svg
-from scissorcal.report.text import limit_text
 from scissorcal.verdicts import Verdict
 
 if TYPE_CHECKING:
     from datetime import datetime
+    from pathlib import Path
 
     from scissorcal.report.document import ReportDocument
     from scissorcal.report.inputs import Geometry
@@ -45,10 +44,10 @@ def report_page(document: ReportDocument, geometry: Geometry) -> str:
     """Write the page with as many pictures as it can carry and stay below `PAGE_BYTES`."""
     page = _report(document)
     shown = [(panel.part, picture) for panel in document.panels for picture in panel.pictures]
-    files: dict[str, list[PictureFile]] = {}
+    files: dict[str, list[tuple[Path, int]]] = {}
     for part, picture in shown:
         paths = (path for path in geometry.pictures.get(part, ()) if path.name == picture.file)  # type: ignore[call-overload]
-        files.setdefault(part, []).append(PictureFile(next(paths), picture.widest_px))
+        files.setdefault(part, []).append((next(paths), picture.widest_px))
     # the words around pictures take room too: some hundred bytes each
     room = min(PAGE_BYTES - len(page.encode()) - 1000 * len(shown), PICTURE_BYTES)
     images = {part: iter(own) for part, own in place_pictures(files, room).items()}
@@ -78,7 +77,7 @@ def panels_page(
     body = (
         f'<main><section id="decision" class="plain"><p class="kicker">{escape(kicker)}</p>'
         f"<h1>{prose(heading)}</h1>{f'<dl>{listed}</dl>' if listed else ''}{said}"
-        f"{made_line(when.strftime('%Y-%m-%d %H:%M %Z'), version)}</section>"
+        f"{_made_line(when.strftime('%Y-%m-%d %H:%M %Z'), version)}</section>"
         f"{parts_nav([(panel.id, panel.title) for panel in panels])}"
     )
     for panel in panels:
@@ -146,7 +145,7 @@ def _asset(name: str) -> str:
     return resources.files("scissorcal.report").joinpath("assets", name).read_text("utf-8")
 
 
-def made_line(when: str, version: str) -> str:
+def _made_line(when: str, version: str) -> str:
     """When and by which version a page was made."""
     return f'<p class="meta">Made {escape(when)} by scissorcal {escape(version)}</p>'
 
@@ -155,7 +154,7 @@ def _decision(document: ReportDocument) -> str:
     """The decision page: one screen, one printed page."""
     origin, *others = document.panels_of("decision")
     lead = ". ".join(part for part in (document.material, document.recipe_description) if part)
-    made = made_line(document.created.strftime("%Y-%m-%d %H:%M %Z"), document.scissorcal_version)
+    made = _made_line(document.created.strftime("%Y-%m-%d %H:%M %Z"), document.scissorcal_version)
     cards = "".join(_card(panel) for panel in others)
     return (
         f'<section id="decision" aria-labelledby="report-title"><header><div>'

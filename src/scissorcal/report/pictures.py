@@ -18,14 +18,6 @@ PICTURE_BYTES = 2_400_000
 
 
 @dataclass(frozen=True)
-class PictureFile:
-    """A picture on disk, to be made at most ``widest_px`` wide."""
-
-    path: Path
-    widest_px: int
-
-
-@dataclass(frozen=True)
 class Image:
     """A picture for the page: a data URI of a JPEG, or empty with the reason in ``missing``."""
 
@@ -36,48 +28,50 @@ class Image:
 
 
 def place_pictures(
-    files: Mapping[str, Sequence[PictureFile]], room: int
+    files: Mapping[str, Sequence[tuple[Path, int]]], room: int
 ) -> dict[str, tuple[Image, ...]]:
     """Make the pictures of each part ready for the page, as many as ``room`` bytes hold.
 
-    The first of every part come before the second of any, so that each part shows something.
+    ``files`` has the path of each picture, and how many pixels wide it may be. The first of every
+    part come before the second of any, so that each part shows something.
     """
     placed: dict[Path, Image] = {}
     taken = 0
     for file in chain.from_iterable(zip_longest(*files.values())):
         if file is None:
             continue
-        image = _read(file)
+        path, widest_px = file
+        image = _read(path, widest_px)
         if image.data and taken + len(image.data) > room:
-            image = _without(file, "left out to keep this page small")
+            image = _without(path, "left out to keep this page small")
         taken += len(image.data)
-        placed[file.path] = image
-    return {what: tuple(placed[file.path] for file in own) for what, own in files.items()}
+        placed[path] = image
+    return {what: tuple(placed[path] for path, _ in part) for what, part in files.items()}
 
 
-def _read(file: PictureFile) -> Image:
+def _read(path: Path, widest_px: int) -> Image:
     """The picture as a small JPEG; with the reason where it cannot be read."""
     import cv2
 
     from scissorcal.vision.photo import read_photo
 
     try:
-        image = read_photo(file.path).image
+        image = read_photo(path).image
     except InputError:
-        return _without(file, "not there any more, or damaged")
+        return _without(path, "not there any more, or damaged")
     height, width = image.shape[:2]
-    if width > file.widest_px:
-        size = (file.widest_px, max(round(height * file.widest_px / width), 1))
+    if width > widest_px:
+        size = (widest_px, max(round(height * widest_px / width), 1))
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)  # type: ignore[assignment]
     height, width = image.shape[:2]
     # colours at full resolution: what is drawn is one pixel wide
     full = (cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
     done, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY, *full])
     if not done:
-        return _without(file, "not there any more, or damaged")
+        return _without(path, "not there any more, or damaged")
     data = "data:image/jpeg;base64," + base64.b64encode(jpeg.tobytes()).decode("ascii")
     return Image(data, width, height)
 
 
-def _without(file: PictureFile, why: str) -> Image:
-    return Image("", 0, 0, f"{file.path.name} is {why}.")
+def _without(path: Path, why: str) -> Image:
+    return Image("", 0, 0, f"{path.name} is {why}.")

@@ -1,18 +1,18 @@
 """Which samples of a fit belong to which stroke, and the words and units of its channels."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult
-from scissorcal.recording.recording import Stroke, StrokeKind
-from scissorcal.report.inputs import RecordingSummary
+from scissorcal.recording.recording import Recording, Stroke, StrokeKind
 from scissorcal.report.numbers import Number, finite, short
 from scissorcal.report.panel import Look
-from scissorcal.report.reduce import median
 
 KINDS: dict[str, StrokeKind] = {
     "closing": "closing",
@@ -32,6 +32,9 @@ LOOKS: dict[str, Look] = {
 }
 """Each kind of stroke has colour and mark of a name (doi:10.1038/nmeth.1618)."""
 BETWEEN = "between strokes"
+SAME_SPEED = 0.05
+
+Against = Literal["opening", "time"]
 
 
 @dataclass(frozen=True)
@@ -69,12 +72,13 @@ def look_of(kind: str) -> Look:
 
 
 @dataclass(frozen=True)
-class StrokeName:
-    """A stroke's identity: ``anchor`` is its address on the page, ``label`` its name in words.
+class FittedStroke:
+    """A stroke of a fit, with its ``places`` in the fit's series, (n,), in order of time.
 
-    ``recording`` is the file that the fit names; ``stroke`` the number that the fit gives, which
-    counts on over its recordings; ``speed`` the planned rate's magnitude in the fit's position
-    unit per second, None where the stroke has no planned or no single speed.
+    ``anchor`` is its address on the page, ``label`` its name in words, ``recording`` the file that
+    the fit names, ``stroke`` the number that the fit gives, which counts on over its recordings;
+    ``speed`` is the planned rate's magnitude in the fit's position unit per second, None where the
+    stroke has no planned or no single speed.
     """
 
     anchor: str
@@ -84,19 +88,36 @@ class StrokeName:
     kind: str
     speed: Number
     sheet: int
+    places: NDArray[np.int64]
+
+    @property
+    def against(self) -> Against:
+        """What it is shown over: a movement with a direction over opening, any other over time."""
+        between = self.label.startswith(BETWEEN) or self.kind == "excitation"
+        return "time" if between else "opening"
 
 
 @dataclass(frozen=True)
-class StrokeSamples:
-    """A stroke's name and its places in the fit's series, shape (n,), in order of time."""
+class TorqueGroup:
+    """Strokes that are shown together: all closing and opening at one speed, say."""
 
-    name: StrokeName
-    places: NDArray[np.int64]
+    title: str
+    strokes: tuple[FittedStroke, ...]
+
+    @property
+    def against(self) -> Against:
+        """What its strokes are shown over."""
+        return self.strokes[0].against
+
+    @property
+    def places(self) -> NDArray[np.int64]:
+        """Places of all its strokes in the fit's series."""
+        return np.concatenate([stroke.places for stroke in self.strokes])
 
 
 def strokes_of(
-    fit: FitResult, fit_anchor: str, recordings: Sequence[RecordingSummary]
-) -> tuple[StrokeSamples, ...]:
+    fit: FitResult, fit_anchor: str, recordings: Sequence[Recording]
+) -> tuple[FittedStroke, ...]:
     """Part a fit's series into strokes, in order of recording and stroke."""
     series = fit.series
     if len(series.stroke) == 0:
@@ -104,7 +125,7 @@ def strokes_of(
     keys = np.unique(np.stack([series.recording, series.stroke]), axis=1).T
     planned = _planned_strokes(fit, recordings)
     several = len({int(recording) for recording, _ in keys}) > 1
-    found = []
+    strokes = []
     for recording, label in keys:
         places = np.flatnonzero((series.recording == recording) & (series.stroke == label))
         places = places[np.argsort(series.time_s[places], kind="stable")]
@@ -112,20 +133,33 @@ def strokes_of(
         words = stroke_label(stroke, int(label), fit.position_unit)
         if several:
             words += f", recording {recording + 1}"
-        name = StrokeName(
-            f"{fit_anchor}-r{recording}-s{label if label >= 0 else 'between'}",
-            words,
-            source_of(fit, int(recording)),
-            int(label),
-            stroke.kind,
-            finite(stroke.speed),
-            stroke.sheet,
+        strokes.append(
+            FittedStroke(
+                f"{fit_anchor}-r{recording}-s{label if label >= 0 else 'between'}",
+                words,
+                _source_of(fit, int(recording)),
+                int(label),
+                stroke.kind,
+                finite(stroke.speed),
+                stroke.sheet,
+                places,
+            )
         )
-        found.append(StrokeSamples(name, places))
-    return tuple(found)
+    return tuple(strokes)
 
 
-def source_of(fit: FitResult, recording: int) -> str:
+def group_strokes(fit: FitResult, strokes: Sequence[FittedStroke]) -> tuple[TorqueGroup, ...]:
+    """Group strokes by speed (those of a cut also by kind); an excitation stands alone."""
+    grouped: dict[tuple[str, float], list[FittedStroke]] = {}
+    pace = _common_speeds([stroke.speed for stroke in strokes])
+    for stroke in strokes:
+        grouped.setdefault(_key(fit, stroke, pace), []).append(stroke)
+    return tuple(
+        TorqueGroup(_title(fit, members), tuple(members)) for _, members in sorted(grouped.items())
+    )
+
+
+def _source_of(fit: FitResult, recording: int) -> str:
     """The file that a recording's index in the series stands for."""
     if 0 <= recording < len(fit.sources):
         return split_source(fit.sources[recording])[0]
@@ -162,8 +196,8 @@ def kind_word(kind: str, position_unit: str) -> str:
     return kind
 
 
-def summary_of(source: str, recordings: Sequence[RecordingSummary]) -> RecordingSummary | None:
-    """Find the summary of a fit's source: by hash where both state one, else by file."""
+def recording_of(source: str, recordings: Sequence[Recording]) -> Recording | None:
+    """Find the recording that a fit names: by hash where both state one, else by file."""
     path, digest = split_source(source)
     for recording in recordings:
         if digest and recording.content_hash == digest:
@@ -172,19 +206,52 @@ def summary_of(source: str, recordings: Sequence[RecordingSummary]) -> Recording
         if not digest and recording.source and recording.source == path:
             return recording
     for recording in recordings:
-        if not digest and recording.source and recording.name == PurePath(path).name:
+        if (
+            not digest
+            and recording.source
+            and PurePath(recording.source).name == PurePath(path).name
+        ):
             return recording
     return None
 
 
-def _planned_strokes(fit: FitResult, recordings: Sequence[RecordingSummary]) -> dict[int, Stroke]:
+def _key(fit: FitResult, stroke: FittedStroke, pace: Mapping[float, float]) -> tuple[str, float]:
+    if stroke.against == "time":
+        return f"z {stroke.anchor}", 0.0
+    kind = stroke.kind if fit.what == "cut" else ""
+    return kind, np.inf if stroke.speed is None else pace[stroke.speed]
+
+
+def _common_speeds(speeds: Iterable[Number]) -> dict[float, float]:
+    """Each speed with the slowest of those that are nearly the same, within ``SAME_SPEED``."""
+    common: dict[float, float] = {}
+    slowest = -np.inf
+    for speed in sorted({speed for speed in speeds if speed is not None}):
+        if speed > (1.0 + SAME_SPEED) * slowest:
+            slowest = speed
+        common[speed] = slowest
+    return common
+
+
+def _title(fit: FitResult, members: Sequence[FittedStroke]) -> str:
+    first = members[0]
+    if first.against == "time":
+        return first.label
+    kinds = " and ".join(sorted({kind_word(m.kind, fit.position_unit) for m in members}))
+    if first.speed is None:
+        return f"{kinds}, no planned speed"
+    speed = median(np.array([member.speed or np.nan for member in members]))
+    return f"{kinds} at {short(speed)} {fit.position_unit}/s"
+
+
+def _planned_strokes(fit: FitResult, recordings: Sequence[Recording]) -> dict[int, Stroke]:
     """Planned strokes by the number the fit gives them: they count on over its recordings."""
     planned: list[Stroke] = []
     for source in fit.sources:
-        summary = summary_of(source, recordings)
-        if summary is None:
+        recording = recording_of(source, recordings)
+        if recording is None:
             break
-        planned += summary.strokes
+        planned += recording.strokes
     return dict(enumerate(planned))
 
 
@@ -195,3 +262,56 @@ def _unplanned(fit: FitResult, label: int, places: NDArray[np.int64]) -> Stroke:
             return Stroke(label, KINDS[error.kind])
     rate = median(fit.series.opening_rate[places])
     return Stroke(label, "closing" if rate < 0 else "opening" if rate > 0 else "excitation")
+
+
+def rms(values: Array) -> float:
+    """Root mean square of the finite values; NaN where there are none."""
+    kept = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(kept**2))) if len(kept) else float("nan")
+
+
+def mean(values: Array) -> float:
+    """Mean of the finite values; NaN where there are none."""
+    kept = values[np.isfinite(values)]
+    return float(np.mean(kept)) if len(kept) else float("nan")
+
+
+def median(values: Array) -> float:
+    """Median of the finite values; NaN where there are none."""
+    kept = values[np.isfinite(values)]
+    return float(np.median(kept)) if len(kept) else float("nan")
+
+
+def block_means(values: Array, blocks: int) -> Array:
+    """Means of what is finite over consecutive blocks of nearly equal length.
+
+    Shape (min(blocks, n),); NaN for a block without a finite value.
+    """
+    count = min(blocks, len(values))
+    if count == 0:
+        return np.zeros(0)
+    starts = np.arange(count) * len(values) // count
+    known = np.isfinite(values)
+    sums = np.add.reduceat(np.where(known, values, 0.0), starts)
+    counts = np.add.reduceat(known.astype(np.float64), starts)
+    means = np.full(count, np.nan)
+    np.divide(sums, counts, out=means, where=counts > 0)
+    return means
+
+
+def thinned(places: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+    """At most ``most`` of the places, evenly spread."""
+    if len(places) <= most:
+        return places
+    return places[np.linspace(0, len(places) - 1, most).round().astype(np.int64)]
+
+
+def limits_of(*values: Array, margin: float = 0.06) -> tuple[float, float] | None:
+    """Limits of an axis that holds all finite values; None where there are none."""
+    joined = np.concatenate([np.ravel(value) for value in values]) if values else np.zeros(0)
+    kept = joined[np.isfinite(joined)]
+    if len(kept) == 0:
+        return None
+    low, high = float(kept.min()), float(kept.max())
+    room = margin * (high - low) or 0.1 * abs(high) or 1.0
+    return low - room, high + room

@@ -103,7 +103,7 @@ def reading(chart: Chart) -> str:
     return " ".join(words)
 
 
-def label_of(axis: Axis) -> str:
+def _label_of(axis: Axis) -> str:
     """An axis's label with its unit."""
     return f"{axis.label} [{unit_text(axis.unit)}]" if axis.unit else axis.label
 
@@ -204,13 +204,13 @@ def _grid(
         link = chart.y.links[number] if number < len(chart.y.links) else ""
         parts.append(f'<a href="#{escape(link)}">{label}</a>' if link else label)
     middle = 0.5 * (left + right)
-    label = escape(label_of(chart.x))
+    label = escape(_label_of(chart.x))
     parts.append(f'<text x="{middle:.1f}" y="{height - 8}" class="mid axis">{label}</text>')
     if chart.y.label:
         at = 0.5 * (TOP + bottom)
         parts.append(
             f'<text transform="translate(12 {at:.1f}) rotate(-90)" class="mid axis">'
-            f"{escape(label_of(chart.y))}</text>"
+            f"{escape(_label_of(chart.y))}</text>"
         )
     return "".join(parts)
 

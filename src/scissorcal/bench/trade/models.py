@@ -8,7 +8,6 @@ from scissorcal.bench.trade.case import Case
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.kernel import ModelTables
-from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.compile import (
     TOLERANCE,
     Compiled,
@@ -17,6 +16,7 @@ from scissorcal.package.compile import (
     scene_ranges,
 )
 from scissorcal.package.exact import ExactModel, central_model, pick_draws
+from scissorcal.package.friction_tables import rendered_fits
 from scissorcal.package.simplest.law import Law
 from scissorcal.package.simplest.model import simplest_model
 from scissorcal.package.smallest_tables import smallest_tables

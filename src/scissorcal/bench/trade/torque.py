@@ -12,7 +12,6 @@ from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.point import Error
 from scissorcal.calibration.result import FitResult
 from scissorcal.model import FrictionLaw, edge_height, friction_torque
-from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.compile import SLOWEST_EPS, scene_ranges
 from scissorcal.package.exact import (
     ExactModel,
@@ -22,6 +21,7 @@ from scissorcal.package.exact import (
     pick_draws,
     torque_quantiles,
 )
+from scissorcal.package.friction_tables import rendered_fits
 from scissorcal.package.grid import Points, spread_points
 
 PLACES = 400

@@ -17,9 +17,8 @@ from scissorcal.package.compile import Compiled
 from scissorcal.package.exact import ExactModel, FitDraws, central_model
 from scissorcal.package.friction_tables import least_factor
 from scissorcal.package.simplest.law import Law, column
-from scissorcal.package.simplest.project import Projection, Reference
+from scissorcal.package.simplest.project import Projection, Reference, Walked, cost_of, walk
 from scissorcal.package.simplest.record import AspectRecord, RigFriction, Simplification
-from scissorcal.package.simplest.walk import Walked, cost_of, walk
 from scissorcal.package.smallest_tables import package_tables
 from scissorcal.package.table_cost import table_bytes
 from scissorcal.recipe.schema import Recipe

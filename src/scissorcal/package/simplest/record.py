@@ -4,24 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+from scissorcal.package.records import NonNegative, Section
+
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 Name = Annotated[str, Field(max_length=100)]
 AspectName = Literal["friction", "fracture", "edge", "damping", "response", "closure"]
 Verdict = Literal["enough", "not enough", "not cheaper"]
 
 
-class Record(BaseModel):
-    """Base of the objects below: frozen, no unknown keys, no conversions, no NaN."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
-    )
-
-
-class Cost(Record):
+class Cost(Section):
     """How far the torque of a simpler law is from that of the fit, over the scene.
 
     ``worst_share`` is the largest difference as a share of the local torque where it can be felt,
@@ -53,7 +46,7 @@ def _two_digits(value: float) -> str:
     return f"{value:.0f}" if value >= 99.5 else f"{value:.2g}"
 
 
-class TriedCandidate(Record):
+class TriedCandidate(Section):
     """A candidate as it was judged, together with what was left out before it."""
 
     name: Name
@@ -61,7 +54,7 @@ class TriedCandidate(Record):
     cost: Cost
 
 
-class AspectRecord(Record):
+class AspectRecord(Section):
     """One aspect of the law: what the data support, what the scene needs, and what was tried.
 
     ``fitted`` is the candidate of the fit, ``used`` that of the package. Where they differ,
@@ -82,7 +75,7 @@ class AspectRecord(Record):
         return self.used != self.fitted
 
 
-class RigFriction(Record):
+class RigFriction(Section):
     """Friction of the rig itself, as fitted: the check before a rendering needs it.
 
     ``levels`` are the 5 % quantiles of the friction fit's Coulomb and viscous parameters by name,
@@ -96,7 +89,7 @@ class RigFriction(Record):
     least_factor: NonNegative
 
 
-class Simplification(Record):
+class Simplification(Section):
     """The walk from the cheapest candidate of each aspect to the one that the scene needs.
 
     ``asked`` is ``scene.simplify``; without it nothing is tried. The scene's ``tolerance`` is

@@ -13,9 +13,16 @@ from scissorcal.model import Response, edge_height, mean_share
 from scissorcal.model.friction_terms import PARAMETERS, side_of, terms_of
 from scissorcal.model.terms import Role
 from scissorcal.package.exact import FitDraws
-from scissorcal.package.simplest.candidates import NONE, Candidate
 from scissorcal.package.simplest.difference import Scene
-from scissorcal.package.simplest.law import Law, column, structured, with_columns, without
+from scissorcal.package.simplest.law import (
+    NONE,
+    Candidate,
+    Law,
+    column,
+    structured,
+    with_columns,
+    without,
+)
 
 EDGE_FIELDS = ("offset_m", "taper_rad", "curvature_per_m", "bend_per_m2")
 EDGE_TERMS = {"line": 2, "arc": 3, "cubic": 4}

@@ -22,8 +22,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.reduce import median
-from scissorcal.report.strokes import StrokeSamples
+from scissorcal.report.strokes import FittedStroke, median
 
 SAME_WITHIN = 1e-3
 
@@ -48,7 +47,7 @@ class Candidate:
         return "✓ used" if self.chosen else "≈ equivalent" if self.equivalent else "✗ worse"
 
 
-def candidates_of(fit: FitResult) -> tuple[Candidate, ...]:
+def _candidates_of(fit: FitResult) -> tuple[Candidate, ...]:
     """Candidates in the fit's order, the simplest first."""
     return tuple(_candidate(entry) for entry in fit.candidates)
 
@@ -56,25 +55,27 @@ def candidates_of(fit: FitResult) -> tuple[Candidate, ...]:
 def candidates_panel(fit: FitResult, part: str) -> Panel:
     """Every candidate with its scores."""
     title, id_ = "Candidate models", f"{part}-candidates"
-    found = candidates_of(fit)
-    if not found:
+    candidates = _candidates_of(fit)
+    if not candidates:
         return absent(id_, part, title, "No candidates were compared.")
-    lowest = min((one.bic for one in found if one.bic is not None), default=None)
+    lowest = min(
+        (candidate.bic for candidate in candidates if candidate.bic is not None), default=None
+    )
     rows = tuple(
         Row(
-            one.name,
+            candidate.name,
             (
-                count("parameters", one.parameters),
-                number("BIC", one.bic, digits=6),
-                number("above the lowest BIC", _less(one.bic, lowest), digits=3),
-                number("hold-out rms", one.held_out_rms, fit.effort_unit),
-                number("hold-out ELPD", one.held_out_elpd, digits=6),
-                number("PSIS-LOO", one.loo, digits=6, sd=one.loo_se),
-                words("outcome", one.outcome),
+                count("parameters", candidate.parameters),
+                number("BIC", candidate.bic, digits=6),
+                number("above the lowest BIC", _less(candidate.bic, lowest), digits=3),
+                number("hold-out rms", candidate.held_out_rms, fit.effort_unit),
+                number("hold-out ELPD", candidate.held_out_elpd, digits=6),
+                number("PSIS-LOO", candidate.loo, digits=6, sd=candidate.loo_se),
+                words("outcome", candidate.outcome),
             ),
-            marked=one.chosen,
+            marked=candidate.chosen,
         )
-        for one in found
+        for candidate in candidates
     )
     caption = (
         "The simplest first. Lower BIC, lower hold-out rms, higher ELPD (expected log predictive "
@@ -86,9 +87,13 @@ def candidates_panel(fit: FitResult, part: str) -> Panel:
 
 def passed_over(fit: FitResult) -> tuple[tuple[str, str], ...]:
     """Candidates that were not chosen, each with what choosing it would change."""
-    found = candidates_of(fit)
-    chosen = next((one for one in found if one.chosen), None)
-    return tuple((one.name, _cost(one, chosen)) for one in found if not one.chosen)
+    candidates = _candidates_of(fit)
+    chosen = next((candidate for candidate in candidates if candidate.chosen), None)
+    return tuple(
+        (candidate.name, _cost(candidate, chosen))
+        for candidate in candidates
+        if not candidate.chosen
+    )
 
 
 def critic_panel(fit: FitResult, part: str) -> Panel:
@@ -124,7 +129,7 @@ def critic_panel(fit: FitResult, part: str) -> Panel:
     return Panel(id_, part, title, sentence, rows, notes=(note,))
 
 
-def replay_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
+def replay_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> Panel:
     """Errors of replaying one stroke and of the model, by unseen stroke."""
     title, id_ = "Replay of one recorded stroke", f"{part}-replay"
     replay = fit.replay
@@ -134,36 +139,38 @@ def replay_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) ->
             f"{fit.words} --force` makes it where there are strokes to compare."
         )
         return absent(id_, part, title, why)
-    names = {(one.name.stroke, one.name.recording): one.name for one in strokes}
+    names = {(stroke.stroke, stroke.recording): stroke for stroke in strokes}
     rows = []
-    for one in replay.rows:
-        name = names.get((one.stroke, one.recording))
+    for error in replay.rows:
+        name = names.get((error.stroke, error.recording))
         rows.append(
             Row(
-                name.label if name else f"stroke {one.stroke}",
+                name.label if name else f"stroke {error.stroke}",
                 (
-                    words("new in it", one.novelty),
-                    number("replay", one.replay_rms, fit.effort_unit),
-                    number("model", one.model_rms, fit.effort_unit),
-                    number("model of that one stroke", one.one_stroke_rms, fit.effort_unit),
-                    percent_of("covered by the replay", one.covered),
+                    words("new in it", error.novelty),
+                    number("replay", error.replay_rms, fit.effort_unit),
+                    number("model", error.model_rms, fit.effort_unit),
+                    number("model of that one stroke", error.one_stroke_rms, fit.effort_unit),
+                    percent_of("covered by the replay", error.covered),
                 ),
                 link=name.anchor if name else "",
-                marked=(finite(one.model_rms) or 0.0) > (finite(one.replay_rms) or np.inf),
+                marked=(finite(error.model_rms) or 0.0) > (finite(error.replay_rms) or np.inf),
             )
         )
-    kinds = list(dict.fromkeys(one.novelty for one in replay.rows))
+    kinds = list(dict.fromkeys(error.novelty for error in replay.rows))
     series = []
     for label, key, look in (
         ("replay", "replay_rms", "vermillion"),
         ("model", "model_rms", "blue"),
     ):
         up = -0.13 if key == "replay_rms" else 0.13
-        x = [getattr(one, key) for one in replay.rows]
-        y = [kinds.index(one.novelty) + up for one in replay.rows]
+        x = [getattr(error, key) for error in replay.rows]
+        y = [kinds.index(error.novelty) + up for error in replay.rows]
         series.append(points(label, x, y, look, toggle=True))  # type: ignore[arg-type]
         middle = [
-            median(np.array([v for v, one in zip(x, replay.rows, strict=True) if one.novelty == k]))
+            median(
+                np.array([v for v, error in zip(x, replay.rows, strict=True) if error.novelty == k])
+            )
             for k in kinds
         ]
         at = [place + up for place in range(len(kinds))]
@@ -211,22 +218,24 @@ def _less(value: Number, other: Number) -> Number:
     return None if value is None or other is None else value - other
 
 
-def _cost(one: Candidate, chosen: Candidate | None) -> str:
-    found = []
-    if chosen and one.bic is not None and chosen.bic is not None:
-        change = one.bic - chosen.bic
-        found.append(f"its BIC is {short(abs(change))} {'higher' if change >= 0 else 'lower'}")
-    if chosen and one.held_out_rms is not None and chosen.held_out_rms:
-        found.append(
-            f"its hold-out error is {_compared(one.held_out_rms / chosen.held_out_rms - 1)}"
+def _cost(candidate: Candidate, chosen: Candidate | None) -> str:
+    changes = []
+    if chosen and candidate.bic is not None and chosen.bic is not None:
+        change = candidate.bic - chosen.bic
+        changes.append(f"its BIC is {short(abs(change))} {'higher' if change >= 0 else 'lower'}")
+    if chosen and candidate.held_out_rms is not None and chosen.held_out_rms:
+        changes.append(
+            f"its hold-out error is {_compared(candidate.held_out_rms / chosen.held_out_rms - 1)}"
         )
-    if not found or chosen is None:
+    if not changes or chosen is None:
         return "It was compared, but without figures."
-    better = one.held_out_rms is not None and one.held_out_rms < (chosen.held_out_rms or 0.0)
+    better = candidate.held_out_rms is not None and candidate.held_out_rms < (
+        chosen.held_out_rms or 0.0
+    )
     reason = " That gain is too small to feel, or not steady over strokes." if better else ""
-    if one.equivalent:
+    if candidate.equivalent:
         reason = " It is equivalent to the best in these data; the simplest of those is used."
-    return f"Against {chosen.name}, {' and '.join(found)}.{reason}"
+    return f"Against {chosen.name}, {' and '.join(changes)}.{reason}"
 
 
 def _compared(change: float) -> str:

@@ -1,9 +1,9 @@
-"""What closes a report: package and other sheets, what was left out, provenance."""
+"""What closes a report: what was left out, provenance, the rig as it was probed."""
 
 from __future__ import annotations
 
 import json
-import re
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
@@ -14,13 +14,36 @@ from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.identity import bytes_digest
 from scissorcal.recipe.requirements import requirements
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.probe import PROBE_KEY
-from scissorcal.report.inputs import FactSheet, Geometry, RecordingSummary
+from scissorcal.recording.probe import (
+    ESTIMATES,
+    FACTS,
+    PROBE_KEY,
+    Estimate,
+    ProbeResult,
+    Swing,
+    newest_probe,
+)
+from scissorcal.recording.recording import Recording
+from scissorcal.report.inputs import Evidence
 from scissorcal.report.numbers import display, scalar
-from scissorcal.report.panel import Panel, Row, Value, count, number, words
-from scissorcal.report.strokes import split_source, summary_of
+from scissorcal.report.panel import (
+    Axis,
+    Chart,
+    Look,
+    Panel,
+    Row,
+    Series,
+    Value,
+    count,
+    curve,
+    number,
+    points,
+    words,
+)
+from scissorcal.report.strokes import recording_of, split_source
 from scissorcal.report.subjects.candidates import passed_over
 
+LOOKS: tuple[Look, ...] = ("blue", "vermillion", "green", "purple", "orange", "ink")
 PHOTOGRAPHED = ("blade photographs", "plate pose")
 """What photographs would give, as requirements name it where a scene does without."""
 
@@ -84,34 +107,28 @@ class Provenance:
     recipe_text_origin: str
 
 
-def trace(
-    recipe: Recipe | None,
-    recipe_text: str,
-    fits: Mapping[str, FitResult],
-    recordings: Sequence[RecordingSummary] = (),
-    geometry: Geometry | None = None,
-    checks: Mapping[str, VerifyResult] | None = None,
-) -> Provenance:
+def trace(recipe: Recipe | None, fits: Mapping[str, FitResult], evidence: Evidence) -> Provenance:
     """Tie recordings to fits (by part), and name sources whose recording was not handed in."""
-    every = list(fits.values())
+    recordings, geometry = evidence.recordings, evidence.geometry
     sources = [
         Source(
-            one.source or "recording without a file",
-            one.content_hash,
+            recording.source or "recording without a file",
+            recording.content_hash,
             tuple(
-                f.what for f in every if any(summary_of(s, recordings) is one for s in f.sources)
+                fit.what
+                for fit in fits.values()
+                if any(recording_of(source, recordings) is recording for source in fit.sources)
             ),
         )
-        for one in recordings
+        for recording in recordings
     ]
-    for source in dict.fromkeys(source for fit in every for source in fit.sources):
-        if summary_of(source, recordings) is None:
-            users = tuple(fit.what for fit in every if source in fit.sources)
+    for source in dict.fromkeys(source for fit in fits.values() for source in fit.sources):
+        if recording_of(source, recordings) is None:
+            users = tuple(fit.what for fit in fits.values() if source in fit.sources)
             sources.append(Source(*split_source(source), users))
-    text, origin = recipe_text, "as written"
+    text, origin = evidence.recipe_text, "as written"
     if not text and recipe is not None:
         text, origin = recipe.model_dump_json(indent=2), "as read, in JSON"
-    geometry = geometry or Geometry()
     return Provenance(
         tuple(sources),
         tuple(
@@ -127,7 +144,7 @@ def trace(
         ),
         tuple(
             TrustCheckOrigin(what, check.fit_hash, trust_check_sha256(check))
-            for what, check in sorted((checks or {}).items())
+            for what, check in sorted(evidence.checks.items())
         ),
         text,
         origin,
@@ -144,9 +161,9 @@ def trust_check_sha256(check: VerifyResult) -> str:
     return bytes_digest(json.dumps(asdict(check), sort_keys=True).encode())
 
 
-def provenance_panel(provenance: Provenance, recordings: Sequence[RecordingSummary]) -> Panel:
+def provenance_panel(provenance: Provenance, recordings: Sequence[Recording]) -> Panel:
     """Recordings with their devices, fits with their hashes."""
-    known = {one.source: one for one in recordings}
+    known = {recording.source: recording for recording in recordings}
     rows = [_source_row(source, known.get(source.source)) for source in provenance.sources]
     rows += [
         Row(
@@ -155,55 +172,39 @@ def provenance_panel(provenance: Provenance, recordings: Sequence[RecordingSumma
         )
         for fit in provenance.fits
     ]
-    for one in provenance.geometry:
-        rows.append(
-            Row(
-                f"{one.fit} fit",
-                (
-                    words("inputs", one.inputs_hash or " "),
-                    words("file", one.file_sha256 or " "),
-                    words("photographs", ", ".join(one.sources) or " "),
-                ),
-            )
+    rows += [
+        Row(
+            f"{fit.fit} fit",
+            (
+                words("inputs", fit.inputs_hash or " "),
+                words("file", fit.file_sha256 or " "),
+                words("photographs", ", ".join(fit.sources) or " "),
+            ),
         )
+        for fit in provenance.geometry
+    ]
     return Panel("provenance-sources", "provenance", "Recordings and fits", rows=tuple(rows))
 
 
-def _source_row(source: Source, summary: RecordingSummary | None) -> Row:
+def _source_row(source: Source, recording: Recording | None) -> Row:
     values = [
         words("SHA-256", source.content_hash or "not available"),
         words("used by", ", ".join(source.used_by) or "no fit"),
     ]
-    if summary is None:
+    if recording is None:
         note = "The recording was not handed to this report."
         return Row(source.source, tuple(values), note)
     device = ", ".join(
-        f"{key} {display(scalar(v))}" for key, v in summary.device.items() if key != PROBE_KEY
+        f"{key} {display(scalar(v))}" for key, v in recording.device.items() if key != PROBE_KEY
     )
     values += [
-        words("kind", f"{summary.kind}, {summary.joint} joint"),
-        number("length", summary.duration_s, "s", digits=4),
-        count("samples", summary.samples),
-        count("strokes", len(summary.strokes)),
+        words("kind", f"{recording.kind}, {recording.joint.kind} joint"),
+        number("length", recording.duration_s, "s", digits=4),
+        count("samples", len(recording.samples)),
+        count("strokes", len(recording.strokes)),
         words("device", device or " "),
     ]
-    return Row(source.source, tuple(values), " ".join(summary.notes))
-
-
-def sheet_panel(sheet: FactSheet) -> Panel:
-    """Take a sheet of facts over; its part's name holds only letters, digits and hyphens."""
-    part = "sheet-" + re.sub(r"[^A-Za-z0-9]+", "-", sheet.anchor).strip("-")
-    rows = tuple(Row(fact.label, (_fact(scalar(fact.value), fact.unit),)) for fact in sheet.facts)
-    return Panel(f"{part}-facts", part, sheet.title, rows=rows, notes=sheet.notes)
-
-
-def _fact(value: object, unit: str) -> Value:
-    if isinstance(value, str | bool):
-        said = display(value)
-        return words("value", f"{said} {unit}".strip() or " ")
-    if isinstance(value, int):
-        return Value("value", value, unit)
-    return number("value", value, unit, digits=4)
+    return Row(source.source, tuple(values), " ".join(recording.notes))
 
 
 def left_out_panel(recipe: Recipe, fits: Sequence[FitResult], geometry: Mapping[str, str]) -> Panel:
@@ -253,3 +254,61 @@ def _not_needed(recipe: Recipe) -> Iterable[tuple[str, str, str]]:
     ):
         if target not in scene.render:
             yield what, "not needed", f"The scene's `render` list does not name `{target}`."
+
+
+def rig_panels(recordings: Sequence[Recording]) -> tuple[Panel, ...]:
+    """What the latest probe in the recordings says; none where none was probed."""
+    last = newest_probe(recording.device for recording in recordings)
+    return () if last is None else (rig_panel(last),)
+
+
+def rig_panel(probe: ProbeResult) -> Panel:
+    """Estimates with their intervals, the facts that people ask for, pushes beside the model."""
+    values = [
+        (name, _estimated(estimate, scale, unit))
+        for name, key, scale, unit in ESTIMATES
+        if (estimate := getattr(probe, key)) is not None
+    ]
+    values += [
+        (name, number("value", scale * probe.facts[key], unit))
+        for name, key, scale, unit in FACTS
+        if math.isfinite(probe.facts.get(key, math.nan))
+    ]
+    rows = tuple(Row(name, (value,)) for name, value in values)
+    sentence = f"{probe.device}, probed at {probe.made_at}."
+    return Panel(
+        "provenance-rig", "provenance", "The rig as it was probed", sentence, rows,
+        _charts(probe), caption="Estimates: intervals of 90 %.",
+    )  # fmt: skip
+
+
+def _estimated(estimate: Estimate, scale: float, unit: str) -> Value:
+    mean, sd, low, high = (scale * v for v in (estimate.mean, estimate.sd, *estimate.interval))
+    return number("value", mean, unit, sd=sd, low=low, high=high)
+
+
+def _charts(probe: ProbeResult) -> tuple[Chart, ...]:
+    if not probe.swings:
+        return ()
+    chart = Chart(
+        "provenance-rig-swings",
+        "Pushes of the probe",
+        Axis("time", "ms"),
+        Axis("opening, from where it stood", "mrad"),
+        tuple(
+            series
+            for place, (swing, look) in enumerate(zip(probe.swings, LOOKS, strict=False), start=1)
+            for series in _series(place, swing, look)
+        ),
+        "The strongest pushes of the probe, as the encoder showed them (marks), and as the fitted "
+        "joint goes (lines).",
+    )
+    return (chart,)
+
+
+def _series(place: int, swing: Swing, look: Look) -> tuple[Series, Series]:
+    times = [1e3 * value for value in swing.times_s]
+    name = f"{place}: {1e3 * swing.torque_Nm:+.3g} mN m"
+    places = [1e3 * value for value in swing.places_rad]
+    goes = [1e3 * value for value in swing.model_rad]
+    return points(name, times, places, look), curve(f"{name}, model", times, goes, look)

@@ -37,8 +37,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.reduce import thinned
-from scissorcal.report.strokes import StrokeSamples, look_of
+from scissorcal.report.strokes import FittedStroke, look_of, thinned
 
 MOST_DOTS = 400
 MOST_BARS = 24
@@ -54,44 +53,50 @@ def response_panel(fit: FitResult, part: str) -> Panel:
     """Force at the edge against indentation, with the candidates that these data do not exclude."""
     title, id_ = "Response of the material", f"{part}-response"
     try:
-        found = response_curve(fit)
+        response = response_curve(fit)
     except ScissorcalError as error:
         return absent(id_, part, title, str(error))
     notes = [
         "Force at the edge against indentation at the crack tip. Measured torque becomes force by "
         "the lever of the model's crack tip."
     ]
-    alike = [one.name for one in found.others if one.equivalent and one.force is not None]
+    alike = [
+        other.name for other in response.others if other.equivalent and other.force is not None
+    ]
     if alike:
         notes.append(f"Equivalent in these data: {', '.join(alike)}.")
-    undrawn = [one.name for one in found.others if one.equivalent and one.force is None]
+    undrawn = [other.name for other in response.others if other.equivalent and other.force is None]
     if undrawn:
         notes.append(
             f"Also equivalent, but not drawn, because this fit keeps no values of it: "
             f"{', '.join(undrawn)}."
         )
-    low, high = (short(1e3 * v, 2) for v in (found.support_low, found.support_high))
+    low, high = (short(1e3 * v, 2) for v in (response.support_low, response.support_high))
     sentence = (
         f"Data press from {low} to {high} mm; there the response is known to "
-        f"± {percent(found.half_width)} (median half of the 90 % band)."
+        f"± {percent(response.half_width)} (median half of the 90 % band)."
     )
-    chart = _response_chart(found, f"{id_}-f")
+    chart = _response_chart(response, f"{id_}-f")
     return Panel(id_, part, title, sentence, charts=(chart,), notes=tuple(notes))
 
 
-def _response_chart(found: ResponseCurve, id_: str) -> Chart:
-    x = 1e3 * found.indentation
-    at, force = found.data_indentation, found.data_force
+def _response_chart(response: ResponseCurve, id_: str) -> Chart:
+    x = 1e3 * response.indentation
+    at, force = response.data_indentation, response.data_force
     pressed = np.flatnonzero((at > 0) & (1e3 * at < x[-1]) & np.isfinite(force))
     some = thinned(pressed, MOST_DOTS)
-    known = (found.indentation >= found.support_low) & (found.indentation <= found.support_high)
+    known = (response.indentation >= response.support_low) & (
+        response.indentation <= response.support_high
+    )
     series = [
         points("measured", 1e3 * at[some], force[some], "blue", toggle=True),
-        band("90 % of the response", x, found.low, found.high),
-        curve("beyond the data", x, found.force, style="dashed"),
-        curve("used", x, np.where(known, found.force, np.nan)),
+        band("90 % of the response", x, response.low, response.high),
+        curve("beyond the data", x, response.force, style="dashed"),
+        curve("used", x, np.where(known, response.force, np.nan)),
     ]
-    drawn = sorted((o for o in found.others if o.force is not None), key=lambda o: not o.equivalent)
+    drawn = sorted(
+        (o for o in response.others if o.force is not None), key=lambda o: not o.equivalent
+    )
     for other, (look, style) in zip(drawn, OTHERS, strict=False):
         assert other.force is not None
         name = other.name.partition(",")[0] + (" (equivalent)" if other.equivalent else "")
@@ -111,14 +116,16 @@ def work_panel(
     fit: FitResult,
     friction: FitResult | None,
     recordings: Sequence[Recording],
-    strokes: Sequence[StrokeSamples],
+    strokes: Sequence[FittedStroke],
     part: str,
 ) -> Panel:
     """Measured fracture work of each stroke against what the fit expects of it."""
     title, id_ = "Fracture work by stroke", f"{part}-work"
-    names = {one.name.stroke: one.name for one in strokes if one.name.kind != "opening"}
+    names = {stroke.stroke: stroke for stroke in strokes if stroke.kind != "opening"}
     try:
-        found = fracture_work(fit, friction, recordings, sorted(names))
+        work = fracture_work(
+            fit, friction, [r for r in recordings if len(r.samples)], sorted(names)
+        )
     except ScissorcalError as error:
         return absent(id_, part, title, str(error))
     rows = tuple(
@@ -135,15 +142,15 @@ def work_panel(
             link=names[row.stroke].anchor,
             marked=row.differs,
         )
-        for row in found
+        for row in work
     )  # fmt: skip
     return Panel(
         id_,
         part,
         title,
-        _work_sentence(found, [row.name for row in rows if row.marked]),
+        _work_sentence(work, [row.name for row in rows if row.marked]),
         rows,
-        (_work_chart(found, names, f"{id_}-f"),),
+        (_work_chart(work, names, f"{id_}-f"),),
         notes=(
             "Work of the torque over the whole stroke, less friction, inertia and what the pressed "
             "material still holds at its end. Expected is J_c h times the length of the cut by the "
@@ -152,8 +159,8 @@ def work_panel(
     )
 
 
-def _work_sentence(found: Sequence[StrokeWork], odd: Sequence[str]) -> str:
-    good = [row for row in found if not row.pivot_moved] or list(found)
+def _work_sentence(strokes: Sequence[StrokeWork], odd: Sequence[str]) -> str:
+    good = [row for row in strokes if not row.pivot_moved] or list(strokes)
     length, work, expected = (
         sum(getattr(row, key) for row in good) for key in ("length", "fracture", "expected")
     )
@@ -166,8 +173,8 @@ def _work_sentence(found: Sequence[StrokeWork], odd: Sequence[str]) -> str:
     return sentence + (f" Different from the fit: {'; '.join(odd[:3])}." if odd else "")
 
 
-def _work_chart(found: Sequence[StrokeWork], names: dict, id_: str) -> Chart:  # type: ignore[type-arg]
-    shown = found[:MOST_BARS]
+def _work_chart(strokes: Sequence[StrokeWork], names: dict, id_: str) -> Chart:  # type: ignore[type-arg]
+    shown = strokes[:MOST_BARS]
     per = [(row.length or 1.0) for row in shown]
     work = [row.fracture / length for row, length in zip(shown, per, strict=True)]
     reach = [2 * row.sd / length for row, length in zip(shown, per, strict=True)]
@@ -188,8 +195,8 @@ def _work_chart(found: Sequence[StrokeWork], names: dict, id_: str) -> Chart:  #
         high=[w + r for w, r in zip(work, reach, strict=True)],
     )
     caption = "Marks are measured with two standard deviations, bars what the fit expects."
-    if len(shown) < len(found):
-        caption += f" The first {len(shown)} of {len(found)} strokes."
+    if len(shown) < len(strokes):
+        caption += f" The first {len(shown)} of {len(strokes)} strokes."
     low = min([w - r for w, r in zip(work, reach, strict=True)] + [v or 0.0 for v in expected.low])
     return Chart(
         id_,
@@ -206,7 +213,7 @@ def _work_chart(found: Sequence[StrokeWork], names: dict, id_: str) -> Chart:  #
     )
 
 
-def edge_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
+def edge_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> Panel:
     """Measured over modelled force by place along the edge."""
     title, id_ = "Force along the blade", f"{part}-edge"
     try:
@@ -303,7 +310,7 @@ def _edge_chart(places: Sequence[EdgePlace], id_: str) -> Chart:
         "Measured over modelled force along the edge",
         Axis("place along the edge, from the pivot", "mm"),
         Axis("measured / model", "%"),
-        tuple(one for one in series if one.x),
+        tuple(part for part in series if part.x),
         "Bars hold for all places at once with 95 % probability. Between the dashed lines a hand "
         "notices no difference.",
     )

@@ -12,13 +12,13 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.package.scene_torque import SceneTorque
 from scissorcal.recipe.schema import Recipe
-from scissorcal.report.headline import ASSESSMENTS, SAID, Assessment, Headline
-from scissorcal.report.inputs import Cell, Evidence, Geometry, RecordingSummary
+from scissorcal.recording.recording import Recording
+from scissorcal.report.inputs import Cell, Evidence, Geometry
 from scissorcal.report.numbers import finite, percent
 from scissorcal.report.panel import Panel, Row, Value, count, percent_of, words
-from scissorcal.report.strokes import StrokeSamples, kind_word, stroke_label
+from scissorcal.report.strokes import FittedStroke, kind_word, stroke_label
 from scissorcal.report.subjects.torque import held_out_summary
-from scissorcal.report.subjects.trust import coverage_found
+from scissorcal.report.subjects.trust import ASSESSMENTS, SAID, Assessment, Headline, coverage_found
 from scissorcal.verdicts import Verdict, failed
 
 PART = "decision"
@@ -47,15 +47,15 @@ PHOTOGRAPHS_PASSED = "✓ checks passed"
 """Of a fit of photographs, for which there is no trust check that could be missing."""
 
 
-def origin_of(recordings: Sequence[RecordingSummary]) -> Origin:
+def origin_of(recordings: Sequence[Recording]) -> Origin:
     """Whether recordings come from a simulator, as their devices state it."""
-    flags = {_simulated(one) for one in recordings} - {None}
+    flags = {_simulated(recording) for recording in recordings} - {None}
     if len(flags) != 1:
         return "mixed" if flags else "unknown"
     return "simulated" if flags.pop() else "real"
 
 
-def origin_panel(origin: Origin, recordings: Sequence[RecordingSummary]) -> Panel:
+def origin_panel(origin: Origin, recordings: Sequence[Recording]) -> Panel:
     """Simulated or real, as far as it is stated."""
     said = {
         "simulated": "All recordings that state their device come from a virtual rig: no value of "
@@ -64,7 +64,7 @@ def origin_panel(origin: Origin, recordings: Sequence[RecordingSummary]) -> Pane
         "mixed": "Some recordings come from a virtual rig and some from a real one.",
         "unknown": "No recording states the device that it comes from.",
     }[origin]
-    silent = sum(_simulated(one) is None for one in recordings)
+    silent = sum(_simulated(recording) is None for recording in recordings)
     if silent and origin != "unknown":
         said += f" {silent} of {len(recordings)} recordings do not state it."
     names = sorted({str(r.device["serial"]) for r in recordings if r.device.get("serial")})
@@ -72,7 +72,7 @@ def origin_panel(origin: Origin, recordings: Sequence[RecordingSummary]) -> Pane
     return Panel(f"{PART}-origin", PART, TITLES[origin], said + device)
 
 
-def _simulated(recording: RecordingSummary) -> bool | None:
+def _simulated(recording: Recording) -> bool | None:
     """Whether the device states that it is a simulator; None where it states neither."""
     stated = recording.device.get("capabilities") if recording.device else None
     return bool(stated & SIMULATOR) if isinstance(stated, int) else None
@@ -82,37 +82,39 @@ def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
     """The overall outcome, and one row per fit; ``rig`` names the fits of recordings."""
     rows = tuple(
         Row(
-            one.fit,
-            (words("decision", _decision(one, rig)), words("why", one.brief)),
-            link=one.fit,
-            marked=one.assessment in {"reject", "care"},
+            headline.fit,
+            (words("decision", _decision(headline, rig)), words("why", headline.brief)),
+            link=headline.fit,
+            marked=headline.assessment in {"reject", "care"},
         )
-        for one in headlines
+        for headline in headlines
     )
-    overall = overall_assessment(headlines, rig)
-    own = [one for one in headlines if one.assessment == overall]
-    first = next((one for one in own if one.fit in rig), own[0] if own else None)
+    overall = _overall_assessment(headlines, rig)
+    worst = [headline for headline in headlines if headline.assessment == overall]
+    first = next(
+        (headline for headline in worst if headline.fit in rig), worst[0] if worst else None
+    )
     sentence = f"Next: {first.next_steps[0]}" if first and first.next_steps else ""
     title = "Checks passed" if first and _photographs_passed(first, rig) else OUTCOMES[overall]
     return Panel(f"{PART}-trust", PART, title, sentence, rows)
 
 
-def _decision(one: Headline, rig: Sequence[str]) -> str:
-    return PHOTOGRAPHS_PASSED if _photographs_passed(one, rig) else SAID[one.assessment]
+def _decision(headline: Headline, rig: Sequence[str]) -> str:
+    return PHOTOGRAPHS_PASSED if _photographs_passed(headline, rig) else SAID[headline.assessment]
 
 
-def _photographs_passed(one: Headline, rig: Sequence[str]) -> bool:
-    return one.fit not in rig and one.assessment == "unverified"
+def _photographs_passed(headline: Headline, rig: Sequence[str]) -> bool:
+    return headline.fit not in rig and headline.assessment == "unverified"
 
 
-def overall_assessment(headlines: Sequence[Headline], rig: Sequence[str]) -> Assessment:
+def _overall_assessment(headlines: Sequence[Headline], rig: Sequence[str]) -> Assessment:
     """The worst assessment; photographs that passed their checks do not lower that of the rig."""
     counted = [h.assessment for h in headlines if not (rig and _photographs_passed(h, rig))]
     return min(counted or ["unverified"], key=ASSESSMENTS.index)
 
 
 def cells_of(
-    fits: Sequence[tuple[FitResult, Sequence[StrokeSamples]]], evidence: Evidence
+    fits: Sequence[tuple[FitResult, Sequence[FittedStroke]]], evidence: Evidence
 ) -> tuple[Cell, ...]:
     """What was counted by cells of motion, where it was; else strokes; and photographs by fit.
 
@@ -125,21 +127,19 @@ def cells_of(
     for fit, strokes in fits:
         if fit.what in counted:
             continue
-        used = {one.name.stroke for one in strokes if len(one.places)}
+        used = {stroke.stroke for stroke in strokes if len(stroke.places)}
         planned: dict[str, list[int]] = {}
         recorded: set[int] = set()
         number = 0
-        own = [one for one in evidence.recordings if one.kind == fit.what]
-        raw = {one.source: one for one in evidence.raw}
-        for recording in own:
-            if recording.source in raw:
-                sampled = np.unique(raw[recording.source].samples["stroke"])
-                recorded.update(int(n) + number for n in sampled if n >= 0)
+        captures = [r for r in evidence.recordings if r.kind == fit.what]
+        for recording in captures:
+            sampled = np.unique(recording.samples["stroke"])
+            recorded.update(int(n) + number for n in sampled if n >= 0)
             for stroke in recording.strokes:
                 label = stroke_label(stroke, 0, fit.position_unit).partition(", ")[2]
                 planned.setdefault(label, []).append(number)
                 number += 1
-        known = bool(own) and all(one.source in raw for one in own)
+        known = bool(captures) and all(len(recording.samples) for recording in captures)
         for name, numbers in planned.items():
             kept = sum(n in used for n in numbers)
             returns = name.startswith(kind_word("opening", fit.position_unit))
@@ -151,22 +151,22 @@ def cells_of(
 
 
 def _photographs(geometry: Geometry) -> list[Cell]:
-    found = []
+    cells = []
     for what, fit in geometry.fits.items():
         views = getattr(fit, "views", None)
         if views is None:
             views = {view.source for blade in fit.blades for view in blade.photographs}  # type: ignore[union-attr]
         if fit.sources:
-            found.append(Cell(what, "all", None, len(fit.sources), len(views), "photographs"))
-    return found
+            cells.append(Cell(what, "all", None, len(fit.sources), len(views), "photographs"))
+    return cells
 
 
 def data_panels(cells: Sequence[Cell]) -> tuple[Panel, Panel]:
     """Totals per capture with the incomplete cells, for the decision page; and every cell."""
     rows = []
     for capture, unit in dict.fromkeys((cell.capture, cell.unit) for cell in cells):
-        own = [cell for cell in cells if (cell.capture, cell.unit) == (capture, unit)]
-        rows.append(Row(f"{capture} {unit}", _counts(own), link="data"))
+        counted = [cell for cell in cells if (cell.capture, cell.unit) == (capture, unit)]
+        rows.append(Row(f"{capture} {unit}", _counts(counted), link="data"))
     said = []
     for head, odd in (
         ("Incomplete", [cell for cell in cells if cell.incomplete]),
@@ -233,14 +233,14 @@ def _outcome(check: VerifyResult) -> str:
 
 
 def felt_panel(
-    found: SceneTorque | None, why: str, fits: Sequence[FitResult], recipe: Recipe
+    torque: SceneTorque | None, why: str, fits: Sequence[FitResult], recipe: Recipe
 ) -> Panel:
     """What is uncertain of the torque that is felt, as a share of it, against the tolerance."""
     tolerance = f"tolerance {percent(recipe.scene.tolerance_percent / 100)}"
     rows = []
     sentence = why
-    if found is not None:
-        share = found.share[np.isfinite(found.share)]
+    if torque is not None:
+        share = torque.share[np.isfinite(torque.share)]
         middle, worst = (
             (float(np.median(share)), float(share.max())) if len(share) else (None, None)
         )
@@ -252,7 +252,7 @@ def felt_panel(
         )
         sentence = (
             f"± {percent(middle)} of the scene's torque (median place; worst ± {percent(worst)}), "
-            f"{tolerance}: {percent(finite(found.within_tolerance))} of the places are within it."
+            f"{tolerance}: {percent(finite(torque.within_tolerance))} of the places are within it."
         )
     for fit in fits:
         middle, worst = held_out_summary(fit)
@@ -264,7 +264,7 @@ def felt_panel(
 
 def weaknesses_panel(
     fits: Sequence[FitResult],
-    found: SceneTorque | None,
+    torque: SceneTorque | None,
     verdicts: Sequence[Verdict] = (),
     cells: Sequence[Cell] = (),
 ) -> Panel:
@@ -281,10 +281,10 @@ def weaknesses_panel(
         for fit in fits
         for caveat in caveats_of(fit)
     ]
-    if found is not None:
+    if torque is not None:
         notes += [
             f"Not measured, and not in the band: {name}, up to {percent(share)} of the mean torque."
-            for name, share in found.not_in_band
+            for name, share in torque.not_in_band
         ]
     sentence = "" if notes else NO_WEAKNESS
     title = "Known weaknesses of this fit"

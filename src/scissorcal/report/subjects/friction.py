@@ -15,13 +15,12 @@ from scissorcal.calibration.friction.curve import (
 from scissorcal.calibration.result import FitResult
 from scissorcal.report.numbers import finite, finite_each, percent, short, with_unit
 from scissorcal.report.panel import Axis, Chart, Panel, Series, band, curve, points
-from scissorcal.report.reduce import thinned
-from scissorcal.report.strokes import StrokeSamples, channels_of, kind_word, look_of
+from scissorcal.report.strokes import FittedStroke, channels_of, kind_word, look_of, thinned
 
 MOST_DOTS = 900
 
 
-def friction_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel | None:
+def friction_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> Panel | None:
     """The law among partial residuals, and its map; None for a cut or without numbers."""
     charts, sentence = [], ""
     law = friction_curve(fit)
@@ -44,13 +43,13 @@ def friction_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) 
     return Panel(f"{part}-law", part, "Friction", sentence.strip(), charts=tuple(charts))
 
 
-def _curve(fit: FitResult, strokes: Sequence[StrokeSamples], id_: str) -> Chart:
+def _curve(fit: FitResult, strokes: Sequence[FittedStroke], id_: str) -> Chart:
     law, words = friction_curve(fit), channels_of(fit)
     assert law is not None
     partial, series = partial_residuals(fit), []
-    kinds = list(dict.fromkeys(stroke.name.kind for stroke in strokes))
+    kinds = list(dict.fromkeys(stroke.kind for stroke in strokes))
     for kind in kinds:
-        places = np.concatenate([s.places for s in strokes if s.name.kind == kind])
+        places = np.concatenate([s.places for s in strokes if s.kind == kind])
         some = thinned(places, MOST_DOTS // len(kinds))
         name, rate = kind_word(kind, fit.position_unit), fit.series.opening_rate[some]
         series.append(points(name, rate, partial[some], look_of(kind), toggle=True))

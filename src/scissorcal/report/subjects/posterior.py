@@ -30,7 +30,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.reduce import thinned
+from scissorcal.report.strokes import thinned
 
 MOST_PAIRS = 6
 MOST_DOTS = 150
@@ -120,7 +120,7 @@ def prior_panel(fit: FitResult, part: str) -> Panel:
         narrowed = None if parameter.measured_prior else finite(parameter.identifiability)
         rows.append(
             Row(
-                plain_name(parameter),
+                _plain_name(parameter),
                 (
                     number("prior median", ends[0][1], unit, low=ends[0][0], high=ends[0][2]),
                     number("posterior median", ends[1][1], unit, low=ends[1][0], high=ends[1][2]),
@@ -199,7 +199,7 @@ def diagnostics_panel(fit: FitResult, part: str) -> Panel:
     return Panel(id_, part, title, rows=rows, notes=fit.notes)
 
 
-def plain_name(parameter: FittedParameter) -> str:
+def _plain_name(parameter: FittedParameter) -> str:
     """A parameter's name without a unit in which it is not shown."""
     return parameter.name.removesuffix("_rad") if parameter.unit == "rad" else parameter.name
 
@@ -230,7 +230,7 @@ def _row(fit: FitResult, parameter: FittedParameter, caveats: tuple[str, ...]) -
     if apart is not None:
         another = number(COLUMN, scaled(apart), unit, digits=2)
     return Row(
-        plain_name(parameter),
+        _plain_name(parameter),
         (
             words("meaning", parameter.meaning or " "),
             mean,
@@ -279,7 +279,7 @@ def _density(fit: FitResult, place: int, id_: str) -> Chart:
         heights = np.histogram(values, edges)[0].astype(np.float64)
         steps = np.repeat(heights / max(float(heights.max()), 1.0), 2)
         series.append(curve(name, np.repeat(edges, 2)[1:-1], steps, look, style=style))  # type: ignore[arg-type]
-    name = plain_name(parameter).replace("_", " ")
+    name = _plain_name(parameter).replace("_", " ")
     return Chart(
         id_,
         name,
@@ -298,7 +298,7 @@ def _pair(fit: FitResult, pair: Correlation, id_: str) -> Chart:
         at = names.index(name)
         scale, unit = shown_unit(fit.parameters[at].unit)
         columns.append(scale * fit.draws[:, at])
-        ends.append(Axis(plain_name(fit.parameters[at]).replace("_", " "), unit))
+        ends.append(Axis(_plain_name(fit.parameters[at]).replace("_", " "), unit))
     some = thinned(np.arange(len(fit.draws)), MOST_DOTS)
     x, y = columns
     return Chart(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scissorcal.calibration.result import FitResult
-from scissorcal.package.scene_torque import Along, Places, SceneTorque, Slice
+from scissorcal.package.scene_torque import Along, Places, SceneTorque
 from scissorcal.recipe.schema import Recipe
 from scissorcal.report.numbers import finite, percent, short, with_unit
 from scissorcal.report.panel import (
@@ -24,7 +24,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
-from scissorcal.report.reduce import thinned
+from scissorcal.report.strokes import thinned
 
 PART = "scene"
 TITLE = "Rendered torque over the scene"
@@ -41,48 +41,53 @@ AXES: dict[Along, tuple[str, str, float]] = {
 
 
 def scene_panels(
-    found: SceneTorque | None, why: str, recipe: Recipe, cut: FitResult | None
+    rendered: SceneTorque | None, why: str, recipe: Recipe, cut: FitResult | None
 ) -> tuple[Panel, ...]:
     """The slices with the map of support, and the torque at every place of the grid."""
-    if found is None or cut is None:
+    if rendered is None or cut is None:
         return (absent("scene-torque", PART, TITLE, why),)
-    charts = tuple(_along(found, along, recipe, cut) for along in AXES)
-    friction = "with friction, as the scene asks" if found.with_friction else "without friction"
+    charts = tuple(_along(rendered, along, recipe, cut) for along in AXES)
+    friction = "with friction, as the scene asks" if rendered.with_friction else "without friction"
     note = (
         f"What a loop would render from these fits, {friction}. The shade holds it with "
-        f"{percent(found.confidence)} probability. Lines are full where data lie nearby and dashed "
-        "where the model extrapolates. Marks are measured: they lie off the line by their "
+        f"{percent(rendered.confidence)} probability. Lines are full where data lie nearby and "
+        "dashed where the model extrapolates. Marks are measured: they lie off the line by their "
         "difference from the model where they were taken."
     )
-    rows = tuple(_slice_row(one) for one in found.slices if np.any(np.isfinite(one.places.torque)))
+    rows = tuple(
+        _slice_row(along, places)
+        for along, slices in rendered.slices.items()
+        for places in slices
+        if np.any(np.isfinite(places.torque))
+    )
     torque = Panel(
-        "scene-torque", PART, TITLE, scene_sentence(found), rows,
-        (*charts, _support(found)), notes=(note,), caption="The slices that are drawn.",
+        "scene-torque", PART, TITLE, scene_sentence(rendered), rows,
+        (*charts, _support(rendered)), notes=(note,), caption="The slices that are drawn.",
     )  # fmt: skip
-    return torque, _grid_panel(found)
+    return torque, _grid_panel(rendered)
 
 
-def scene_sentence(found: SceneTorque) -> str:
+def scene_sentence(scene: SceneTorque) -> str:
     """How well the torque is known over the scene, in words."""
     said = [
-        f"The torque is known to within the tolerance of {percent(found.tolerance)} (with "
-        f"{percent(found.confidence)} probability) at {percent(found.within_tolerance)} of the "
-        f"places that can be felt; {percent(found.supported)} of them have data nearby."
+        f"The torque is known to within the tolerance of {percent(scene.tolerance)} (with "
+        f"{percent(scene.confidence)} probability) at {percent(scene.within_tolerance)} of the "
+        f"places that can be felt; {percent(scene.supported)} of them have data nearby."
     ]
-    at = found.worst
+    at = scene.worst
     if at is not None:
-        grid = found.grid
+        grid = scene.grid
         said.append(
             f"It is least certain at {_held(grid, at, ())}: "
-            f"{with_unit(finite(grid.torque[at]), 'N m')} ± {percent(found.share[at])}."
+            f"{with_unit(finite(grid.torque[at]), 'N m')} ± {percent(scene.share[at])}."
         )
-    if found.not_in_band:
-        named = ", ".join(f"{name} up to {percent(share)}" for name, share in found.not_in_band)
+    if scene.not_in_band:
+        named = ", ".join(f"{name} up to {percent(share)}" for name, share in scene.not_in_band)
         said.append(
             f"The band does not include what was not measured, as shares of the mean torque: "
             f"{named}. The verdicts say what to measure."
         )
-    said += found.beyond_data
+    said += scene.beyond_data
     return " ".join(said)
 
 
@@ -97,30 +102,29 @@ def _held(places: Places, at: int, without: tuple[Along, ...]) -> str:
     return ", ".join(said)
 
 
-def _slice_row(one: Slice) -> Row:
-    torque = one.places.torque
+def _slice_row(along: Along, places: Places) -> Row:
+    torque = places.torque
     at = int(np.nanargmax(np.abs(torque)))
-    half = 0.5 * (one.places.high[at] - one.places.low[at])
+    half = 0.5 * (places.high[at] - places.low[at])
     return Row(
-        f"over {AXES[one.along][0]}, {_held(one.places, at, (one.along,))}",
+        f"over {AXES[along][0]}, {_held(places, at, (along,))}",
         (
             number("largest torque", torque[at], "N m"),
             percent_of("band there, ±", half / abs(torque[at]) if torque[at] else None),
-            percent_of("has data", float(np.mean(one.places.supported))),
+            percent_of("has data", float(np.mean(places.supported))),
         ),
     )
 
 
-def _along(found: SceneTorque, along: Along, recipe: Recipe, cut: FitResult) -> Chart:
+def _along(scene: SceneTorque, along: Along, recipe: Recipe, cut: FitResult) -> Chart:
     name, unit, scale = AXES[along]
-    slices = [one for one in found.slices if one.along == along]
+    slices = scene.slices[along]
     series: list[Series] = []
     shown: Along = "contact" if along == "opening" else "opening"
-    for one, look in zip(slices, LOOKS, strict=True):
-        places = one.places
+    for places, look in zip(slices, LOOKS, strict=True):
         x = scale * getattr(places, along)
         label = _label(places, shown)
-        series.append(_marks(one, along, recipe, cut, look, label))
+        series.append(_marks(places, along, recipe, cut, look, label))
         for way in (x < 0, x >= 0) if along == "opening_rate" else (np.ones(len(x), bool),):
             full = np.where(places.supported, places.torque, np.nan)
             ends = (places.low[way], places.high[way])
@@ -128,7 +132,7 @@ def _along(found: SceneTorque, along: Along, recipe: Recipe, cut: FitResult) -> 
             beyond = curve(f"without data, {label}", x[way], places.torque[way], look,
                            style="dashed", group=label)  # fmt: skip
             series += [beyond, curve(label, x[way], full[way], look, group=label, toggle=True)]
-    held = slices[0].places
+    held = slices[0]
     at = (
         f"contact {short(1e3 * float(held.contact[0]))} mm, or where the crack stands"
         if along == "opening_rate"
@@ -149,10 +153,10 @@ def _label(places: Places, shown: Along) -> str:
 
 
 def _marks(
-    one: Slice, along: Along, recipe: Recipe, cut: FitResult, look: Look, label: str
+    places: Places, along: Along, recipe: Recipe, cut: FitResult, look: Look, label: str
 ) -> Series:
     """Measured minus model of samples near a slice, set on the slice."""
-    series, scene, places = cut.series, recipe.scene, one.places
+    series, scene = cut.series, recipe.scene
     near = np.isfinite(series.measured) & np.isfinite(series.predicted)
     for name, span in (("opening", scene.opening_rad), ("contact", scene.contact_m)):
         if name != along:
@@ -167,14 +171,14 @@ def _marks(
     return points(f"measured, {label}", AXES[along][2] * where, line + offset, look, group=label)
 
 
-def _support(found: SceneTorque) -> Chart:
+def _support(scene: SceneTorque) -> Chart:
     """Where data support the torque of a closing motion, at one rate of the grid."""
-    grid = found.grid
+    grid = scene.grid
     rates = np.unique(grid.opening_rate)
     pace = rates[len(rates) // 4]
     here = grid.opening_rate == pace
-    share, known = found.share[here], np.isfinite(grid.torque[here])
-    wide = known & (share > found.tolerance)
+    share, known = scene.share[here], np.isfinite(grid.torque[here])
+    wide = known & (share > scene.tolerance)
     touching, supported = grid.touching[here], grid.supported[here]
     x, y = DEGREES * grid.opening[here], 1e3 * grid.contact[here]
     kinds: tuple[tuple[str, np.ndarray, Look, Style], ...] = (
@@ -196,8 +200,8 @@ def _support(found: SceneTorque) -> Chart:
     return Chart("scene-support", "Where data support the torque", *axes, series, caption)
 
 
-def _grid_panel(found: SceneTorque) -> Panel:
-    grid = found.grid
+def _grid_panel(scene: SceneTorque) -> Panel:
+    grid = scene.grid
     rows = []
     for at in np.flatnonzero(np.isfinite(grid.torque)):
         nearby = "yes" if grid.supported[at] else "no"
@@ -213,6 +217,6 @@ def _grid_panel(found: SceneTorque) -> Panel:
         )
     caption = (
         f"Torque at each place of a grid over the scene, with the interval that holds it with "
-        f"{percent(found.confidence)} probability. Negative rates close."
+        f"{percent(scene.confidence)} probability. Negative rates close."
     )
     return Panel("scene-grid", PART, "Rendered torque by place", rows=tuple(rows), caption=caption)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult, rms_interval, worst_stroke
 from scissorcal.recording.recording import Stroke
-from scissorcal.report.numbers import Number, finite, percent, short, unit_text, with_unit
+from scissorcal.report.numbers import Number, finite, percent, unit_text, with_unit
 from scissorcal.report.panel import (
     Axis,
     Chart,
@@ -27,16 +25,22 @@ from scissorcal.report.panel import (
     percent_of,
     points,
 )
-from scissorcal.report.reduce import block_means, limits_of, mean, median, rms, thinned
 from scissorcal.report.strokes import (
-    BETWEEN,
     KINDS,
-    StrokeName,
-    StrokeSamples,
+    Against,
+    FittedStroke,
+    TorqueGroup,
+    block_means,
     channels_of,
+    group_strokes,
     kind_word,
+    limits_of,
     look_of,
+    mean,
+    median,
+    rms,
     stroke_label,
+    thinned,
 )
 
 MOST_DOTS = 600
@@ -47,22 +51,11 @@ MOST_BARS = 20
 PROPOSED_BLOCKS = 40
 SPREAD_DOTS = 900
 OPENING_BLOCKS, TIME_BLOCKS = 60, 300
-SAME_SPEED = 0.05
 
-Against = Literal["opening", "time"]
 Over = Literal["opening", "rate", "time"]
 
 
-@dataclass(frozen=True)
-class TorqueGroup:
-    """Strokes that are shown together: all closing and opening at one speed, say."""
-
-    title: str
-    against: Against
-    strokes: tuple[StrokeSamples, ...]
-
-
-def torque_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
+def torque_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> Panel:
     """Data against the model, a chart and a row for each group of strokes."""
     words = channels_of(fit)
     title = f"{words.effort.capitalize()}: data against the model"
@@ -95,30 +88,13 @@ def torque_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) ->
     )
 
 
-def group_strokes(fit: FitResult, strokes: Sequence[StrokeSamples]) -> tuple[TorqueGroup, ...]:
-    """Group strokes by speed (those of a cut also by kind); an excitation stands alone."""
-    grouped: dict[tuple[str, float], list[StrokeSamples]] = {}
-    pace = _common_speeds([stroke.name.speed for stroke in strokes])
-    for stroke in strokes:
-        grouped.setdefault(_key(fit, stroke.name, pace), []).append(stroke)
-    return tuple(
-        TorqueGroup(_title(fit, members), against_of(members[0].name), tuple(members))
-        for _, members in sorted(grouped.items())
-    )
-
-
-def against_of(name: StrokeName) -> Against:
-    """A movement with a direction is shown over opening, any other over time."""
-    return "time" if name.label.startswith(BETWEEN) or name.kind == "excitation" else "opening"
-
-
-def strokes_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
+def strokes_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> Panel:
     """Residuals by stroke from the worst: bars, spread, a chart for each of the worst strokes."""
     title, id_ = "Residuals by stroke, the worst first", f"{part}-residuals"
     ranked = sorted(strokes, key=lambda one: -(finite(_rms(fit, one)) or -1.0))
     if not ranked:
         return absent(id_, part, title, "The fit holds no strokes.")
-    carded = {stroke.name.anchor for stroke in ranked[:MOST_CARDS]}
+    carded = {stroke.anchor for stroke in ranked[:MOST_CARDS]}
     rows = tuple(_residual_row(fit, stroke, carded) for stroke in ranked)
     charts: list[Chart] = []
     if finite(_rms(fit, ranked[0])) is not None:
@@ -130,14 +106,14 @@ def strokes_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -
     charts += [_card(fit, stroke) for stroke in ranked[:MOST_CARDS]]
     worst = max(ranked, key=lambda one: _shown(fit, one, len(ranked)))
     sentence = (
-        f"The model misses most on {worst.name.label}: "
+        f"The model misses most on {worst.label}: "
         f"{with_unit(finite(_rms(fit, worst)), fit.effort_unit, 2)} rms."
     )
     caption = f"Measured minus model by stroke, in {unit_text(fit.effort_unit)}."
     return Panel(id_, part, title, sentence, rows, tuple(charts), caption=caption)
 
 
-def _shown(fit: FitResult, stroke: StrokeSamples, of: int) -> float:
+def _shown(fit: FitResult, stroke: FittedStroke, of: int) -> float:
     """The error that a stroke is shown to have, one ``of`` so many; -1 where there is none."""
     rms = finite(_rms(fit, stroke))
     if rms is None:
@@ -146,12 +122,12 @@ def _shown(fit: FitResult, stroke: StrokeSamples, of: int) -> float:
     return rms_interval(rms, share * len(stroke.places), 0.05 / of)[0]
 
 
-def held_out_panel(fit: FitResult, strokes: Sequence[StrokeSamples], part: str) -> Panel:
+def held_out_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> Panel:
     """Error on strokes that the fit had not seen, from the worst."""
     title, id_ = "Hold-out error by stroke", f"{part}-heldout"
     if not fit.held_out:
         return absent(id_, part, title, "No stroke was held out.")
-    names = {(one.name.stroke, one.name.recording): one.name for one in strokes}
+    names = {(stroke.stroke, stroke.recording): stroke for stroke in strokes}
     errors = sorted(fit.held_out, key=lambda e: -(finite(e.relative_rms) or -1.0))
     rows, marks = [], []
     for error in errors:
@@ -211,41 +187,8 @@ def _held_out_chart(fit: FitResult, marks: Sequence[tuple[float, float, str]], i
     )
 
 
-def _key(fit: FitResult, name: StrokeName, pace: Mapping[float, float]) -> tuple[str, float]:
-    if against_of(name) == "time":
-        return f"z {name.anchor}", 0.0
-    kind = name.kind if fit.what == "cut" else ""
-    return kind, np.inf if name.speed is None else pace[name.speed]
-
-
-def _common_speeds(speeds: Iterable[Number]) -> dict[float, float]:
-    """Each speed with the slowest of those that are nearly the same, within ``SAME_SPEED``."""
-    common: dict[float, float] = {}
-    slowest = -np.inf
-    for speed in sorted({speed for speed in speeds if speed is not None}):
-        if speed > (1.0 + SAME_SPEED) * slowest:
-            slowest = speed
-        common[speed] = slowest
-    return common
-
-
-def _title(fit: FitResult, members: Sequence[StrokeSamples]) -> str:
-    first = members[0].name
-    if against_of(first) == "time":
-        return first.label
-    kinds = " and ".join(sorted({kind_word(m.name.kind, fit.position_unit) for m in members}))
-    if first.speed is None:
-        return f"{kinds}, no planned speed"
-    speed = median(np.array([member.name.speed or np.nan for member in members]))
-    return f"{kinds} at {short(speed)} {fit.position_unit}/s"
-
-
-def _places(group: TorqueGroup) -> NDArray[np.int64]:
-    return np.concatenate([stroke.places for stroke in group.strokes])
-
-
 def _group_row(fit: FitResult, group: TorqueGroup) -> Row:
-    series, at, unit = fit.series, _places(group), fit.effort_unit
+    series, at, unit = fit.series, group.places, fit.effort_unit
     residual = series.measured[at] - series.predicted[at]
     width = median(series.band_high[at] - series.band_low[at])
     return Row(
@@ -267,7 +210,7 @@ def _group_chart(
     series: list[Series] = []
     for stroke in shown:
         series += _drawn(fit, stroke, group.against, dots)
-    residual = fit.series.measured[_places(group)] - fit.series.predicted[_places(group)]
+    residual = fit.series.measured[group.places] - fit.series.predicted[group.places]
     caption = (
         f"{len(group.strokes)} stroke{'s' if len(group.strokes) != 1 else ''}, "
         f"{len(residual)} samples; rms of measured minus model "
@@ -287,9 +230,9 @@ def _axes(fit: FitResult, against: Against) -> tuple[Axis, Axis]:
     return x, Axis(words.effort, words.effort_unit)
 
 
-def _drawn(fit: FitResult, stroke: StrokeSamples, against: Against, dots: int) -> list[Series]:
+def _drawn(fit: FitResult, stroke: FittedStroke, against: Against, dots: int) -> list[Series]:
     """A stroke's marks, and its model with the band, that are switched together."""
-    series, name = fit.series, stroke.name
+    series = fit.series
     start = series.time_s[stroke.places[0]]
     scale = channels_of(fit).scale
     where = scale * series.opening if against == "opening" else series.time_s - start
@@ -299,18 +242,18 @@ def _drawn(fit: FitResult, stroke: StrokeSamples, against: Against, dots: int) -
         block_means(values[stroke.places], blocks)
         for values in (where, series.predicted, series.band_low, series.band_high)
     )
-    key, label = name.anchor, name.label
+    key, label = stroke.anchor, stroke.label
     return [
         points(
-            label, where[some], series.measured[some], look_of(name.kind), group=key, toggle=True
+            label, where[some], series.measured[some], look_of(stroke.kind), group=key, toggle=True
         ),
         band("band of the model", x, low, high, group=key),
         curve(f"model, {label}", x, y, group=key),
     ]
 
 
-def _card(fit: FitResult, stroke: StrokeSamples) -> Chart:
-    against = against_of(stroke.name)
+def _card(fit: FitResult, stroke: FittedStroke) -> Chart:
+    against = stroke.against
     x, y = _axes(fit, against)
     residual = with_unit(finite(_rms(fit, stroke)), fit.effort_unit, 2)
     series = tuple(
@@ -318,27 +261,27 @@ def _card(fit: FitResult, stroke: StrokeSamples) -> Chart:
         for one in _drawn(fit, stroke, against, MOST_DOTS // 3)
     )
     caption = f"Rms residual {residual}."
-    return Chart(stroke.name.anchor, stroke.name.label, x, y, series, caption, small=True)
+    return Chart(stroke.anchor, stroke.label, x, y, series, caption, small=True)
 
 
-def _rms(fit: FitResult, stroke: StrokeSamples) -> float:
+def _rms(fit: FitResult, stroke: FittedStroke) -> float:
     at = stroke.places
     return rms(fit.series.measured[at] - fit.series.predicted[at])
 
 
-def _residual_row(fit: FitResult, stroke: StrokeSamples, carded: set[str]) -> Row:
+def _residual_row(fit: FitResult, stroke: FittedStroke, carded: set[str]) -> Row:
     series, at, words = fit.series, stroke.places, channels_of(fit)
     residual = series.measured[at] - series.predicted[at]
     scale, error = rms(series.measured[at]), rms(residual)
     known = np.flatnonzero(np.isfinite(residual))
     worst = known[np.argmax(np.abs(residual[known]))] if len(known) else None
-    anchor = stroke.name.anchor
+    anchor = stroke.anchor
 
     def at_worst(values: Array) -> float | None:
         return None if worst is None else values[worst]
 
     return Row(
-        stroke.name.label,
+        stroke.label,
         (
             number("rms", error, fit.effort_unit),
             percent_of("relative", error / scale if scale > 0 else None),
@@ -353,7 +296,7 @@ def _residual_row(fit: FitResult, stroke: StrokeSamples, carded: set[str]) -> Ro
     )
 
 
-def _bars(fit: FitResult, ranked: Sequence[StrokeSamples], rows: Sequence[Row], id_: str) -> Chart:
+def _bars(fit: FitResult, ranked: Sequence[FittedStroke], rows: Sequence[Row], id_: str) -> Chart:
     size = [_rms(fit, stroke) for stroke in ranked]
     at = fit.series.measured - fit.series.predicted
     bias = [abs(mean(at[stroke.places])) for stroke in ranked]
@@ -361,11 +304,11 @@ def _bars(fit: FitResult, ranked: Sequence[StrokeSamples], rows: Sequence[Row], 
         Series(
             kind_word(kind, fit.position_unit),
             "bars",
-            tuple(finite(v) for v, s in zip(size, ranked, strict=True) if s.name.kind == kind),
-            tuple(float(i) for i, s in enumerate(ranked) if s.name.kind == kind),
+            tuple(finite(v) for v, s in zip(size, ranked, strict=True) if s.kind == kind),
+            tuple(float(i) for i, s in enumerate(ranked) if s.kind == kind),
             look=look_of(kind),
         )
-        for kind in dict.fromkeys(stroke.name.kind for stroke in ranked)
+        for kind in dict.fromkeys(stroke.kind for stroke in ranked)
     ]
     series.append(points("size of the mean", bias, range(len(ranked)), "ink"))
     caption = (
@@ -380,8 +323,8 @@ def _bars(fit: FitResult, ranked: Sequence[StrokeSamples], rows: Sequence[Row], 
         Axis("rms residual", fit.effort_unit, low=0.0),
         Axis(
             "",
-            categories=tuple(stroke.name.label for stroke in ranked),
-            links=tuple(stroke.name.anchor for stroke in ranked),
+            categories=tuple(stroke.label for stroke in ranked),
+            links=tuple(stroke.anchor for stroke in ranked),
             reverse=True,
         ),
         tuple(series),
@@ -389,7 +332,7 @@ def _bars(fit: FitResult, ranked: Sequence[StrokeSamples], rows: Sequence[Row], 
     )
 
 
-def _spread(fit: FitResult, strokes: Sequence[StrokeSamples], against: Over, id_: str) -> Chart:
+def _spread(fit: FitResult, strokes: Sequence[FittedStroke], against: Over, id_: str) -> Chart:
     """Residuals over a quantity, and what the critic's proposals add to the law there."""
     series, words = fit.series, channels_of(fit)
     residual = series.measured - series.predicted
@@ -398,10 +341,10 @@ def _spread(fit: FitResult, strokes: Sequence[StrokeSamples], against: Over, id_
         "rate": (series.opening_rate, Axis(f"{words.position} rate", words.rate_unit)),
         "time": (_elapsed(fit), Axis("time", "s")),
     }[against]
-    kinds = list(dict.fromkeys(stroke.name.kind for stroke in strokes))
+    kinds = list(dict.fromkeys(stroke.kind for stroke in strokes))
     marks = []
     for kind in kinds:
-        places = np.concatenate([s.places for s in strokes if s.name.kind == kind])
+        places = np.concatenate([s.places for s in strokes if s.kind == kind])
         some = thinned(places, SPREAD_DOTS // len(kinds))
         name = kind_word(kind, fit.position_unit)
         marks.append(points(name, where[some], residual[some], look_of(kind), toggle=True))

@@ -92,8 +92,8 @@ def trade_workspace(
     cannot be used, or another run holds the file.
     """
     from scissorcal.bench.trade.knob import KNOBS
+    from scissorcal.report.build import twin_text
     from scissorcal.report.trade import trade_page
-    from scissorcal.report.twin import twin_text
 
     start = time.time() if began is None else began
     chosen = settings or TradeSettings()

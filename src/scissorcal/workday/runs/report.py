@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.load import read_text
@@ -48,7 +48,7 @@ def write_workspace_report(
     nothing that it says has changed, it keeps its time, and with it a signature, which the page
     shows. Raises MissingError where there is no fit, or one is stale.
     """
-    from scissorcal.report import build_report
+    from scissorcal.report import Evidence, build_report
 
     _refuse_stale(engine)
     fits = _rig_fits(engine)
@@ -63,16 +63,23 @@ def write_workspace_report(
         build_report(
             engine.recipe,
             list(fits.values()),
-            [r for what in RIG if what in fits for r in _recordings(engine, what)],
+            Evidence(
+                tuple(
+                    recording
+                    for what in RIG
+                    if what in fits
+                    for recording in used_recordings(workspace, engine.recipe, what, engine.index)
+                ),
+                checks,
+                geometry,
+                tuple(cell for what in RIG if what in fits for cell in _cells(engine, what)),
+                _choice(engine),
+                plate_pieces(engine.recipe.plate, workspace.root),
+                recipe_text=read_text(workspace.recipe_path),
+                inputs_hash=engine.identity("report"),
+            ),
             workspace.report_html.parent,
             created=now or datetime.now(UTC),
-            recipe_text=read_text(workspace.recipe_path),
-            checks=checks,
-            geometry=geometry,
-            inputs_hash=engine.identity("report"),
-            completeness=[cell for what in RIG if what in fits for cell in _cells(engine, what)],
-            choice=_choice(engine),
-            pieces=plate_pieces(engine.recipe.plate, workspace.root),
         )
         engine.refresh()
     verdicts = [v for found in geometry.fits.values() for v in found.verdicts]
@@ -96,10 +103,6 @@ def _refuse_stale(engine: Engine) -> None:
 
 def _rig_fits(engine: Engine) -> "dict[str, FitResult]":
     return {what: load_result(engine, what) for what in available(engine, RIG)}
-
-
-def _recordings(engine: Engine, what: "CaptureKind") -> tuple[Any, ...]:
-    return used_recordings(engine.workspace, engine.recipe, what, engine.index)
 
 
 def _cells(engine: Engine, what: "CaptureKind") -> "list[Cell]":

@@ -27,8 +27,8 @@ def workspace_scene_choice(engine: Engine) -> "SceneChoice | None":
     """
     import numpy as np
 
-    from scissorcal.package.by_load import rendered_fits
     from scissorcal.package.exact import pick_draws
+    from scissorcal.package.friction_tables import rendered_fits
     from scissorcal.package.simplest.model import simplest_model
 
     if not engine.needed(STEP) or set(available(engine, NEEDED)) != set(NEEDED):

@@ -39,13 +39,12 @@ from scissorcal.bench.trade.torque import (
     torque_errors,
 )
 from scissorcal.calibration.result import FitResult
-from scissorcal.package.simplest.candidates import FAMILIES, NONE, Aspect, fitted_candidate
 from scissorcal.package.simplest.difference import Scene, felt
-from scissorcal.package.simplest.law import Law
+from scissorcal.package.simplest.law import FAMILIES, NONE, Aspect, Law, fitted_candidate
 from scissorcal.recipe.schema import Recipe
 
 DAMPED = "damped"
-"""As `package.simplest.candidates` calls it."""
+"""As `package.simplest.law` calls it."""
 HOLDOUT = "hold-out strokes, rms"
 RIPPLE_AVERAGE, RIPPLE_WORST = "ripple, average", "ripple, worst"
 NO_MINUTES = "Minutes of capture are not known: the recordings do not state their rig."

@@ -9,8 +9,7 @@ from scissorcal.bench.trade.models import central_law
 from scissorcal.bench.trade.package_cost import BYTES
 from scissorcal.bench.trade.point import Sample, Setting
 from scissorcal.errors import ScissorcalError
-from scissorcal.package.simplest.candidates import Candidate, fitted_candidate, simpler_candidates
-from scissorcal.package.simplest.law import Law
+from scissorcal.package.simplest.law import Candidate, Law, fitted_candidate, simpler_candidates
 from scissorcal.package.simplest.project import Reference, project
 from scissorcal.recipe.schema import Recipe
 

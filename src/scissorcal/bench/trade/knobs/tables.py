@@ -13,9 +13,9 @@ from scissorcal.bench.trade.point import Error, Quantity, Sample, Setting
 from scissorcal.bench.trade.torque import AVERAGE, WORST
 from scissorcal.errors import MissingError
 from scissorcal.package.compile import TOLERANCE, compile_model
+from scissorcal.package.records import Bound
 from scissorcal.package.stated_bound import stated_bound
 from scissorcal.package.table_cost import CostAndError, TableCost
-from scissorcal.package.table_record import Bound
 from scissorcal.package.tables import NumberFormat
 
 RANDOM_STEP = "step at random states"
