@@ -34,7 +34,7 @@ from scissorcal.bench.trade.point import Curve
 from scissorcal.bench.trade.recommend import stated
 from scissorcal.bench.trade.together import Together, rendered_torque
 from scissorcal.bench.trade.torque import scene_places
-from scissorcal.cli.bench_trade import seconds_of
+from scissorcal.cli.bench import seconds_of
 from scissorcal.device.sim.specimen import Specimen
 from scissorcal.device.sim.truth import average_torque
 from scissorcal.workday.demo.day import make_day, specimen_of

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scissorcal.bench.trade.subsets import kept, movements, shortened
+from scissorcal.bench.trade.knobs.capture import kept, movements, shortened
 from scissorcal.recording.header import Stroke
 from scissorcal.recording.recording import SAMPLE_DTYPE, UNLOADED_MARK, Recording
 

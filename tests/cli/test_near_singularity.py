@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scissorcal.cli.fit_plate import facts, text
-from scissorcal.cli.track_view import track_line
+from scissorcal.cli.track import track_line
 from scissorcal.recipe.euler_angles import EulerAngles
 from scissorcal.report.subjects.plate_pose import plate_panels
 from scissorcal.vision.geometry.pose import Pose

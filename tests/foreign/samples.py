@@ -237,7 +237,7 @@ def _report(path: Path) -> None:
 
 def _read_report(path: Path) -> None:
     from scissorcal.workday import facts
-    from scissorcal.workday.runs.compare import load_side
+    from scissorcal.workday.runs.report import load_side
 
     assert isinstance(facts.report(path)["inputs"], str)
     load_side(path)

@@ -10,9 +10,8 @@ import pytest
 
 from scissorcal.calibration import store
 from scissorcal.errors import InputError
-from scissorcal.workday.elsewhere import put_in_place, refuse_unwritable
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.history import restore, versions
+from scissorcal.workday.history import put_in_place, refuse_unwritable, restore, versions
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.runs.fit import fit_step, fit_workspace
 from scissorcal.workday.steps import BY_NAME

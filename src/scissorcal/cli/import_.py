@@ -10,12 +10,12 @@ import typer
 
 from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder, options_of
-from scissorcal.cli.output import Answer, command
+from scissorcal.cli.output import Answer, command, table
 from scissorcal.cli.progress import progress
-from scissorcal.cli.survey import survey_lines
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
+    from scissorcal.calibration.signals.survey import Survey
     from scissorcal.recording import Joint, Kind, Recording
 
 _CAMERA_FILES = (".yaml", ".yml", ".xml", ".json", ".ini")
@@ -278,3 +278,24 @@ def pairs(option: str, given: Sequence[str] | None) -> list[tuple[str, str]]:
             raise InputError(f"--{option} {channel.strip()} is given twice; give it once.")
         pairs.append((channel.strip(), value.strip()))
     return pairs
+
+
+def survey_lines(found: "Survey") -> list[str]:
+    """Rate and sensors, for people; angles in deg."""
+    import math
+
+    gaps = found.gaps
+    lost = f"{gaps.missing} samples missing in {gaps.places} gaps" if gaps.places else "no gap"
+    head = (
+        f"rate: {found.rate_Hz:.4g} Hz; {found.interval_low_ms:.4g} to "
+        f"{found.interval_high_ms:.4g} ms between samples (5 to 95 %), longest "
+        f"{found.longest_ms:.4g} ms; {lost}"
+    )
+    rows = [["sensor", "unit", "step", "lowest", "highest", "cut off low", "high", "dead band"]]
+    for one in found.sensors:
+        unit, factor = ("deg", 180.0 / math.pi) if one.unit == "rad" else (one.unit, 1.0)
+        values = [f"{factor * value:.4g}" for value in (one.low, one.high)]
+        step = "constant" if one.constant else f"{factor * one.step:.3g}" if one.step else "none"
+        shares = [f"{share:.1%}" for share in (one.at_low, one.at_high, one.dead)]
+        rows.append([one.channel, unit, step, *values, *shares])
+    return [head, table(rows, right=range(2, 8))]

@@ -9,7 +9,7 @@ from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder, Seed, TrustedKey
 from scissorcal.cli.output import Answer, command
-from scissorcal.cli.signing import SigningKey, signer_of
+from scissorcal.cli.report import SigningKey, signer_of
 
 if TYPE_CHECKING:
     from scissorcal.package import Manifest

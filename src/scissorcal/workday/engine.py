@@ -18,7 +18,6 @@ from scissorcal.recipe.requirements import CaptureKind, Requirements, requiremen
 from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.facts import UNFINISHED, rendering
 from scissorcal.workday.index import FileIndex
-from scissorcal.workday.photograph_state import photograph_indexes, photographs_state
 from scissorcal.workday.recordings import (
     RecordingRow,
     counts_of,
@@ -28,7 +27,15 @@ from scissorcal.workday.recordings import (
     refuse_mixed_joints,
     why_unused,
 )
-from scissorcal.workday.states import CHANGED, WAITING, State, StepState, counted
+from scissorcal.workday.states import (
+    CHANGED,
+    WAITING,
+    State,
+    StepState,
+    counted,
+    photograph_indexes,
+    photographs_state,
+)
 from scissorcal.workday.steps import BY_NAME, EFFORTS, STEPS, Step
 from scissorcal.workday.workspace import Workspace
 
@@ -300,7 +307,7 @@ class Engine:
         return made("done", facts["label"], "", notes=notes, **kept)
 
     def _remedy(self, step: Step, failed: tuple[str, ...], effort: str) -> str:
-        from scissorcal.workday.remedies import remedy  # a day on which all went well needs none
+        from scissorcal.workday.states import remedy  # a day on which all went well needs none
 
         return remedy(step, failed, effort, self.state)
 

@@ -116,7 +116,7 @@ class FitOptions:
     ``effort`` is the recipe's where not given. ``force`` fits again where nothing changed.
     ``critic`` asks for the critic of friction, at draft effort too; a stored fit without it is made
     again. Where the workspace cannot be written, a fit is kept in ``save_to``
-    (`workday.elsewhere`).
+    (`workday.history`).
     """
 
     effort: Literal["draft", "standard", "thorough"] | None = None

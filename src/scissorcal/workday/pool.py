@@ -1,6 +1,7 @@
 """Where the fits of a trust check run: here, in processes of this machine, or on a cluster."""
 
 import gc
+import json
 import logging
 import multiprocessing
 import os
@@ -18,11 +19,13 @@ from concurrent.futures import (
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
 
+from scissorcal import errors
 from scissorcal.errors import DeviceError, InputError, ScissorcalError, needs_extra
-from scissorcal.workday.answers import answering, read_answer
+from scissorcal.foreign import parse_json
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -38,7 +41,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class Pool:
     """An executor, how many jobs it does at a time, and how many it is handed at once.
 
-    Where it is ``remote``, jobs answer in JSON text (`workday.answers`).
+    Where it is ``remote``, jobs answer in JSON text (`workday.pool`).
     """
 
     executor: Executor
@@ -255,3 +258,66 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)
+
+
+
+REMEDY = "Check that its workers have this version of scissorcal, and who may reach it."
+
+_ERRORS = {
+    kind.__name__: kind
+    for kind in (
+        ScissorcalError,
+        errors.InputError,
+        errors.VerdictError,
+        errors.DeviceError,
+        errors.MissingError,
+    )
+}
+
+
+def answering(job: Callable[[T], Any]) -> "Callable[[T], str]":
+    """``job`` such that it answers with JSON text, whether it ends or raises."""
+    return partial(_answer, job)
+
+
+def read_answer(answer: object, kind: Any) -> Any:
+    """The value of type ``kind`` in an answer; its type is checked as that of a foreign file.
+
+    Raises the error that the answer tells of, ModuleNotFoundError where a worker lacks a module,
+    and ScissorcalError where it is no answer.
+
+    >>> read_answer(answering(abs)(-2), int)
+    2
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    if not isinstance(answer, str):
+        raise ScissorcalError(f"The cluster sent no answer but {type(answer).__name__}. {REMEDY}")
+    told = parse_json(answer, "The cluster's answer", REMEDY)
+    if isinstance(told, dict) and "error" in told:
+        raise _error(str(told["error"]), str(told.get("sentence", "")))
+    try:
+        return TypeAdapter(kind).validate_python(told["value"])
+    except (ValidationError, KeyError, TypeError) as error:
+        raise ScissorcalError(
+            f"The cluster's answer is not of the kind that was asked for. {REMEDY}"
+        ) from error
+
+
+def _answer(job: Callable[[T], Any], item: T) -> str:
+    from pydantic_core import to_jsonable_python
+
+    try:
+        return json.dumps({"value": to_jsonable_python(job(item))})
+    except ModuleNotFoundError as error:
+        return json.dumps({"error": "ModuleNotFoundError", "sentence": error.name or str(error)})
+    except Exception as error:  # noqa: BLE001 - told to who asked, as text
+        return json.dumps({"error": type(error).__name__, "sentence": str(error)})
+
+
+def _error(name: str, sentence: str) -> Exception:
+    if name == "ModuleNotFoundError":
+        return ModuleNotFoundError(f"No module named {sentence!r}", name=sentence)
+    if name in _ERRORS:
+        return _ERRORS[name](sentence)
+    return ScissorcalError(f"A worker of the cluster failed: {name}: {sentence}")

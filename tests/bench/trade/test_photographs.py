@@ -142,7 +142,7 @@ def test_rendered_photographs_give_the_edge_and_the_pose(tmp_path):
         render_blade_photographs,
         render_plate_photographs,
     )
-    from scissorcal.workday.demo.sim_photographs import specimen_blade
+    from scissorcal.workday.demo.photographs import specimen_blade
 
     chosen = recipe("paper-photographed")
     lens = SIM_LENS

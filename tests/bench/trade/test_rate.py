@@ -10,12 +10,24 @@ import pytest
 from scissorcal.bench.trade import frame_time
 from scissorcal.bench.trade.assemble import curve_of
 from scissorcal.bench.trade.frame_time import frame_time_s
-from scissorcal.bench.trade.knobs.rate import ALONE, IN_HAND, NO_PORT, NO_RIG, Rate
+from scissorcal.bench.trade.knobs.rate import (
+    ALONE,
+    IN_HAND,
+    NO_PORT,
+    NO_RIG,
+    Rate,
+    known_rig,
+    margin,
+)
 from scissorcal.bench.trade.models import compiled
 from scissorcal.bench.trade.recommend import choices_of
-from scissorcal.bench.trade.rendered import continuous_torques, rendered_error
-from scissorcal.bench.trade.stability import known_rig, margin
-from scissorcal.bench.trade.strokes import PEAK_OVER_MEAN, Stroke, hand_strokes
+from scissorcal.bench.trade.rendered import (
+    PEAK_OVER_MEAN,
+    Stroke,
+    continuous_torques,
+    hand_strokes,
+    rendered_error,
+)
 from scissorcal.bench.trade.torque import AVERAGE, WORST
 from scissorcal.errors import ScissorcalError, needs_unix
 from scissorcal.kernel import estimated_rates

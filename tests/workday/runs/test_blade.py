@@ -9,7 +9,7 @@ from scissorcal.calibration.edge.result import BladeResult
 from scissorcal.calibration.store import load
 from scissorcal.errors import InputError, MissingError
 from scissorcal.vision.sim.sim_camera import render_blade_photographs
-from scissorcal.workday.demo.sim_photographs import specimen_blade
+from scissorcal.workday.demo.photographs import specimen_blade
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.photographs import BladeSetup, photo_captures

@@ -1,9 +1,9 @@
 """Fits of one case with one candidate law, all other choices as the present fits have them."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,8 +12,11 @@ from scissorcal.calibration.cut.fit import fit_cut
 from scissorcal.calibration.fit_model import CutRun
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.result import FitResult
-from scissorcal.errors import MissingError
-from scissorcal.recipe.schema import Recipe
+from scissorcal.device.cut_trajectory import cut_plan
+from scissorcal.device.rig_record import identity_of
+from scissorcal.device.trajectory import friction_plan
+from scissorcal.errors import MissingError, ScissorcalError
+from scissorcal.recipe.schema import CaptureCut, CaptureFriction, Recipe
 
 Changes = Mapping[str, Any]
 
@@ -104,3 +107,49 @@ def holdout_rms(fit: FitResult) -> float:
 def _with_fit(recipe: Recipe, part: str, changes: Changes) -> Recipe:
     section = getattr(recipe.fit, part).model_copy(update=dict(changes))
     return recipe.model_copy(update={"fit": recipe.fit.model_copy(update={part: section})})
+
+
+Section = TypeVar("Section", CaptureFriction, CaptureCut)
+
+
+def needed_minutes(case: Case, friction_speeds: int, cut_speeds: int) -> float | None:
+    """Planned minutes of motion with so many of the recipe's speeds, pauses excluded.
+
+    A law with k parameters over the rate needs motion at k speeds at least; repeats, strokes,
+    sheets and the excitation stay as the recipe has them. None where the recordings do not state
+    the rig, or where the recipe cannot be planned on it.
+    """
+    known = next((one for one in case.friction if "schema_hash" in one.device), None)
+    if known is None:
+        return None
+    identity, capture = identity_of(known.device, known.source), case.recipe.capture
+    fewer = capture.model_copy(
+        update={
+            "friction": _with_speeds(capture.friction, friction_speeds),
+            "cut": _with_speeds(capture.cut, cut_speeds),
+        }
+    )
+    recipe = case.recipe.model_copy(update={"capture": fewer})
+    plans = (friction_plan, cut_plan) if case.cut else (friction_plan,)
+    try:
+        return sum(plan(recipe, identity).duration_s for plan in plans) / 60.0
+    except ScissorcalError:
+        return None
+
+
+def some_speeds(speeds: Sequence[float], count: int) -> tuple[float, ...]:
+    """So many of some speeds, spread over their range: the middle one alone, or both ends and more.
+
+    >>> some_speeds((0.05, 0.12, 0.3, 0.7, 1.5), 1), some_speeds((0.05, 0.12, 0.3, 0.7, 1.5), 3)
+    ((0.3,), (0.05, 0.3, 1.5))
+    """
+    ordered = sorted(set(speeds))
+    if count == 1:
+        return (ordered[len(ordered) // 2],)
+    picked = np.unique(np.round(np.linspace(0, len(ordered) - 1, min(count, len(ordered)))))
+    return tuple(ordered[int(index)] for index in picked)
+
+
+def _with_speeds(section: Section, count: int) -> Section:
+    speeds = some_speeds(section.speeds_rad_per_s, count)
+    return section.model_copy(update={"speeds_rad_per_s": speeds})

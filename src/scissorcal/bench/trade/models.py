@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
+from scissorcal.bench.trade.point import Quantity
 from scissorcal.calibration.result import FitResult
-from scissorcal.errors import MissingError
+from scissorcal.errors import MissingError, ScissorcalError
 from scissorcal.kernel import ModelTables
 from scissorcal.package.by_load import rendered_fits
 from scissorcal.package.compile import (
@@ -20,6 +21,7 @@ from scissorcal.package.exact import ExactModel, central_model, pick_draws
 from scissorcal.package.simplest.law import Law
 from scissorcal.package.simplest.model import simplest_model
 from scissorcal.package.smallest_tables import smallest_tables
+from scissorcal.package.table_cost import CostAndError, cost_and_error
 
 
 @dataclass(frozen=True)
@@ -126,3 +128,45 @@ def tables_of(case: Case, model: ExactModel) -> Compiled:
         return smallest_tables(model, case.recipe, number_format=case.number_format)
     tolerance = TOLERANCE if case.table_tolerance is None else case.table_tolerance
     return compile_model(model, case.recipe, tolerance=tolerance, number_format=case.number_format)
+
+
+BYTES, STEP = "table bytes", "step"
+
+TIMINGS = 5
+"""Repeats of a timing, whose median counts."""
+
+
+def package_costs(
+    case: Case, model: ExactModel, made: Compiled, rng: np.random.Generator
+) -> dict[str, Quantity]:
+    """Bytes of the tables, and the time of a step (ns) where a compiler measures it.
+
+    Raises what `measured_tables` raises.
+    """
+    cost = measured_tables(case, model, made, rng, count_instructions=False).cost
+    costs = {BYTES: Quantity(float(cost.bytes), "B")}
+    if cost.stroke_ns is not None:
+        costs[STEP] = Quantity(cost.stroke_ns.median, "ns")
+    return costs
+
+
+def measured_tables(
+    case: Case,
+    model: ExactModel,
+    made: Compiled,
+    rng: np.random.Generator,
+    *,
+    count_instructions: bool = True,
+) -> CostAndError:
+    """What `package.table_cost` measures of tables; ScissorcalError where the compiler fails."""
+    try:
+        return cost_and_error(
+            model,
+            case.recipe,
+            made,
+            rng,
+            repeats=TIMINGS,
+            count_instructions=count_instructions,
+        )
+    except RuntimeError as error:
+        raise ScissorcalError(f"The step could not be measured: {error}") from error

@@ -14,8 +14,7 @@ from scissorcal.bench.trade.fits import (
     fits_errors,
     fits_outcome,
 )
-from scissorcal.bench.trade.models import held_law, model_of_law, tables_of
-from scissorcal.bench.trade.package_cost import package_costs
+from scissorcal.bench.trade.models import held_law, model_of_law, package_costs, tables_of
 from scissorcal.bench.trade.pictures import Resolution, fit_edge
 from scissorcal.bench.trade.point import Error, Quantity, Sample, Setting
 from scissorcal.bench.trade.torque import WORST, model_torque, scene_places

@@ -9,8 +9,8 @@ from scissorcal.aliases import Progress
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.verdicts import Verdict
-from scissorcal.workday.demo.judged import Judged
 from scissorcal.workday.demo.photographs import (
+    Judged,
     fit_photographs,
     judge_photographs,
     photograph,

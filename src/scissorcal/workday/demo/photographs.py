@@ -1,13 +1,15 @@
 """The demo's photographs: rendered, taken in and fitted as a lab's own would be, then judged."""
 
+import math
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scissorcal.aliases import Progress
+from scissorcal.errors import InputError
 from scissorcal.recipe.requirements import requirements
 from scissorcal.recording.probe import NORMAL_90
-from scissorcal.workday.demo.judged import Judged
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.photographs import BladeSetup
@@ -20,6 +22,55 @@ from scissorcal.workday.workspace import Workspace
 if TYPE_CHECKING:
     from scissorcal.device.sim.specimen import Specimen
     from scissorcal.recipe.schema import Recipe
+    from scissorcal.vision.sim import BladeShape
+
+
+def specimen_blade(recipe: "Recipe") -> "BladeShape":
+    """Shape of the specimen's blade. Raises InputError where the recipe names no specimen."""
+    from scissorcal.device.sim.specimen import load_specimen
+    from scissorcal.vision.sim import BladeShape
+
+    if recipe.specimen is None:
+        raise InputError(
+            f'The recipe "{recipe.name}" names no specimen, so there is no virtual blade to '
+            'photograph: add specimen = "...", or give photographs with --image.'
+        )
+    blade = load_specimen(recipe.specimen).blade
+    if blade.wave_mm is not None:
+        raise InputError(
+            f'The blade of the specimen "{recipe.specimen}" has a wave (blade.wave_mm), and the '
+            "virtual camera draws lines and arcs only: take it out, or give photographs with "
+            "--image."
+        )
+    taper = math.radians(blade.taper_deg)
+    return BladeShape(
+        length_m=1e-3 * blade.length_mm,
+        offset_m=1e-3 * blade.offset_mm,
+        taper_rad=taper,
+        curvature_per_m=blade.curvature_per_m,
+        back_m=-1e-3 * blade.offset_mm,
+        back_slope=-math.tan(taper),
+    )
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An estimate in ``unit`` with its 90 % interval, of a fit's parameter or of photographs.
+
+    ``truth`` is None where the chosen law has no such thing.
+    """
+
+    name: str
+    unit: str
+    truth: float | None
+    estimate: float
+    low: float
+    high: float
+
+    @property
+    def inside(self) -> bool | None:
+        """Whether the truth lies in the interval; None where there is no truth."""
+        return None if self.truth is None else self.low <= self.truth <= self.high
 
 
 def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Progress) -> None:
@@ -34,7 +85,6 @@ def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Prog
         render_plate_photographs,
     )
     from scissorcal.vision.targets.boards import CAMERA_BOARD
-    from scissorcal.workday.demo.sim_photographs import specimen_blade
 
     wanted = [item.name for item in requirements(recipe).photographs]
     for index, what in enumerate(wanted):

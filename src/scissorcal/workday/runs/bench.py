@@ -172,8 +172,8 @@ class _Run:
         Of a budget some is left for all recommended settings at once. With ``keep_time`` some is
         left for simulated captures too, and only what can lead to a recommendation is measured.
         """
+        from scissorcal.bench.trade.assemble import without_prospect
         from scissorcal.bench.trade.next_capture import CAPTURES
-        from scissorcal.bench.trade.prospects import without_prospect
         from scissorcal.bench.trade.schedule import Schedule
         from scissorcal.bench.trade.study import (
             PRESENT_TASK,
@@ -230,9 +230,8 @@ class _Run:
 
         The present settings come before all others, which are compared with them in pairs.
         """
-        from scissorcal.bench.trade.assemble import refits
+        from scissorcal.bench.trade.assemble import refits, to_simulate
         from scissorcal.bench.trade.knob import make_knob
-        from scissorcal.bench.trade.prospects import to_simulate
         from scissorcal.bench.trade.study import capture_tasks
 
         if self._case.friction_fit is None:

@@ -11,10 +11,10 @@ from scissorcal.errors import InputError
 from scissorcal.identity import VERSION, digest
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.envelope import plain
+from scissorcal.workday.photographs import BladeSetup, photo_captures
 from scissorcal.workday.recordings import used_recordings
-from scissorcal.workday.runs.bench_photographs import with_photographs
 from scissorcal.workday.runs.cut import edge_of_photographs
-from scissorcal.workday.runs.fit import load_result
+from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.workspace import FitKind
 
 if TYPE_CHECKING:
@@ -160,3 +160,24 @@ def _virtual(recording: "Recording") -> bool:
     from scissorcal.kernel import Capability
 
     return bool(int(recording.device.get("capabilities", 0)) & Capability.SIMULATOR)
+
+
+def with_photographs(case: "Case", engine: Engine) -> "Case":
+    """The case with the workspace's photographs of the blade and the plate, and its camera.
+
+    Of the plate only the newest capture counts, as in its fit. A camera counts where its fit is
+    current. Raises InputError where a capture's index is damaged.
+    """
+    from scissorcal.bench.trade.case import Photographed
+
+    blades = []
+    for capture in photo_captures(engine.workspace, "blade"):
+        setup = capture.index.blade or BladeSetup()
+        paths = tuple(capture.path(photograph) for photograph in capture.index.photographs)
+        blades.append(Photographed(paths, case.simulated, **setup.model_dump()))
+    plate = None
+    for capture in photo_captures(engine.workspace, "plate")[-1:]:
+        paths = tuple(capture.path(photograph) for photograph in capture.index.photographs)
+        plate = Photographed(paths, case.simulated)
+    camera = load_result(engine, "camera").camera if available(engine, ["camera"]) else None
+    return replace(case, photographs=tuple(blades), camera=camera, plate=plate)

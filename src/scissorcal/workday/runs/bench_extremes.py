@@ -25,8 +25,12 @@ def run_extremes(
     """
     from pydantic import TypeAdapter
 
-    from scissorcal.bench.extremes.compare import compare_kernel, compare_model, compare_package
-    from scissorcal.bench.extremes.long_runs import strokes
+    from scissorcal.bench.extremes.compare import (
+        compare_kernel,
+        compare_model,
+        compare_package,
+        strokes,
+    )
     from scissorcal.bench.extremes.states import package_states
     from scissorcal.report.extremes import extremes_page, extremes_panels
     from scissorcal.report.panel import Panel

@@ -150,7 +150,7 @@ def fit_step(
     stop: Stop | None = None,
 ) -> FitOutcome:
     """Run one fit, or read it back where its identity is the stored one's, unless forced."""
-    from scissorcal.workday.elsewhere import refuse_unwritable, save_anywhere
+    from scissorcal.workday.history import refuse_unwritable, save_anywhere
     from scissorcal.workday.options import FitOptions
 
     options = options or FitOptions()

@@ -22,8 +22,12 @@ from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.feeds import Feed
 from scissorcal.workday.tracking.session import Tell, TrackedRun, TrackSession, tracked_run
 from scissorcal.workday.tracking.sim_world import SimWorld
-from scissorcal.workday.tracking.track_pictures import PoseFinder, TrackPicture
-from scissorcal.workday.tracking.track_recorder import TrackRecorder, read_track
+from scissorcal.workday.tracking.track_recorder import (
+    PoseFinder,
+    TrackPicture,
+    TrackRecorder,
+    read_track,
+)
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:

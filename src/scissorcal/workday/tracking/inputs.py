@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from scissorcal.device.link import Link
     from scissorcal.recipe.schema import Recipe
     from scissorcal.tracking.contacts import TipContacts
-    from scissorcal.workday.tracking.track_pictures import PoseFinder
+    from scissorcal.workday.tracking.track_recorder import PoseFinder
 
 KnownPose = tuple[Array, Array, Array]
 """Rotation (3, 3), place (3,) in m and covariance (6, 6) in the rig's frame."""
@@ -42,7 +42,7 @@ def pose_finder(
     """
     from scissorcal.calibration.plate.fit import plate_target
     from scissorcal.workday.runs.plate import locate_workspace_rig
-    from scissorcal.workday.tracking.track_pictures import PoseFinder
+    from scissorcal.workday.tracking.track_recorder import PoseFinder
 
     fitted = load_result(engine, "camera")
     located = locate_workspace_rig(engine, fitted.camera)

@@ -16,11 +16,10 @@ from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import RigOptions
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.tracking import feeds, inputs
-from scissorcal.workday.tracking.camera_thread import CameraThread
+from scissorcal.workday.tracking.feeds import CameraThread
 from scissorcal.workday.tracking.session import TrackedRun, TrackSession, tracked_run
 from scissorcal.workday.tracking.sim_world import CARRY_S, SimWorld
-from scissorcal.workday.tracking.track_pictures import TrackPicture
-from scissorcal.workday.tracking.track_recorder import TrackChannels
+from scissorcal.workday.tracking.track_recorder import TrackChannels, TrackPicture
 
 if TYPE_CHECKING:
     from scissorcal.device.lockstep import LockstepLink
