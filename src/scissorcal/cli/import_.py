@@ -178,7 +178,7 @@ class _Imported:
     measured: tuple[str, ...]
 
 
-def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]") -> Answer:
+def _import_all(files: Sequence[Path], import_one: Callable[[Path], _Imported]) -> Answer:
     """Import each log that can be read; raises InputError that names the others."""
     lines, facts, paths, refused = [], [], [], []
     with progress() as tell:

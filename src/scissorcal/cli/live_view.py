@@ -170,7 +170,7 @@ def band_line(marks: "Sequence[UntilMark]") -> str:
     return f"{bars} {marks[-1].sentence}".strip()
 
 
-def effort_plot(points: "deque[tuple[float, float]]", of: "CoveredAxis") -> str:
+def effort_plot(points: deque[tuple[float, float]], of: "CoveredAxis") -> str:
     """Plot an axis's effort over its place with characters; the newest point is an o."""
     columns, rows = _TRACE_SIZE
     left, right = _range([point[0] for point in points])

@@ -345,7 +345,7 @@ def _bound_buffers(transport: asyncio.Transport | None) -> None:
         line.setsockopt(sockets.SOL_SOCKET, sockets.SO_SNDBUF, _SOCKET_BUFFER)
 
 
-async def _cancelled(task: "asyncio.Task[None]") -> None:
+async def _cancelled(task: asyncio.Task[None]) -> None:
     task.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await task

@@ -35,6 +35,7 @@ from scissorcal.workday.states import (
     counted,
     photograph_indexes,
     photographs_state,
+    remedy,
 )
 from scissorcal.workday.steps import BY_NAME, EFFORTS, STEPS, Step
 from scissorcal.workday.workspace import Workspace
@@ -287,7 +288,7 @@ class Engine:
             return made("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
         notes = self._little_used(step)
         if failed:
-            command = self._remedy(step, failed, facts.get("effort", ""))
+            command = remedy(step, failed, facts.get("effort", ""), self.state)
             found = f"{facts['label']}; failed: {', '.join(failed)}"
             return made("failed", found, command, notes=notes, **kept)
         if facts.get("lacks"):
@@ -301,15 +302,10 @@ class Engine:
         if check and check.state == "failed":
             found = f"{facts['label']}; its trust check failed: {', '.join(check.failed)}"
             kept["failed"] = tuple(f"{check.name} {one}" for one in check.failed)
-            return made("failed", found, self._remedy(step, kept["failed"], ""), **kept)
+            return made("failed", found, remedy(step, kept["failed"], "", self.state), **kept)
         if check and check.state != "done":
             return made("unverified", facts["label"], check.command, notes=notes, **kept)
         return made("done", facts["label"], "", notes=notes, **kept)
-
-    def _remedy(self, step: Step, failed: tuple[str, ...], effort: str) -> str:
-        from scissorcal.workday.states import remedy  # a day on which all went well needs none
-
-        return remedy(step, failed, effort, self.state)
 
     def _failed_below(self, step: Step) -> StepState | None:
         """A fit that this fit builds on and that failed, if only by its trust check."""

@@ -13,6 +13,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
+from scissorcal.calibration.result import Result
+from scissorcal.calibration.store import load, load_fit, save
 from scissorcal.errors import InputError, MissingError, file_error
 from scissorcal.files import discard_folder, part_of, put_beside, rename_folder
 from scissorcal.identity import file_digest
@@ -21,8 +24,6 @@ from scissorcal.workday.steps import BY_NAME, Step, steps_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from scissorcal.calibration.result import Result
 
 HASH = 8
 """Digits of the content's digest in a version's name."""
@@ -100,9 +101,6 @@ def scatter_on_record(engine: Engine, step: Step) -> dict[str, float]:
     Only fits by the present version of the step count: another judged recordings in another way.
     Empty where none of them had several recordings that could be compared.
     """
-    from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
-    from scissorcal.calibration.store import load_fit
-
     for version in versions(engine, step.what):
         with contextlib.suppress(InputError):  # a version that is damaged shows nothing
             known = load_fit(version.path).diagnostics
@@ -154,7 +152,7 @@ def take_place(engine: Engine, name: str, source: Path) -> Path | None:
 
 
 def save_version(
-    engine: Engine, name: str, result: "Result", draw: Callable[[Path], object] | None = None
+    engine: Engine, name: str, result: Result, draw: Callable[[Path], object] | None = None
 ) -> Path:
     """Keep the result that is there, then write the new one. Gives its path.
 
@@ -162,8 +160,6 @@ def save_version(
     fails, or is killed, the earlier result stays in use. Pictures and trust checks are never those
     of another result; after a kill they may stand in the result's version alone.
     """
-    from scissorcal.calibration.store import save
-
     path = engine.file(name)
     drawn = part_of(path.with_suffix(""))
     try:
@@ -275,8 +271,8 @@ def _checks_beside(path: Path) -> tuple[Path, ...]:
 def save_anywhere(
     engine: Engine,
     step: Step,
-    result: "Result",
-    draw: "Callable[[Path], object] | None",
+    result: Result,
+    draw: Callable[[Path], object] | None,
     folder: Path | None,
 ) -> None:
     """Write a result into the workspace; where that cannot be written, into another folder.
@@ -312,8 +308,6 @@ def put_in_place(engine: Engine, path: Path) -> tuple[Step, Path | None]:
     Gives its step and the folder of the one that was in use. Raises InputError where ``path`` is no
     result of a fit.
     """
-    from scissorcal.calibration.store import load
-
     step = _step_of(path)
     module, _, name = step.holds.partition(":")
     found = load(path, getattr(import_module(module), name))
@@ -326,10 +320,8 @@ def put_in_place(engine: Engine, path: Path) -> tuple[Step, Path | None]:
 
 
 def _kept_elsewhere(
-    refusal: str, when: str, step: Step, result: "Result", folder: Path | None
+    refusal: str, when: str, step: Step, result: Result, folder: Path | None
 ) -> InputError:
-    from scissorcal.calibration.store import save
-
     name = f"{step.what}-{result.inputs_hash[:HASH]}-{os.urandom(2).hex()}.nc"
     for place in _places(folder):
         path = place / name

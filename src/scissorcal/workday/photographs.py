@@ -105,8 +105,8 @@ class Seen:
     words: str
     detection: "Detection | None" = None
     stance: tuple[float, float] | None = None
-    drawn: "Callable[[Path], object] | None" = None
-    board: "CharucoBoard | MarkerBoard | Chessboard | None" = None
+    drawn: Callable[[Path], object] | None = None
+    board: CharucoBoard | MarkerBoard | Chessboard | None = None
 
 
 @dataclass(frozen=True)

@@ -260,7 +260,6 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-
 REMEDY = "Check that its workers have this version of scissorcal, and who may reach it."
 
 _ERRORS = {
@@ -275,7 +274,7 @@ _ERRORS = {
 }
 
 
-def answering(job: Callable[[T], Any]) -> "Callable[[T], str]":
+def answering(job: Callable[[T], Any]) -> Callable[[T], str]:
     """``job`` such that it answers with JSON text, whether it ends or raises."""
     return partial(_answer, job)
 

@@ -14,6 +14,7 @@ from scissorcal.bench.trade.fits import (
     fits_errors,
     fits_outcome,
 )
+from scissorcal.bench.trade.knob import make_knob
 from scissorcal.bench.trade.models import held_law, model_of_law, package_costs, tables_of
 from scissorcal.bench.trade.pictures import Resolution, fit_edge
 from scissorcal.bench.trade.point import Error, Quantity, Sample, Setting
@@ -119,8 +120,6 @@ def expected_chain_s(case: Case) -> float:
 
 def _choice(case: Case, name: str, label: str) -> tuple[Any, Setting]:
     """A knob and one of its settings."""
-    from scissorcal.bench.trade.knob import make_knob
-
     knob = make_knob(name)
     return knob, next(one for one in knob.settings(case) if one.label == label)
 

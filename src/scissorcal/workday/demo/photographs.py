@@ -4,12 +4,25 @@ import math
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from scissorcal.aliases import Progress
+from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import InputError
 from scissorcal.recipe.requirements import requirements
+from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.probe import NORMAL_90
+from scissorcal.vision.geometry.pose import Pose, difference
+from scissorcal.vision.sim import BladeShape
+from scissorcal.vision.sim.sim_camera import (
+    render_blade_photographs,
+    render_board_photographs,
+    render_card_photographs,
+    render_plate_photographs,
+    sim_plate_scene,
+)
+from scissorcal.vision.targets.boards import CAMERA_BOARD
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.photographs import BladeSetup
@@ -19,17 +32,9 @@ from scissorcal.workday.runs.fit import FitOutcome, fit_workspace, load_result
 from scissorcal.workday.runs.plate import capture_plate
 from scissorcal.workday.workspace import Workspace
 
-if TYPE_CHECKING:
-    from scissorcal.device.sim.specimen import Specimen
-    from scissorcal.recipe.schema import Recipe
-    from scissorcal.vision.sim import BladeShape
 
-
-def specimen_blade(recipe: "Recipe") -> "BladeShape":
+def specimen_blade(recipe: Recipe) -> BladeShape:
     """Shape of the specimen's blade. Raises InputError where the recipe names no specimen."""
-    from scissorcal.device.sim.specimen import load_specimen
-    from scissorcal.vision.sim import BladeShape
-
     if recipe.specimen is None:
         raise InputError(
             f'The recipe "{recipe.name}" names no specimen, so there is no virtual blade to '
@@ -73,19 +78,11 @@ class Judged:
         return None if self.truth is None else self.low <= self.truth <= self.high
 
 
-def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Progress) -> None:
+def photograph(workspace: Workspace, recipe: Recipe, seed: int, progress: Progress) -> None:
     """Render the photographs that the scene requires, and take them in.
 
     They show the specimen's own blade, and targets at places that only the renderer knows.
     """
-    from scissorcal.vision.sim.sim_camera import (
-        render_blade_photographs,
-        render_board_photographs,
-        render_card_photographs,
-        render_plate_photographs,
-    )
-    from scissorcal.vision.targets.boards import CAMERA_BOARD
-
     wanted = [item.name for item in requirements(recipe).photographs]
     for index, what in enumerate(wanted):
         share = index / len(wanted)
@@ -110,7 +107,7 @@ def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Prog
 
 
 def fit_photographs(
-    workspace: Workspace, recipe: "Recipe", seed: int, progress: Progress
+    workspace: Workspace, recipe: Recipe, seed: int, progress: Progress
 ) -> tuple[FitOutcome, ...]:
     """Fit what the scene requires of its photographs, in order."""
     wanted = [item.name for item in requirements(recipe).geometry]
@@ -119,7 +116,7 @@ def fit_photographs(
 
 
 def judge_photographs(
-    workspace: Workspace, recipe: "Recipe", specimen: "Specimen", seed: int
+    workspace: Workspace, recipe: Recipe, specimen: Specimen, seed: int
 ) -> tuple[Judged, ...]:
     """Put the edge's height and slope and the plate's place beside what was rendered.
 
@@ -134,9 +131,7 @@ def judge_photographs(
     return tuple(rows)
 
 
-def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[Judged]:
-    import numpy as np
-
+def _judge_edge(workspace: Workspace, specimen: Specimen) -> list[Judged]:
     fit = load_result(Engine.of(workspace), "blade").blades[0]
     edges = fit.belief.with_values(fit.draws)
     blade, length = specimen.blade, fit.belief.edge.length_m
@@ -163,12 +158,7 @@ def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[Judged]:
     return rows
 
 
-def _judge_plate(workspace: Workspace, recipe: "Recipe", seed: int) -> list[Judged]:
-    import numpy as np
-
-    from scissorcal.vision.geometry.pose import Pose, difference
-    from scissorcal.vision.sim.sim_camera import sim_plate_scene
-
+def _judge_plate(workspace: Workspace, recipe: Recipe, seed: int) -> list[Judged]:
     fit = load_result(Engine.of(workspace), "plate")
     rendered = sim_plate_scene(recipe, seed).rig_plate
     truth = Pose.from_matrix(rendered.rotation, rendered.shift_m)

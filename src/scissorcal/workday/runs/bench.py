@@ -8,12 +8,42 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from scissorcal.aliases import Progress
+from scissorcal.bench.trade.assemble import (
+    curve_of,
+    limit_of,
+    measured_curve,
+    reference_of,
+    refits,
+    to_simulate,
+    without_prospect,
+)
+from scissorcal.bench.trade.case import Case
+from scissorcal.bench.trade.knob import KNOBS, PRESENT_ALIKE, make_knob
+from scissorcal.bench.trade.next_capture import CAPTURES
+from scissorcal.bench.trade.point import Curve, Quantity, Spread
+from scissorcal.bench.trade.recommend import choices_of, together_sentence
+from scissorcal.bench.trade.result import FORMAT, Trade
+from scissorcal.bench.trade.schedule import Schedule
+from scissorcal.bench.trade.study import (
+    PRESENT_TASK,
+    Task,
+    capture_tasks,
+    key_of,
+    knob_of,
+    records_of,
+    run_task,
+    setting_of,
+    tasks_of,
+)
+from scissorcal.bench.trade.together import RECOMMENDED, TOGETHER, Together
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
 from scissorcal.identity import VERSION
+from scissorcal.report.trade import trade_page
+from scissorcal.report.twin import twin_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.pool import Pool, open_pool
 from scissorcal.workday.records import Record, RecordFile
@@ -27,14 +57,6 @@ from scissorcal.workday.runs.bench_case import (
     wanted_knobs,
 )
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.bench.trade.case import Case
-    from scissorcal.bench.trade.point import Curve
-    from scissorcal.bench.trade.result import Trade
-    from scissorcal.bench.trade.schedule import Schedule
-    from scissorcal.bench.trade.study import Task
-
 
 FINISH_S = 2.0
 """Time within a budget for writing the results."""
@@ -64,7 +86,7 @@ class TradeSettings:
 class TradeOutcome:
     """The result, its files, and what to say on the side."""
 
-    trade: "Trade"
+    trade: Trade
     html: Path
     json: Path
     notes: tuple[str, ...] = ()
@@ -91,10 +113,6 @@ def trade_workspace(
     knob is unknown or not of this scene, the budget is too small for any measurement, the cluster
     cannot be used, or another run holds the file.
     """
-    from scissorcal.bench.trade.knob import KNOBS
-    from scissorcal.report.trade import trade_page
-    from scissorcal.report.twin import twin_text
-
     start = time.time() if began is None else began
     chosen = settings or TradeSettings()
     tell = progress or (lambda done, sentence: None)
@@ -136,15 +154,13 @@ class _Run:
 
     def __init__(
         self,
-        case: "Case",
+        case: Case,
         file: RecordFile,
         budget_s: float | None,
         deadline: float | None,
         tell: Progress,
         left_out: Mapping[str, str],
     ) -> None:
-        from scissorcal.bench.trade.study import key_of
-
         self._case, self._file, self._tell = case, file, tell
         self._budget_s, self._deadline = budget_s, deadline
         self._blob = pickle.dumps(case)
@@ -156,14 +172,10 @@ class _Run:
     @property
     def _records(self) -> list[Record]:
         """The newest record of each task."""
-        from scissorcal.bench.trade.study import key_of
-
         return list({key_of(record): record for record in self._file.records}.values())
 
     def _known(self) -> list[Record]:
         """Records of the tasks that are not measured again."""
-        from scissorcal.bench.trade.study import key_of
-
         return [record for record in self._records if key_of(record) not in self._failed]
 
     def measure(self, pool: Pool, names: Sequence[str], *, keep_time: bool = True) -> bool:
@@ -172,18 +184,6 @@ class _Run:
         Of a budget some is left for all recommended settings at once. With ``keep_time`` some is
         left for simulated captures too, and only what can lead to a recommendation is measured.
         """
-        from scissorcal.bench.trade.assemble import without_prospect
-        from scissorcal.bench.trade.next_capture import CAPTURES
-        from scissorcal.bench.trade.schedule import Schedule
-        from scissorcal.bench.trade.study import (
-            PRESENT_TASK,
-            key_of,
-            knob_of,
-            setting_of,
-            tasks_of,
-        )
-        from scissorcal.bench.trade.together import TOGETHER, Together
-
         together = Together(())
         present = together.settings(self._case)[0]
         tasks = tasks_of(self._case, names)
@@ -230,10 +230,6 @@ class _Run:
 
         The present settings come before all others, which are compared with them in pairs.
         """
-        from scissorcal.bench.trade.assemble import refits, to_simulate
-        from scissorcal.bench.trade.knob import make_knob
-        from scissorcal.bench.trade.study import capture_tasks
-
         if self._case.friction_fit is None:
             return
         if any(refits(make_knob(name)) for name in names):
@@ -243,11 +239,8 @@ class _Run:
             if not self._captured(pool, sorted(tasks, key=lambda task: task.repeat)):
                 return
 
-    def _captured(self, pool: Pool, tasks: "Sequence[Task]") -> bool:
+    def _captured(self, pool: Pool, tasks: Sequence[Task]) -> bool:
         """Measure simulated captures that have no record yet; whether any was."""
-        from scissorcal.bench.trade.schedule import Schedule
-        from scissorcal.bench.trade.study import key_of, knob_of, setting_of
-
         known = {key_of(record) for record in self._records}
         left = [task for task in tasks if task.key not in known]
         expected = {}
@@ -261,11 +254,8 @@ class _Run:
         self._work(pool, schedule, len(left))
         return self.made > before
 
-    def curves(self, names: Sequence[str]) -> "tuple[Curve, ...]":
+    def curves(self, names: Sequence[str]) -> tuple[Curve, ...]:
         """The curves of the knobs named, from all records; of those left out, why."""
-        from scissorcal.bench.trade.assemble import curve_of, limit_of
-        from scissorcal.bench.trade.knob import make_knob
-
         case, limit = self._case, limit_of(self._case)
         found = []
         for name in names:
@@ -276,18 +266,11 @@ class _Run:
             found.append(curve)
         return tuple(found)
 
-    def together(self, pool: Pool, curves: "Sequence[Curve]") -> "Curve | None":
+    def together(self, pool: Pool, curves: Sequence[Curve]) -> Curve | None:
         """Measure the present and all recommended settings.
 
         None where they are the same, but for settings that this measurement does not hold.
         """
-        from scissorcal.bench.trade.assemble import measured_curve, reference_of
-        from scissorcal.bench.trade.knob import make_knob
-        from scissorcal.bench.trade.recommend import choices_of, together_sentence
-        from scissorcal.bench.trade.schedule import Schedule
-        from scissorcal.bench.trade.study import PRESENT_TASK, Task, key_of
-        from scissorcal.bench.trade.together import RECOMMENDED, TOGETHER, Together
-
         effort = make_knob("effort")
         reference, against = reference_of(self._case, effort, self._of("effort"))
         choices = choices_of(curves)
@@ -327,16 +310,12 @@ class _Run:
     def result(
         self,
         engine: Engine,
-        curves: "tuple[Curve, ...]",
-        together: "Curve | None",
+        curves: tuple[Curve, ...],
+        together: Curve | None,
         seconds: float,
         workers: int,
-    ) -> "Trade":
+    ) -> Trade:
         """Everything that was found, with the sentences that it ends in."""
-        from scissorcal.bench.trade.assemble import limit_of
-        from scissorcal.bench.trade.point import Quantity, Spread
-        from scissorcal.bench.trade.result import FORMAT, Trade
-
         records = self._records
         sentences = [
             f"{curve.title}: {curve.sentences[0]}"
@@ -377,14 +356,12 @@ class _Run:
         )
 
     def _of(self, name: str) -> list[Record]:
-        from scissorcal.bench.trade.study import records_of
-
         return records_of(self._case, name, self._records)
 
     def _work(
         self,
         pool: Pool,
-        schedule: "Schedule",
+        schedule: Schedule,
         count: int,
         learned: Callable[[], None] = lambda: None,
     ) -> None:
@@ -392,8 +369,6 @@ class _Run:
 
         Within a budget no worker is handed a second one.
         """
-        from scissorcal.bench.trade.study import key_of
-
         jobs = (
             (self._blob, task, self._deadline and self._deadline - schedule.reserve())
             for task in schedule
@@ -426,9 +401,7 @@ class _Run:
             ) from error
 
 
-def _do(job: "tuple[bytes, Task, float | None]") -> Record | None:
-    from scissorcal.bench.trade.study import run_task
-
+def _do(job: tuple[bytes, Task, float | None]) -> Record | None:
     blob, task, end = job
     record = run_task(_unpacked(blob), task, end)
     return record and {**record, "machine": machine()}
@@ -436,9 +409,6 @@ def _do(job: "tuple[bytes, Task, float | None]") -> Record | None:
 
 def _forced(record: Record, names: Sequence[str]) -> bool:
     """Whether a record is of one of the knobs named, or of the settings that they have now."""
-    from scissorcal.bench.trade.knob import PRESENT_ALIKE
-    from scissorcal.bench.trade.study import PRESENT_TASK, key_of
-
     alike = key_of(record) == PRESENT_TASK.key and any(name in PRESENT_ALIKE for name in names)
     return not names or record["knob"] in names or alike
 

@@ -5,10 +5,16 @@ import platform
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from scissorcal.bench.trade.case import Case, Photographed
+from scissorcal.bench.trade.knob import KNOBS, make_knob, scene_knobs
+from scissorcal.bench.trade.models import held_law, nothing_rendered
+from scissorcal.calibration.store import load
+from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError
 from scissorcal.identity import VERSION, digest
+from scissorcal.kernel import Capability
+from scissorcal.recording import Recording
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.envelope import plain
 from scissorcal.workday.photographs import BladeSetup, photo_captures
@@ -16,10 +22,6 @@ from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.runs.cut import edge_of_photographs
 from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.workspace import FitKind
-
-if TYPE_CHECKING:
-    from scissorcal.bench.trade.case import Case, Photographed
-    from scissorcal.recording import Recording
 
 ALGORITHM = 4
 """Raised whenever a measurement of the same inputs would mean something else."""
@@ -33,14 +35,11 @@ ON_A_CLUSTER = (
 )
 
 
-def load_case(engine: Engine, seed: int = 0) -> "Case":
+def load_case(engine: Engine, seed: int = 0) -> Case:
     """What a workspace gives to a benchmark: recipe, used recordings and current fits.
 
     Raises MissingError with the command that must come first.
     """
-    from scissorcal.bench.trade.case import Case
-    from scissorcal.bench.trade.models import held_law, nothing_rendered
-
     kinds: tuple[FitKind, ...] = ("friction", "cut")
     needed = [kind for kind in kinds if engine.needed(f"fit {kind}")]
     if not needed:
@@ -72,15 +71,11 @@ def load_case(engine: Engine, seed: int = 0) -> "Case":
     return with_photographs(case, engine)
 
 
-def wanted_knobs(
-    case: "Case", wanted: Sequence[str], *, on_cluster: bool = False
-) -> tuple[str, ...]:
+def wanted_knobs(case: Case, wanted: Sequence[str], *, on_cluster: bool = False) -> tuple[str, ...]:
     """The knobs to measure, less `LOCAL_KNOBS` on a cluster.
 
     InputError for one that is unknown, that the scene does not have, or that no cluster measures.
     """
-    from scissorcal.bench.trade.knob import KNOBS, make_knob, scene_knobs
-
     for name in wanted:
         if name not in KNOBS:
             raise InputError(f"--knob {name} is no knob; choose from {', '.join(KNOBS)}.")
@@ -94,9 +89,6 @@ def wanted_knobs(
 
 def coverage_notes(engine: Engine) -> list[str]:
     """What trust checks of this workspace found of the intervals' coverage, where there are any."""
-    from scissorcal.calibration.store import load
-    from scissorcal.calibration.verify.result import VerifyResult
-
     found = []
     for name in ("verify friction", "verify cut"):
         if engine.needed(name) and engine.state(name).state in ("done", "failed"):
@@ -124,13 +116,13 @@ def machine() -> str:
     return f"{name}, {os.cpu_count()} cores, {platform.system()}"
 
 
-def inputs_hash(engine: Engine, case: "Case") -> str:
+def inputs_hash(engine: Engine, case: Case) -> str:
     """Identity of all that a measurement depends on, this computer among it.
 
     Recordings, fits and photographs count by their content, wherever their files stand.
     """
 
-    def taken(one: "Photographed") -> object:
+    def taken(one: Photographed) -> object:
         return plain(replace(one, paths=())), [engine.index.digest(path) for path in one.paths]
 
     by_content = {
@@ -156,20 +148,16 @@ def inputs_hash(engine: Engine, case: "Case") -> str:
     )
 
 
-def _virtual(recording: "Recording") -> bool:
-    from scissorcal.kernel import Capability
-
+def _virtual(recording: Recording) -> bool:
     return bool(int(recording.device.get("capabilities", 0)) & Capability.SIMULATOR)
 
 
-def with_photographs(case: "Case", engine: Engine) -> "Case":
+def with_photographs(case: Case, engine: Engine) -> Case:
     """The case with the workspace's photographs of the blade and the plate, and its camera.
 
     Of the plate only the newest capture counts, as in its fit. A camera counts where its fit is
     current. Raises InputError where a capture's index is damaged.
     """
-    from scissorcal.bench.trade.case import Photographed
-
     blades = []
     for capture in photo_captures(engine.workspace, "blade"):
         setup = capture.index.blade or BladeSetup()

@@ -3,38 +3,33 @@
 import json
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from pydantic import TypeAdapter
 
 from scissorcal.aliases import Progress
+from scissorcal.bench.extremes.compare import (
+    compare_kernel,
+    compare_model,
+    compare_package,
+    strokes,
+)
+from scissorcal.bench.extremes.states import package_states
 from scissorcal.files import replacing
 from scissorcal.identity import VERSION
-
-if TYPE_CHECKING:
-    from scissorcal.package import ModelPackage
-    from scissorcal.report.panel import Panel
+from scissorcal.package import ModelPackage
+from scissorcal.report.extremes import extremes_page, extremes_panels
+from scissorcal.report.panel import Panel
 
 FORMAT = "scissorcal-extremes/2"
 
 
 def run_extremes(
-    package: "ModelPackage", folder: Path, *, size: float, seed: int, progress: Progress
-) -> "tuple[list[Panel], tuple[Path, Path]]":
+    package: ModelPackage, folder: Path, *, size: float, seed: int, progress: Progress
+) -> tuple[list[Panel], tuple[Path, Path]]:
     """Try a package and write extremes.html and extremes.json into ``folder``: panels, and paths.
 
     The same package, size and seed try the same states.
     """
-    from pydantic import TypeAdapter
-
-    from scissorcal.bench.extremes.compare import (
-        compare_kernel,
-        compare_model,
-        compare_package,
-        strokes,
-    )
-    from scissorcal.bench.extremes.states import package_states
-    from scissorcal.report.extremes import extremes_page, extremes_panels
-    from scissorcal.report.panel import Panel
-
     manifest, tables = package.manifest, package.tables
     scene = manifest.ranges.opening_rad, manifest.ranges.contact_m[0]
     states, tried = package_states(package, size, seed), []

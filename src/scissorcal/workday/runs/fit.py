@@ -4,19 +4,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import Any, Protocol, cast
 
 from scissorcal.aliases import Progress
+from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
+from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.store import load
 from scissorcal.errors import InputError, MissingError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine, refuse_other_fit
+from scissorcal.workday.history import refuse_unwritable, save_anywhere, scatter_on_record
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.states import WAITING, StepState
 from scissorcal.workday.steps import BY_NAME, Step, steps_of
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.calibration.result import Effort
-    from scissorcal.workday.options import FitOptions
 
 Stop = Callable[[], bool]
 
@@ -30,7 +31,7 @@ class Request:
     allowed is used up, ``critic`` asks for the critic of friction at any effort.
     """
 
-    effort: "Effort"
+    effort: Effort
     seed: int
     inputs_hash: str
     checkpoint: Path
@@ -81,7 +82,7 @@ class FitOutcome:
 def fit_workspace(
     workspace: Workspace,
     wanted: Sequence[str] = (),
-    options: "FitOptions | None" = None,
+    options: FitOptions | None = None,
     *,
     progress: Progress | None = None,
     stop: Stop | None = None,
@@ -131,9 +132,7 @@ def steps_to_fit(engine: Engine, wanted: Sequence[str] = ()) -> list[Step]:
     return [step for step in steps_of("fit") if step.name in names]
 
 
-def for_step(
-    options: "FitOptions | None", step: Step, wanted: Sequence[str]
-) -> "FitOptions | None":
+def for_step(options: FitOptions | None, step: Step, wanted: Sequence[str]) -> FitOptions | None:
     """The options of one fit: it is forced, and its critic asked, only where it is wanted."""
     if options is None:
         return None
@@ -144,15 +143,12 @@ def for_step(
 def fit_step(
     engine: Engine,
     step: Step,
-    options: "FitOptions | None" = None,
+    options: FitOptions | None = None,
     *,
     progress: Progress | None = None,
     stop: Stop | None = None,
 ) -> FitOutcome:
     """Run one fit, or read it back where its identity is the stored one's, unless forced."""
-    from scissorcal.workday.history import refuse_unwritable, save_anywhere
-    from scissorcal.workday.options import FitOptions
-
     options = options or FitOptions()
     chosen: Effort = options.effort or engine.recipe.fit.effort
     identity = engine.identity(step.name, chosen)
@@ -230,10 +226,6 @@ def _on_record(engine: Engine, step: Step, result: Any) -> Any:
 
     The latter is for a fit of one recording.
     """
-    from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
-    from scissorcal.calibration.result import FitResult
-    from scissorcal.workday.history import scatter_on_record
-
     if not isinstance(result, FitResult):
         return result
     known = {**result.diagnostics, STEP_VERSION: step.version}
@@ -292,8 +284,6 @@ def _unasked(result: Any) -> bool:
 
 
 def _load(step: Step, path: Path) -> Any:
-    from scissorcal.calibration.store import load
-
     module, _, name = step.holds.partition(":")
     found = load(path, getattr(import_module(module), name))
     refuse_other_fit(step, path, found.what)

@@ -4,44 +4,40 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from scissorcal.calibration.fit_model import FrictionRun
+from scissorcal.calibration.friction.fit import fit_friction
+from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
+from scissorcal.model.mechanism import AxisLaw
+from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.facts import UNFINISHED
 from scissorcal.workday.recordings import used_recordings
+from scissorcal.workday.runs.fit import Made, Request
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from scissorcal.calibration.result import FitResult
-    from scissorcal.model.mechanism import AxisLaw
-    from scissorcal.recipe.requirements import CaptureKind
-    from scissorcal.workday.engine import Engine
-    from scissorcal.workday.runs.fit import Made, Request
 
 STREAM = 0
 """Which stream of random numbers of a seed is this fit's."""
 
 
-def fit(engine: "Engine", request: "Request") -> "Made":
+def fit(engine: Engine, request: Request) -> Made:
     """Fit friction to the used recordings of empty motion."""
-    from scissorcal.calibration.friction.fit import fit_friction
-
     return fitted(fit_friction, engine.recipe.fit.friction, "friction", STREAM, engine, request)
 
 
 def fitted(
     fit_by: "Callable[..., FitResult]",
     settings: object,
-    kind: "CaptureKind",
+    kind: CaptureKind,
     stream: int,
-    engine: "Engine",
-    request: "Request",
-) -> "Made":
+    engine: Engine,
+    request: Request,
+) -> Made:
     """Fit an axis by its function and settings to the used recordings of a kind."""
-    import numpy as np
-
-    from scissorcal.calibration.fit_model import FrictionRun
-    from scissorcal.workday.runs.fit import Made
-
     request.progress(0.0, f"{kind}: reading recordings")
     result = fit_by(
         used_recordings(engine.workspace, engine.recipe, kind, engine.index),
@@ -60,7 +56,7 @@ def fitted(
     return Made(finished(result, request))
 
 
-def finished(result: "FitResult", request: "Request") -> "FitResult":
+def finished(result: FitResult, request: Request) -> FitResult:
     """The result with the identity of its inputs; marked as unfinished where time ran out."""
     if not (result.rejected and request.stop()):
         return replace(result, inputs_hash=request.inputs_hash)
@@ -72,10 +68,8 @@ def finished(result: "FitResult", request: "Request") -> "FitResult":
     return replace(result, inputs_hash=marked, notes=(*result.notes, note))
 
 
-def axis_of_fit(fit: "FitResult", unit: str) -> "AxisLaw":
+def axis_of_fit(fit: FitResult, unit: str) -> AxisLaw:
     """One axis from its fit of friction, at the medians of the posterior; ``unit`` of inertia."""
-    from scissorcal.model.mechanism import AxisLaw
-
     values = {p.name: p.q50 for p in (*fit.parameters, *fit.nuisance)}
     if not values.get("inertia", 0.0) > 0.0:
         raise MissingError(
@@ -85,9 +79,7 @@ def axis_of_fit(fit: "FitResult", unit: str) -> "AxisLaw":
     return AxisLaw.of_fit(values, angle_centre(fit), 0.0)
 
 
-def angle_centre(fit: "FitResult") -> float:
+def angle_centre(fit: FitResult) -> float:
     """The angle (rad) about which a fit's friction changes along the stroke."""
-    import numpy as np
-
     centre = float(fit.structure.get("angle_center", float("nan")))
     return centre if math.isfinite(centre) else float(np.nanmedian(fit.series.opening))

@@ -3,29 +3,41 @@
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from scissorcal.calibration import load_fit
+from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.store import load
+from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign import read_foreign, reading
 from scissorcal.foreign.formats import REPORT
 from scissorcal.identity import VERSION
+from scissorcal.package.simplest.choice import SceneChoice
 from scissorcal.recipe.load import read_text
 from scissorcal.recipe.plate_layers import plate_pieces
+from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.report import (
+    Cell,
+    Comparison,
+    Geometry,
+    Side,
+    build_report,
+    compare,
+    document_of,
+    document_of_fit,
+    read_twin,
+    write_comparison,
+)
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.runs.fit import available, load_result, pictures_beside
+from scissorcal.workday.runs.simplest import workspace_scene_choice
 from scissorcal.workday.steps import steps_of
 from scissorcal.workday.workspace import RECIPE_FILE, Workspace, find_workspace
 
-if TYPE_CHECKING:
-    from scissorcal.calibration.result import FitResult
-    from scissorcal.calibration.verify.result import VerifyResult
-    from scissorcal.package.simplest.choice import SceneChoice
-    from scissorcal.recipe.requirements import CaptureKind
-    from scissorcal.report import Cell, Comparison, Geometry, Side
-
-RIG: "tuple[CaptureKind, ...]" = ("friction", "friction-advance", "cut")
+RIG: tuple[CaptureKind, ...] = ("friction", "friction-advance", "cut")
 
 
 @dataclass(frozen=True)
@@ -52,8 +64,6 @@ def write_workspace_report(
     nothing that it says has changed, it keeps its time, and with it a signature, which the page
     shows. Raises MissingError where there is no fit, or one is stale.
     """
-    from scissorcal.report import build_report
-
     _refuse_stale(engine)
     fits = _rig_fits(engine)
     geometry = _geometry(engine)
@@ -98,46 +108,37 @@ def _refuse_stale(engine: Engine) -> None:
             raise InputError(f"{state.found}.")
 
 
-def _rig_fits(engine: Engine) -> "dict[str, FitResult]":
+def _rig_fits(engine: Engine) -> dict[str, FitResult]:
     return {what: load_result(engine, what) for what in available(engine, RIG)}
 
 
-def _recordings(engine: Engine, what: "CaptureKind") -> tuple[Any, ...]:
+def _recordings(engine: Engine, what: CaptureKind) -> tuple[Any, ...]:
     return used_recordings(engine.workspace, engine.recipe, what, engine.index)
 
 
-def _cells(engine: Engine, what: "CaptureKind") -> "list[Cell]":
-    from scissorcal.report import Cell
-
+def _cells(engine: Engine, what: CaptureKind) -> list[Cell]:
     return [
         Cell(what, row.name, row.planned, row.recorded, row.used, row.unit, row.motion)
         for row in engine.completeness(what).summary
     ]
 
 
-def _choice(engine: Engine) -> "SceneChoice | None":
+def _choice(engine: Engine) -> SceneChoice | None:
     """What the scene needs of the fits; None where their law makes no tables."""
-    from scissorcal.workday.runs.simplest import workspace_scene_choice
-
     try:
         return workspace_scene_choice(engine)
     except InputError:
         return None  # 'package build' says why; the report is of the fits all the same
 
 
-def _trust_checks(engine: Engine, fits: "dict[str, FitResult]") -> "dict[str, VerifyResult]":
+def _trust_checks(engine: Engine, fits: dict[str, FitResult]) -> dict[str, VerifyResult]:
     """The trust checks of these very fits."""
-    from scissorcal.calibration.store import load
-    from scissorcal.calibration.verify.result import VerifyResult
-
     current = [w for w in fits if engine.state(f"verify {w}").state in ("done", "failed")]
     return {what: load(engine.file(f"verify {what}"), VerifyResult) for what in current}
 
 
-def _geometry(engine: Engine) -> "Geometry":
+def _geometry(engine: Engine) -> Geometry:
     """The fits of photographs that are current; one that is missing is named with its command."""
-    from scissorcal.report import Geometry
-
     kinds = ("camera", "blade", "plate")
     there = available(engine, kinds)
     missing = {}
@@ -163,7 +164,7 @@ def _geometry(engine: Engine) -> "Geometry":
 class Compared:
     """A comparison and its two files."""
 
-    comparison: "Comparison"
+    comparison: Comparison
     html: Path
     json: Path
 
@@ -176,18 +177,14 @@ def compare_runs(
     Each side is a workspace, a report.json, or a fit (.nc). Raises MissingError where there is
     nothing, InputError where a file is none of these or the two cannot be compared.
     """
-    from scissorcal.report import compare, write_comparison
-
     sides = [load_side(path) for path in (first, second)]
     found = compare(*sides, created=now or datetime.now(UTC), version=VERSION)
     files = write_comparison(found, folder)
     return Compared(found, files.html, files.json)
 
 
-def load_side(path: Path) -> "Side":
+def load_side(path: Path) -> Side:
     """Read one side of a comparison from wherever it lies."""
-    from scissorcal.report import Side, read_twin
-
     if path.is_dir():
         if not (path / RECIPE_FILE).is_file():
             raise MissingError(
@@ -218,9 +215,7 @@ def told_path(path: Path) -> str:
     return str(path.relative_to(root.parent)) if path.is_relative_to(root) else path.name
 
 
-def _side_of_workspace(workspace: Workspace, source: str) -> "Side":
-    from scissorcal.report import Side, document_of
-
+def _side_of_workspace(workspace: Workspace, source: str) -> Side:
     engine = Engine.of(workspace)
     fits = [
         load_result(engine, what)
@@ -231,11 +226,8 @@ def _side_of_workspace(workspace: Workspace, source: str) -> "Side":
     return Side(source, document_of(engine.recipe, fits))
 
 
-def _side_of_fit(path: Path) -> "Side":
+def _side_of_fit(path: Path) -> Side:
     """A fit alone: what it is of, its workspace says if it lies in one."""
-    from scissorcal.calibration import load_fit
-    from scissorcal.report import Side, document_of_fit
-
     fit = load_fit(path)
     try:
         recipe = find_workspace(path.parent).recipe()

@@ -6,11 +6,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from scissorcal.aliases import Progress
+from scissorcal.calibration import FitResult
+from scissorcal.calibration.cut import cut_experiment
+from scissorcal.calibration.fit_model import Experiment
+from scissorcal.calibration.friction.advance import actuation_of, sliding_joints
+from scissorcal.calibration.friction.fit import friction_experiment
+from scissorcal.calibration.store import save
+from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
+from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.calibration.verify.simulator import Simulator, cut_simulator, friction_simulator
+from scissorcal.calibration.verify.study import Study, Task, run
 from scissorcal.errors import InputError, MissingError
 from scissorcal.identity import digest
+from scissorcal.recording import Recording
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import VerifySettings
 from scissorcal.workday.pool import Pool, open_pool
@@ -19,15 +30,6 @@ from scissorcal.workday.records import Record, RecordFile
 from scissorcal.workday.runs.cut import edge_of_photographs
 from scissorcal.workday.runs.fit import available, load_result, share_of
 from scissorcal.workday.workspace import FitKind, Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.calibration import FitResult
-    from scissorcal.calibration.fit_model import Experiment
-    from scissorcal.calibration.verify.result import VerifyResult
-    from scissorcal.calibration.verify.simulator import Simulator
-    from scissorcal.calibration.verify.study import Study, Task
-    from scissorcal.recording import Recording
-
 
 ALGORITHM = 6
 """Raised whenever a fit of the same inputs would give other numbers."""
@@ -38,7 +40,7 @@ class VerifyOutcome:
     """The check of one fit, its file, how many fits it took now, and what to say on the side."""
 
     what: FitKind
-    result: "VerifyResult"
+    result: VerifyResult
     path: Path
     fitted: int
     notes: tuple[str, ...]
@@ -63,9 +65,6 @@ def verify_workspace(
     Raises MissingError where a fit is missing or not of what is there now, InputError where the
     cluster cannot be used or another run holds the file.
     """
-    from scissorcal.calibration.store import save
-    from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
-
     chosen = settings or VerifySettings()
     engine = Engine.of(workspace)
     kinds = _kinds(engine, wanted)
@@ -111,14 +110,9 @@ def _kinds(engine: Engine, wanted: Sequence[FitKind]) -> list[FitKind]:
 
 
 def _experiment(
-    engine: Engine, kind: FitKind, fit: "FitResult"
-) -> "tuple[Experiment, Simulator, dict[int, int]]":
+    engine: Engine, kind: FitKind, fit: FitResult
+) -> tuple[Experiment, Simulator, dict[int, int]]:
     """The design of a fit, its simulator, and the sheet that each of its strokes went through."""
-    from scissorcal.calibration.cut import cut_experiment
-    from scissorcal.calibration.friction.advance import actuation_of, sliding_joints
-    from scissorcal.calibration.friction.fit import friction_experiment
-    from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
-
     recipe = engine.recipe
     recordings = used_recordings(engine.workspace, recipe, kind, engine.index)
     if kind == "friction":
@@ -137,7 +131,7 @@ def _experiment(
     return design, simulator, _sheets(recordings)
 
 
-def _sheets(recordings: "Sequence[Recording]") -> dict[int, int]:
+def _sheets(recordings: Sequence[Recording]) -> dict[int, int]:
     """Number the sheets of all recordings, by the stroke labels that a fit gives."""
     found: dict[int, int] = {}
     numbers: dict[tuple[int, int], int] = {}
@@ -153,8 +147,8 @@ def _sheets(recordings: "Sequence[Recording]") -> dict[int, int]:
 
 def _run(
     pool: Pool,
-    study: "Study",
-    tasks: "Sequence[Task]",
+    study: Study,
+    tasks: Sequence[Task],
     file: RecordFile,
     kind: FitKind,
     tell: Progress,
@@ -188,9 +182,7 @@ def _run(
     return finished
 
 
-def _do(job: "tuple[bytes, Task]") -> Record:
-    from scissorcal.calibration.verify.study import run
-
+def _do(job: tuple[bytes, Task]) -> Record:
     blob, task = job
     return run(_unpacked(blob), task)
 

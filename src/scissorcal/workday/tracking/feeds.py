@@ -6,20 +6,19 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.device.capture import servo_config
+from scissorcal.device.link import Link
+from scissorcal.device.motion import Motion
+from scissorcal.device.open_motion import open_motion
+from scissorcal.device.session import RigSession
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.vision.live import Frame, LocatedFrame
+from scissorcal.vision.live import Frame, LocatedFrame, camera_number
 from scissorcal.workday.tracking.sim_world import SimWorld
 from scissorcal.workday.tracking.track_recorder import PoseFinder, RecordedTrack, TrackPicture
-
-if TYPE_CHECKING:
-    from scissorcal.device.link import Link
-    from scissorcal.device.motion import Motion
-    from scissorcal.device.session import RigSession
 
 CLOSE_S = 2.0
 
@@ -143,7 +142,7 @@ def sim_feed(world: SimWorld, eye: PoseFinder) -> Feed:
     return Feed(pictures, time.time_ns())
 
 
-def sim_rig_feed(world: SimWorld, motion: "Motion", eye: PoseFinder | None) -> Feed:
+def sim_rig_feed(world: SimWorld, motion: Motion, eye: PoseFinder | None) -> Feed:
     """A virtual rig in virtual time, and what the camera of the same world sees."""
     return Feed(_sim_rig(world, motion, eye), 0)
 
@@ -152,7 +151,7 @@ def live_feed(
     stack: ExitStack,
     eye: PoseFinder | None,
     frames: Iterator[object] | None,
-    motion: "Motion | None",
+    motion: Motion | None,
 ) -> Feed:
     """A running camera, a rig on a port, or both, in real time. ``stack`` closes the camera."""
     base_ns, begun = time.time_ns(), time.monotonic()
@@ -163,15 +162,12 @@ def live_feed(
     return Feed(_live(camera, eye, motion, begun), base_ns)
 
 
-def idle_rig(session: "RigSession") -> AbstractContextManager["Motion"]:
+def idle_rig(session: RigSession) -> AbstractContextManager[Motion]:
     """Start the servo with the motors off: the rig only tells where it is."""
-    from scissorcal.device.capture import servo_config
-    from scissorcal.device.open_motion import open_motion
-
     return open_motion(session.link, servo_config(session.recipe, session.identity))
 
 
-def refuse_without_sledge(link: "Link") -> None:
+def refuse_without_sledge(link: Link) -> None:
     """DeviceError where the tip's place along the cut is not measured."""
     identity = link.identity
     if identity.advance_min < identity.advance_max:
@@ -192,7 +188,6 @@ def refuse_strange_pairs(camera: str, device: str) -> None:
             f"--camera {camera} and --device {device} do not show the same plate: the simulated "
             "camera goes with the simulated rig. Give both as sim, or one of them as none."
         )
-    from scissorcal.vision.live import camera_number
 
     if device != "none" and camera not in ("none", "sim") and camera_number(camera) is None:
         raise InputError(
@@ -216,7 +211,7 @@ def _recorded(track: RecordedTrack) -> Iterator[Event]:
     yield from pictures
 
 
-def _sim_rig(world: SimWorld, motion: "Motion", eye: PoseFinder | None) -> Iterator[Event]:
+def _sim_rig(world: SimWorld, motion: Motion, eye: PoseFinder | None) -> Iterator[Event]:
     world.begin(motion)
     while True:
         yield motion.step()
@@ -226,7 +221,7 @@ def _sim_rig(world: SimWorld, motion: "Motion", eye: PoseFinder | None) -> Itera
 
 
 def _live(
-    camera: CameraThread | None, eye: PoseFinder | None, motion: "Motion | None", begun: float
+    camera: CameraThread | None, eye: PoseFinder | None, motion: Motion | None, begun: float
 ) -> Iterator[Event]:
     last = time.monotonic()
     while True:
