@@ -13,7 +13,6 @@ from scissorcal.calibration.store import load
 from scissorcal.errors import InputError, MissingError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine, refuse_other_fit
-from scissorcal.workday.history import refuse_unwritable, save_anywhere, scatter_on_record
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.states import WAITING, StepState
 from scissorcal.workday.steps import BY_NAME, Step, steps_of
@@ -149,6 +148,8 @@ def fit_step(
     stop: Stop | None = None,
 ) -> FitOutcome:
     """Run one fit, or read it back where its identity is the stored one's, unless forced."""
+    from scissorcal.workday.history import refuse_unwritable, save_anywhere
+
     options = options or FitOptions()
     chosen: Effort = options.effort or engine.recipe.fit.effort
     identity = engine.identity(step.name, chosen)
@@ -226,6 +227,8 @@ def _on_record(engine: Engine, step: Step, result: Any) -> Any:
 
     The latter is for a fit of one recording.
     """
+    from scissorcal.workday.history import scatter_on_record
+
     if not isinstance(result, FitResult):
         return result
     known = {**result.diagnostics, STEP_VERSION: step.version}

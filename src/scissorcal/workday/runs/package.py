@@ -3,27 +3,22 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from scissorcal.calibration.store import load
 from scissorcal.calibration.verify.result import VerifyResult
-from scissorcal.device.rig_record import identity_of
 from scissorcal.errors import InputError, VerdictError
-from scissorcal.package import Manifest, PackageOptions, build_package, open_package, put_review
-from scissorcal.package.check import check_built
-from scissorcal.package.manifest import RigRecord
-from scissorcal.package.signature import Sign, signed_text
-from scissorcal.package.simplest.choice import SceneChoice
-from scissorcal.recipe.plate_layers import plate_pieces
-from scissorcal.recording.header_reader import read_header
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.runs.sign import standing_review
-from scissorcal.workday.runs.simplest import store_scene_choice, workspace_scene_choice
 from scissorcal.workday.steps import BY_NAME
+
+if TYPE_CHECKING:
+    from scissorcal.package import Manifest
+    from scissorcal.package.manifest import RigRecord
+    from scissorcal.package.signature import Sign
+    from scissorcal.package.simplest.choice import SceneChoice
 
 UNSIGNED = (
     "The package's signature was left out, as it was given with another review: sign it again "
@@ -39,11 +34,11 @@ class Built:
     """
 
     path: Path
-    manifest: Manifest
+    manifest: "Manifest"
     verdicts: tuple[Verdict, ...]
     warnings: tuple[str, ...]
     cached: bool
-    choice: SceneChoice | None = None
+    choice: "SceneChoice | None" = None
 
 
 def build_workspace_package(
@@ -52,7 +47,7 @@ def build_workspace_package(
     seed: int = 0,
     force: bool = False,
     allow_failed: bool = False,
-    sign: Sign | None = None,
+    sign: "Sign | None" = None,
 ) -> Built:
     """Compile the fits of a workspace into package/<recipe>.zip.
 
@@ -63,6 +58,14 @@ def build_workspace_package(
     Raises VerdictError where a fit failed, unless ``allow_failed``, MissingError where a fit is
     missing or stale, and what `scissorcal.package.build_package` raises.
     """
+    import numpy as np
+
+    from scissorcal.package import PackageOptions, build_package, open_package, put_review
+    from scissorcal.package.check import check_built
+    from scissorcal.package.signature import signed_text
+    from scissorcal.recipe.plate_layers import plate_pieces
+    from scissorcal.workday.runs.simplest import store_scene_choice, workspace_scene_choice
+
     if not engine.needed("package build"):
         raise InputError(
             f"{engine.workspace.recipe_path}: a linear joint carries no blades (rig.joint), so "
@@ -129,11 +132,15 @@ def _fits(engine: Engine) -> dict[str, Any]:
     return found
 
 
-def recorded_rig(captures: Path, fits: Mapping[str, Any]) -> RigRecord | None:
+def recorded_rig(captures: Path, fits: Mapping[str, Any]) -> "RigRecord | None":
     """The rig of the recordings: of friction, which is the rig's own, else of the cut.
 
     None where no recording is there that states one.
     """
+    from scissorcal.device.rig_record import identity_of
+    from scissorcal.package.manifest import RigRecord
+    from scissorcal.recording.header_reader import read_header
+
     sources = [name for what in ("friction", "cut") if fits[what] for name in fits[what].sources]
     for source in sources:
         path = captures / Path(source.rpartition(" sha256:")[0]).name

@@ -33,7 +33,6 @@ from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.runs.fit import available, load_result, pictures_beside
-from scissorcal.workday.runs.simplest import workspace_scene_choice
 from scissorcal.workday.steps import steps_of
 from scissorcal.workday.workspace import RECIPE_FILE, Workspace, find_workspace
 
@@ -125,6 +124,8 @@ def _cells(engine: Engine, what: CaptureKind) -> list[Cell]:
 
 def _choice(engine: Engine) -> SceneChoice | None:
     """What the scene needs of the fits; None where their law makes no tables."""
+    from scissorcal.workday.runs.simplest import workspace_scene_choice
+
     try:
         return workspace_scene_choice(engine)
     except InputError:

@@ -3,19 +3,17 @@
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
-
-from pydantic import ValidationError
+from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError, MissingError
 from scissorcal.files import replacing
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import PAGE
-from scissorcal.package import Review, stamp
-from scissorcal.report import sign_page
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.reviewed import reviewed_content
 from scissorcal.workday.runs.fit import available
+
+if TYPE_CHECKING:
+    from scissorcal.package import Review
 
 Decision = Literal["accept", "reject"]
 
@@ -28,7 +26,7 @@ def sign_report(
     *,
     key: Path | None = None,
     passphrase: Callable[[], str] = str,
-) -> Review:
+) -> "Review":
     """Write report/signature.json: who decided what on the report, and all that it rests on.
 
     ``key`` is a private Ed25519 key that signs it, too; ``passphrase`` is asked for where that is
@@ -36,6 +34,11 @@ def sign_report(
     MissingError where there is no report or it is stale, InputError where the name is empty, the
     page was changed or cannot take the signature, the key is none, or a file cannot be written.
     """
+    from pydantic import ValidationError
+
+    from scissorcal.package import Review, stamp
+    from scissorcal.workday.reviewed import reviewed_content
+
     state = engine.state("report")
     if state.state == "missing":
         raise MissingError("There is no report to sign yet: run 'scissorcal report' and read it.")
@@ -67,14 +70,18 @@ def sign_report(
     return review
 
 
-def standing_review(engine: Engine) -> Review | None:
+def standing_review(engine: Engine) -> "Review | None":
     """The signature under the workspace's report, None where there is none or it is void."""
+    from scissorcal.package import Review
+
     found = engine.review()
     return None if found is None else Review.model_validate(found)
 
 
-def _write(path: Path, html: Path, review: Review) -> None:
+def _write(path: Path, html: Path, review: "Review") -> None:
     """Sign the page and write the signature, or leave both as they were."""
+    from scissorcal.report import sign_page
+
     before = read_foreign(html, PAGE)
     try:
         with replacing(path) as part:
