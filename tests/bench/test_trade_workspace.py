@@ -196,7 +196,7 @@ def test_a_budget_says_what_was_left_out(
         return whole(case, ["steps"])[:2]
 
     whole = study.tasks_of
-    monkeypatch.setattr(study, "tasks_of", hardly_any)
+    monkeypatch.setattr(bench, "tasks_of", hardly_any)
     found = run(workspace, budget_s=GUARD_S)
     assert found.trade.curves[0].unmeasured == ("middle", FAILING)
     assert found.trade.budget_s == GUARD_S
@@ -209,7 +209,7 @@ def test_a_knob_that_a_budget_leaves_out_as_a_whole_is_named(
     every = {name: MADE[name] for name in ("steps", "slow")}
     monkeypatch.setattr(knobs, "KNOBS", every)
     whole = study.tasks_of
-    monkeypatch.setattr(study, "tasks_of", lambda case, names: whole(case, ["steps"]))
+    monkeypatch.setattr(bench, "tasks_of", lambda case, names: whole(case, ["steps"]))
     monkeypatch.setattr(Slow, "title", "Slow steps")
     monkeypatch.setattr(bench._Run, "together", lambda *_: None)
     found = run(workspace, budget_s=GUARD_S)

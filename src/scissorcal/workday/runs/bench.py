@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from scissorcal.aliases import Progress
+from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade.assemble import (
     curve_of,
     limit_of,
@@ -21,7 +22,7 @@ from scissorcal.bench.trade.assemble import (
     without_prospect,
 )
 from scissorcal.bench.trade.case import Case
-from scissorcal.bench.trade.knob import KNOBS, PRESENT_ALIKE, make_knob
+from scissorcal.bench.trade.knob import PRESENT_ALIKE, make_knob
 from scissorcal.bench.trade.next_capture import CAPTURES
 from scissorcal.bench.trade.point import Curve, Quantity, Spread
 from scissorcal.bench.trade.recommend import choices_of, together_sentence
@@ -120,7 +121,7 @@ def trade_workspace(
     engine = Engine.of(workspace)
     case = load_case(engine, chosen.seed)
     names = wanted_knobs(case, chosen.knobs, on_cluster=cluster is not None)
-    shown = names if chosen.knobs else tuple(KNOBS)
+    shown = names if chosen.knobs else tuple(knobs.KNOBS)
     deadline = None if chosen.budget_s is None else start + chosen.budget_s - FINISH_S
     inputs = inputs_hash(engine, case)
     with RecordFile(workspace.trade_partial_path, inputs) as file:

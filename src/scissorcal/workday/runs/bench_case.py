@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
+from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade.case import Case, Photographed
-from scissorcal.bench.trade.knob import KNOBS, make_knob, scene_knobs
+from scissorcal.bench.trade.knob import make_knob, scene_knobs
 from scissorcal.bench.trade.models import held_law, nothing_rendered
 from scissorcal.calibration.store import load
 from scissorcal.calibration.verify.result import VerifyResult
@@ -77,8 +78,8 @@ def wanted_knobs(case: Case, wanted: Sequence[str], *, on_cluster: bool = False)
     InputError for one that is unknown, that the scene does not have, or that no cluster measures.
     """
     for name in wanted:
-        if name not in KNOBS:
-            raise InputError(f"--knob {name} is no knob; choose from {', '.join(KNOBS)}.")
+        if name not in knobs.KNOBS:
+            raise InputError(f"--knob {name} is no knob; choose from {', '.join(knobs.KNOBS)}.")
         if why := make_knob(name).missing(case):
             raise InputError(f"--knob {name}: this scene does not have it. {why}")
         if on_cluster and name in LOCAL_KNOBS:
