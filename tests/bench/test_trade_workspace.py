@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import jsonschema
 import pytest
@@ -13,7 +13,7 @@ from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade import study
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.point import Curve, Error, Point, Sample, Setting, Spread
-from scissorcal.bench.trade.result import FORMAT, read_trade
+from scissorcal.bench.trade.result import FORMAT, Trade, read_trade
 from scissorcal.bench.trade.schedule import Schedule
 from scissorcal.bench.trade.study import Task
 from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, TOGETHER, Together
@@ -21,8 +21,9 @@ from scissorcal.bench.trade.torque import WORST
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe.library import schemas_dir
 from scissorcal.report.twin import twin_text
+from scissorcal.workday.options import Processes, TradeOptions
 from scissorcal.workday.runs import bench
-from scissorcal.workday.runs.bench import TradeOutcome, TradeSettings, trade_workspace
+from scissorcal.workday.runs.bench import trade_workspace
 from scissorcal.workday.runs.bench_case import ON_A_CLUSTER
 from scissorcal.workday.workspace import Workspace
 from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, Steps, made_case
@@ -44,8 +45,16 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     return quick_workspace(tmp_path / "paper")
 
 
-def run(workspace: Workspace, **settings: object) -> TradeOutcome:
-    return trade_workspace(workspace, TradeSettings(**settings), workers=1)  # type: ignore[arg-type]
+class Ran(NamedTuple):
+    trade: Trade
+    notes: tuple[str, ...]
+    html: Path
+    json: Path
+
+
+def run(workspace: Workspace, processes: Processes = Processes(1), **options: object) -> Ran:
+    found = trade_workspace(workspace, TradeOptions(**options), processes)  # type: ignore[arg-type]
+    return Ran(*found, workspace.trade_html, workspace.trade_json)
 
 
 def test_a_run_writes_a_page_and_a_twin_that_keeps_its_schema(workspace: Workspace) -> None:
@@ -133,9 +142,9 @@ def test_a_cluster_measures_no_photographs_and_says_why(
     monkeypatch.setattr(knobs, "KNOBS", {"steps": MADE["steps"], "plate": MADE["plate"]})
     monkeypatch.setattr(bench._Run, "together", lambda *_: None)
     whole = bench.open_pool
-    monkeypatch.setattr(bench, "open_pool", lambda workers, cluster: whole(1))
+    monkeypatch.setattr(bench, "open_pool", lambda processes: whole(Processes(1)))
     run(workspace, knobs=("plate",))
-    found = trade_workspace(workspace, TradeSettings(), cluster="tcp://host:1")
+    found = run(workspace, Processes(cluster="tcp://host:1"))
     assert found.trade.measured_now == ALL
     steps, plate = found.trade.curves
     assert len(steps.points) == len(ERRORS) + 1
@@ -144,7 +153,7 @@ def test_a_cluster_measures_no_photographs_and_says_why(
     page = found.html.read_text(encoding="utf-8")
     assert "photographs are read from files of this computer" in page
     with pytest.raises(InputError, match="--knob plate: It is left out with --cluster"):
-        trade_workspace(workspace, TradeSettings(("plate",)), cluster="tcp://host:1")
+        run(workspace, Processes(cluster="tcp://host:1"), knobs=("plate",))
 
 
 def test_an_interrupted_run_goes_on_where_it_was(
@@ -295,7 +304,7 @@ def test_a_knob_that_the_scene_does_not_have_is_refused(
 
 def test_a_workspace_without_fits_says_what_comes_first(tmp_path: Path) -> None:
     with pytest.raises(MissingError, match="There is no fit of friction yet: run 'scissorcal"):
-        trade_workspace(quick_workspace(tmp_path / "paper"), workers=1)
+        run(quick_workspace(tmp_path / "paper"))
 
 
 def test_results_of_another_version_are_refused(workspace: Workspace) -> None:

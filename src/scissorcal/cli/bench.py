@@ -2,7 +2,7 @@
 
 import re
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,8 +13,9 @@ from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import RIG, Folder, Seed, options_of
 from scissorcal.cli.output import Answer, command, note
 from scissorcal.cli.progress import progress
-from scissorcal.cli.verify import CLUSTER, Processes
+from scissorcal.cli.verify import CLUSTER
 from scissorcal.errors import InputError
+from scissorcal.workday.options import Processes, TradeOptions
 
 if TYPE_CHECKING:
     from scissorcal.bench.trade.result import Trade
@@ -88,29 +89,9 @@ _SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 _DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(s|min|h)\s*")
 
 
-@dataclass(frozen=True)
-class TradeOptions:
-    """Which knobs are measured, for how long, and of which day."""
-
-    knob: list[str] | None = None
-    budget: str | None = None
-    recipe: str | None = None
-    force: bool = False
-    seed: int = 0
-
-
 _OPTIONS = {
-    "knob": typer.Option(
+    "knobs": typer.Option(
         "--knob", metavar="NAME", help="A knob to measure; repeat the option. All if not given."
-    ),
-    "budget": typer.Option(
-        metavar="TIME",
-        help='Time for the whole run, such as "3 min" or "90 s"; what does not fit is named.',
-    ),
-    "recipe": typer.Option(
-        help="A built-in recipe in place of a workspace: its day on the virtual rig is made first, "
-        "in the folder bench-NAME (bench-NAME-SEED for a seed above 0), and kept; a budget counts "
-        "from there on."
     ),
     "force": typer.Option(
         "--force",
@@ -121,13 +102,33 @@ _OPTIONS = {
     "workers": typer.Option(min=1, help="Processes to measure in; one for each core if not given."),
     "cluster": CLUSTER,
 }
+Budget = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TIME",
+        help='Time for the whole run, such as "3 min" or "90 s"; what does not fit is named.',
+    ),
+]
+OfRecipe = Annotated[
+    str | None,
+    typer.Option(
+        help="A built-in recipe in place of a workspace: its day on the virtual rig is made first, "
+        "in the folder bench-NAME (bench-NAME-SEED for a seed above 0), and kept; a budget counts "
+        "from there on."
+    ),
+]
 Show = Annotated[bool, typer.Option("--show", help="Print what the last run found; measure none.")]
 
 
 @command
 @options_of(_OPTIONS)
 def trade(
-    options: TradeOptions, processes: Processes, show: Show = False, folder: Folder = None
+    options: TradeOptions,
+    processes: Processes,
+    budget: Budget = None,
+    recipe: OfRecipe = None,
+    show: Show = False,
+    folder: Folder = None,
 ) -> Answer:
     """Measure what accuracy costs, on a workspace's own recordings and scene.
 
@@ -149,10 +150,10 @@ def trade(
       ...
     """
     began = time.time()
-    from scissorcal.workday.runs.bench import TradeSettings, trade_workspace
+    from scissorcal.workday.runs.bench import trade_workspace
 
-    recipe = options.recipe
-    allowed = None if options.budget is None else seconds_of(options.budget)
+    if budget is not None:
+        options = replace(options, budget_s=seconds_of(budget))
     if recipe is not None and folder is not None:
         raise InputError("--recipe makes another workspace: leave out --workspace.")
     if recipe is not None and show:
@@ -164,19 +165,11 @@ def trade(
     else:
         workspace = _day(recipe, options.seed)
         began = time.time()
-    settings = TradeSettings(tuple(options.knob or ()), allowed, options.seed, options.force)
     with progress() as tell:
-        outcome = trade_workspace(
-            workspace,
-            settings,
-            workers=processes.workers,
-            cluster=processes.cluster,
-            progress=tell,
-            began=began,
-        )
-    for sentence in outcome.notes:
+        found, notes = trade_workspace(workspace, options, processes, tell, began)
+    for sentence in notes:
         note(sentence)
-    return _answer(outcome.trade, (outcome.html, outcome.json))
+    return _answer(found, (workspace.trade_html, workspace.trade_json))
 
 
 def seconds_of(words: str) -> float:

@@ -149,12 +149,9 @@ def export(
     """
     from scissorcal.workday.runs.prototype import export_page
 
-    page = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
-    text = (
-        f"{page.path}: {page.bytes / 1e6:.2g} MB; open it in a browser, it needs no server and no "
-        "network"
-    )
-    return Answer({"page": page.path, "bytes": page.bytes}, text, files=[page.path])
+    size = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
+    text = f"{html}: {size / 1e6:.2g} MB; open it in a browser, it needs no server and no network"
+    return Answer({"page": html, "bytes": size}, text, files=[html])
 
 
 def _contents(manifest: "Manifest") -> str:

@@ -119,14 +119,13 @@ def compare(
     from scissorcal.report import panels_text
     from scissorcal.workday.runs.report import compare_runs
 
-    done = compare_runs(first, second, output)
-    found = done.comparison
+    found, files = compare_runs(first, second, output)
     shown = [panel for panel in found.panels if panel.id.endswith("-parameters")]
     for panel in found.panels:
         if panel.id == "verdicts-all":
             changed = tuple(row for row in panel.rows if row.marked)
             shown.append(replace(panel, rows=changed))
-    text = f"{found.sentence}\n\n{panels_text(shown)}\n\n{done.html} and {done.json} show it"
+    text = f"{found.sentence}\n\n{panels_text(shown)}\n\n{files.html} and {files.json} show it"
     result = {
         "first": found.first,
         "second": found.second,
@@ -135,10 +134,10 @@ def compare(
             {"id": panel.id, "title": panel.title, "sentence": panel.sentence, "rows": panel.rows}
             for panel in found.panels
         ],
-        "html": done.html,
-        "json": done.json,
+        "html": files.html,
+        "json": files.json,
     }
-    return Answer(result, text, files=[done.html, done.json])
+    return Answer(result, text, files=[files.html, files.json])
 
 
 @command

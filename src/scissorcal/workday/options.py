@@ -154,6 +154,30 @@ class VerifySettings:
 
 
 @dataclass(frozen=True)
+class Processes:
+    """Where work is done: in ``workers`` processes of this computer, or on a ``cluster``.
+
+    One for each core where nothing is given.
+    """
+
+    workers: int | None = None
+    cluster: str | None = None
+
+
+@dataclass(frozen=True)
+class TradeOptions:
+    """Which knobs are measured, all if none is named; seconds for the whole run, None for no limit.
+
+    ``force`` measures these knobs again; measurements of others are kept.
+    """
+
+    knobs: list[str] | None = None
+    budget_s: float | None = None
+    seed: int = 0
+    force: bool = False
+
+
+@dataclass(frozen=True)
 class PrototypeOptions:
     """What the page of a package shows, and which rig it may start commands on.
 

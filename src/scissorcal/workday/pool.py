@@ -26,6 +26,7 @@ from typing import Any, ParamSpec, TypeVar
 from scissorcal import errors
 from scissorcal.errors import DeviceError, InputError, ScissorcalError, needs_extra
 from scissorcal.foreign import parse_json
+from scissorcal.workday.options import Processes
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -124,18 +125,18 @@ def _why_cluster_failed(error: Exception) -> str:
 
 
 @contextmanager
-def open_pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
+def open_pool(processes: Processes) -> Iterator[Pool]:
     """Open processes of this machine, or the dask.distributed cluster at an address.
 
-    ``workers`` is the number of processes, all cores if not given; one worker is this process
+    One worker is this process
     itself. Processes are started afresh, with one thread of linear algebra each, and end when this
     one does, whatever ends it. Raises InputError where the cluster cannot be reached.
     """
-    if cluster is not None:
-        with _cluster(cluster) as pool:
+    if processes.cluster is not None:
+        with _cluster(processes.cluster) as pool:
             yield pool
         return
-    count = workers or usable_cores()
+    count = processes.workers or usable_cores()
     if count == 1:
         with _left_alone():
             yield Pool(_Here(), 1, ahead=1)

@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from statistics import median
+from typing import NamedTuple
 
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.knob import SAME_FITS, Knob, make_knob, scene_knobs
@@ -124,8 +125,7 @@ def reference_of(case: Case, knob: Knob, records: Sequence[Record]) -> tuple[Sam
     return found.sample, found.against
 
 
-@dataclass(frozen=True)
-class _Reference:
+class _Reference(NamedTuple):
     """What errors are counted against: in words, its label and sample (none where it has neither).
 
     ``gaps`` say of each more accurate setting why it is not the reference; empty without any.

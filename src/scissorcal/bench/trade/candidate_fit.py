@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -19,15 +18,6 @@ from scissorcal.errors import MissingError, ScissorcalError
 from scissorcal.recipe.schema import CaptureCut, CaptureFriction, Recipe
 
 Changes = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Refitted:
-    """Both fits with a candidate in them, and the processor seconds of those that were made."""
-
-    friction: FitResult | None
-    cut: FitResult | None
-    seconds: float
 
 
 def as_fitted(case: Case) -> Recipe:
@@ -70,11 +60,14 @@ def with_scene(recipe: Recipe, **changes: Any) -> Recipe:
     return recipe.model_copy(update={"scene": recipe.scene.model_copy(update=changes)})
 
 
-def refit(case: Case, recipe: Recipe, repeat: int, *, friction_too: bool) -> Refitted:
+def refit(
+    case: Case, recipe: Recipe, repeat: int, *, friction_too: bool
+) -> tuple[FitResult | None, FitResult | None, float]:
     """Fit the cut again by a changed recipe, and friction before it where that changes too.
 
-    At the case's effort; random numbers follow from the case's seed and ``repeat``. Raises what the
-    fits raise, MissingError without the friction that a cut needs.
+    Gives friction, cut and the processor seconds. At the case's effort; random numbers follow from
+    the case's seed and ``repeat``. Raises what the fits raise, MissingError without the friction
+    that a cut needs.
     """
     rng = np.random.default_rng([case.seed, repeat])
     friction, cut = case.friction_fit, case.cut_fit
@@ -92,7 +85,7 @@ def refit(case: Case, recipe: Recipe, repeat: int, *, friction_too: bool) -> Ref
             rng=rng,
             run=CutRun(edge=case.edge, edge_verdicts=case.edge_verdicts),
         )
-    return Refitted(friction, cut, time.process_time() - began)
+    return friction, cut, time.process_time() - began
 
 
 def holdout_rms(fit: FitResult) -> float:

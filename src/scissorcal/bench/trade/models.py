@@ -1,7 +1,5 @@
 """The model of a case: that of its fits, that of a package of them, and their tables."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
@@ -22,15 +20,6 @@ from scissorcal.package.simplest.law import Law
 from scissorcal.package.simplest.model import simplest_model
 from scissorcal.package.smallest_tables import smallest_tables
 from scissorcal.package.table_cost import CostAndError, cost_and_error
-
-
-@dataclass(frozen=True)
-class CompiledCase:
-    """A model, its tables by file name, and the same as the kernel takes them."""
-
-    model: ExactModel
-    compiled: Compiled
-    tables: ModelTables
 
 
 def nothing_rendered(case: Case) -> str:
@@ -105,17 +94,20 @@ def model_of_law(law: Law) -> ExactModel:
     return central_model(law.cut, law.friction)
 
 
-def compiled(case: Case, model: ExactModel | None = None) -> CompiledCase:
-    """Compile a model, by default the one that a package holds, to float32 tables of one tolerance.
+def compiled(case: Case, model: ExactModel) -> Compiled:
+    """Compile a model to float32 tables of one tolerance.
 
     The case's tolerance, or the fixed one: without a search for the smallest tables, so that models
     compare.
     """
-    model = model or central(case)
     tolerance = TOLERANCE if case.table_tolerance is None else case.table_tolerance
-    found = compile_model(model, case.recipe, tolerance=tolerance)
-    tables = kernel_tables(found.mechanics, scene_ranges(case.recipe), found.arrays)
-    return CompiledCase(model, found, tables)
+    return compile_model(model, case.recipe, tolerance=tolerance)
+
+
+def kernel_model(case: Case) -> ModelTables:
+    """The model that a package of a case's fits holds, `compiled`, as the kernel takes it."""
+    found = compiled(case, central(case))
+    return kernel_tables(found.mechanics, scene_ranges(case.recipe), found.arrays)
 
 
 def tables_of(case: Case, model: ExactModel) -> Compiled:

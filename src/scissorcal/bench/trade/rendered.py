@@ -10,6 +10,7 @@ from scissorcal.aliases import Array
 from scissorcal.device.sim.hand import minimum_jerk
 from scissorcal.kernel import Kernel, ModelTables, estimated_rates
 from scissorcal.recipe.schema import Recipe
+from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
 
 SPEEDS = 3
 PEAK_OVER_MEAN = 1.875
@@ -81,21 +82,6 @@ BINS = 25
 """A stroke is averaged over so many parts of its time, which takes the ripple out."""
 
 
-@dataclass(frozen=True)
-class RenderedError:
-    """Rendered minus continuous torque over strokes, in N m.
-
-    ``average`` and ``worst`` are of the mean torque over 25 parts of each movement, which takes the
-    ripple out; ``moments`` is the average at every moment, in which a tooth that starts a little
-    late counts in full. ``largest`` is the largest continuous torque.
-    """
-
-    average: float
-    worst: float
-    moments: float
-    largest: float
-
-
 def continuous_torques(
     tables: ModelTables, strokes: Sequence[Stroke], limit: float
 ) -> tuple[Torques, ...]:
@@ -112,20 +98,22 @@ def rendered_error(
     tables: ModelTables,
     strokes: Sequence[Stroke],
     rate_Hz: float,
-    continuous: Sequence[Torques],
-    *,
     limit: float,
-    cutoff_Hz: float,
     encoder_step: float = 0.0,
     phase: float = 0.0,
-) -> RenderedError:
+) -> dict[str, float]:
     """Errors of a loop that samples ``rate_Hz`` times a second and holds its torque in between.
 
     The kernel steps at that rate, with the rate of opening as the servo estimates it: differences
-    of the encoder's counts (``encoder_step`` in rad, 0 for none) behind a low-pass at
-    ``cutoff_Hz``. The first sample is taken ``phase`` (0 to 1) of a tick after the stroke's begin.
-    The loop's delay is not among the errors: it depends on the line, not on the rate alone.
+    of the encoder's counts (``encoder_step`` in rad, 0 for none) behind its low-pass. The first
+    sample is taken ``phase`` (0 to 1) of a tick after the stroke's begin. The loop's delay is not
+    among the errors: it depends on the line, not on the rate alone.
+
+    In N m: ``average`` and ``worst`` of the mean torque over 25 parts of each movement, which takes
+    the ripple out; ``moments``, the average at every moment, in which a tooth that starts a little
+    late counts in full; ``largest``, the largest continuous torque.
     """
+    continuous = continuous_torques(tables, strokes, limit)
     tick_us = round(1e6 / rate_Hz)
     means, away, total, largest = [], 0.0, 0, 0.0
     for stroke, reference in zip(strokes, continuous, strict=True):
@@ -134,7 +122,7 @@ def rendered_error(
         opening, _ = stroke.at(samples)
         if encoder_step > 0.0:
             opening = encoder_step * np.round(opening / encoder_step)
-        rate = estimated_rates(opening, tick_us, cutoff_Hz)
+        rate = estimated_rates(opening, tick_us, RATE_CUTOFF_HZ)
         torque = _stepped(tables, stroke, opening, rate, limit)
         held = np.searchsorted(samples, _moments(stroke), side="right") - 1
         first = np.where(held >= 0, torque[np.maximum(held, 0)], reference[0])
@@ -143,12 +131,12 @@ def rendered_error(
         largest = max(largest, float(np.abs(reference).max()))
         means += [float(part.mean()) for part in np.array_split(error, 2 * BINS)]
     size = np.abs(means)
-    return RenderedError(
-        average=float(size.mean()),
-        worst=float(size.max()),
-        moments=away / total,
-        largest=largest,
-    )
+    return {
+        "average": float(size.mean()),
+        "worst": float(size.max()),
+        "moments": away / total,
+        "largest": largest,
+    }
 
 
 def _moments(stroke: Stroke) -> Array:

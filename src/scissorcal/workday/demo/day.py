@@ -29,7 +29,7 @@ from scissorcal.workday.demo.photographs import (
     photograph,
 )
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.options import FitOptions, VerifySettings
+from scissorcal.workday.options import FitOptions, Processes, VerifySettings
 from scissorcal.workday.pool import open_pool, usable_cores
 from scissorcal.workday.runs.fit import FitOutcome, fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
@@ -147,7 +147,7 @@ def make_day(
     """
     tell = progress or (lambda done, sentence: None)
     recipe = workspace.recipe()
-    with open_pool(min(2, usable_cores())) as pool:
+    with open_pool(Processes(min(2, usable_cores()))) as pool:
         tell(0.0, "capturing friction and cuts, beside the photographs where a second core is free")
         captured = pool.executor.submit(_capture, workspace.root, seed, capture)
         photograph(workspace, recipe, seed, _part(tell, 0.05, 0.3))

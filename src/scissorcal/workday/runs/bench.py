@@ -4,10 +4,9 @@ import math
 import pickle
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from scissorcal.aliases import Progress
@@ -46,6 +45,7 @@ from scissorcal.identity import VERSION
 from scissorcal.report.trade import trade_page
 from scissorcal.report.twin import twin_text
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.options import Processes, TradeOptions
 from scissorcal.workday.pool import Pool, open_pool
 from scissorcal.workday.records import Record, RecordFile
 from scissorcal.workday.runs.bench_case import (
@@ -70,66 +70,41 @@ STRETCH = 2.0
 """All recommended settings are begun where this many times the time left is expected for them."""
 
 
-@dataclass(frozen=True)
-class TradeSettings:
-    """Which knobs, all if none is named; seconds for the whole run, without limit if None.
-
-    ``force`` measures these knobs again; measurements of others are kept.
-    """
-
-    knobs: tuple[str, ...] = ()
-    budget_s: float | None = None
-    seed: int = 0
-    force: bool = False
-
-
-@dataclass(frozen=True)
-class TradeOutcome:
-    """The result, its files, and what to say on the side."""
-
-    trade: Trade
-    html: Path
-    json: Path
-    notes: tuple[str, ...] = ()
-
-
 def trade_workspace(
     workspace: Workspace,
-    settings: TradeSettings | None = None,
-    *,
-    workers: int | None = None,
-    cluster: str | None = None,
+    chosen: TradeOptions = TradeOptions(),
+    processes: Processes = Processes(),
     progress: Progress | None = None,
     began: float | None = None,
-) -> TradeOutcome:
+) -> tuple[Trade, tuple[str, ...]]:
     """Measure how cost buys accuracy on a workspace's own recordings, scene and fits.
 
     Each measurement is kept in bench/trade.partial.jsonl as soon as it is made, so that a killed
     run goes on where it was and nothing is measured twice on the same inputs and computer, unless
     ``force``; what failed is tried again by the next run. Knobs that read photographs are left out
     on a cluster. ``began`` is the time (of `time.time`) from which the budget counts. The page is
-    written to bench/trade.html, its JSON twin to bench/trade.json.
+    written to bench/trade.html, its JSON twin to bench/trade.json. Gives the result, and sentences
+    to say on the side.
 
     Raises MissingError where a fit that the scene needs is missing or stale, InputError where a
     knob is unknown or not of this scene, the budget is too small for any measurement, the cluster
     cannot be used, or another run holds the file.
     """
     start = time.time() if began is None else began
-    chosen = settings or TradeSettings()
     tell = progress or (lambda done, sentence: None)
     tell(0.0, "reading recordings and fits")
     engine = Engine.of(workspace)
     case = load_case(engine, chosen.seed)
-    names = wanted_knobs(case, chosen.knobs, on_cluster=cluster is not None)
+    names = wanted_knobs(case, chosen.knobs or (), on_cluster=processes.cluster is not None)
     shown = names if chosen.knobs else tuple(knobs.KNOBS)
     deadline = None if chosen.budget_s is None else start + chosen.budget_s - FINISH_S
     inputs = inputs_hash(engine, case)
     with RecordFile(workspace.trade_partial_path, inputs) as file:
         if chosen.force:
-            file.keep([one for one in file.records if not _forced(one, chosen.knobs)])
-        left_out = {} if cluster is None else dict.fromkeys(LOCAL_KNOBS, ON_A_CLUSTER)
+            file.keep([one for one in file.records if not _forced(one, chosen.knobs or ())])
+        left_out = {} if processes.cluster is None else dict.fromkeys(LOCAL_KNOBS, ON_A_CLUSTER)
         run = _Run(case, file, chosen.budget_s, deadline, tell, left_out)
-        with open_pool(workers, cluster) as pool:
+        with open_pool(processes) as pool:
             together = None
             for keep_time in (True, False):  # time that was kept and not needed goes to the knobs
                 if run.measure(pool, names, keep_time=keep_time) or keep_time:
@@ -144,7 +119,7 @@ def trade_workspace(
     ):
         with replacing(path) as part:
             part.write_text(text, encoding="utf-8")
-    return TradeOutcome(trade, workspace.trade_html, workspace.trade_json, notes)
+    return trade, notes
 
 
 class _Run:

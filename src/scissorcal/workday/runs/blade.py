@@ -67,7 +67,7 @@ def fit(engine: Engine, request: Request) -> Made:
     Uses the workspace's camera where there is one.
     """
     captures = photo_captures(engine.workspace, "blade")
-    seen = _all_measured(engine, captures, request.progress)
+    seen = _all_measured(engine, captures, request.run.tell)
     fits = _fits(seen, captures, engine, request)
     openings = tuple(_pair(one) for one in seen if one.scissors is not None)
     sources = tuple(one.photo.source for one in seen)
@@ -164,7 +164,7 @@ def _fits(
     for index, (name, measured) in enumerate(sides.items()):
 
         def part(done: float, sentence: str, index: int = index, name: str = name) -> None:
-            request.progress(0.6 + 0.4 * (index + done) / len(sides), f"{name}: {sentence}")
+            request.run.tell(0.6 + 0.4 * (index + done) / len(sides), f"{name}: {sentence}")
 
         fits.append(
             fit_blade(

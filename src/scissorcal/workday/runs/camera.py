@@ -86,7 +86,7 @@ def fit(engine: Engine, request: Request) -> Made:
         rng=rng,
         priors=priors,
         inputs_hash=request.inputs_hash,
-        progress=request.progress,
+        progress=request.run.tell,
     )
     boards = [seen_board(photo.name, photo.detection, priors) for photo in photos]
     charts = find_spec("matplotlib") is not None

@@ -21,7 +21,7 @@ STREAM = 1
 
 def fit(engine: Engine, request: Request) -> Made:
     """Fit the response, fracture and taper to the used recordings of cuts."""
-    request.progress(0.0, "cut: reading recordings")
+    request.run.tell(0.0, "cut: reading recordings")
     friction: FitResult = load_result(engine, "friction")
     if friction.position_unit != "rad":
         raise InputError(
@@ -35,14 +35,7 @@ def fit(engine: Engine, request: Request) -> Made:
         friction,
         effort=request.effort,
         rng=np.random.default_rng([request.seed, STREAM]),
-        run=CutRun(
-            progress=request.progress,
-            edge=edge,
-            edge_verdicts=verdicts,
-            checkpoint=request.checkpoint,
-            last_chosen=request.last_model or None,
-            stop=request.stop,
-        ),
+        run=CutRun(**vars(request.run), edge=edge, edge_verdicts=verdicts),
     )
     return Made(finished(result, request))
 

@@ -1,7 +1,7 @@
 """What a workspace's friction fit predicts of a motion, with a band, as table and plot."""
 
 import csv
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from scissorcal.calibration.friction.predict import (
     predict_effort,
     predict_far_load,
 )
+from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, needs_extra
 from scissorcal.files import replacing
 from scissorcal.foreign import open_foreign, reading
@@ -36,25 +37,14 @@ PLOTS = (".svg", ".png")
 MOST_POINTS = 4000
 
 
-@dataclass(frozen=True)
-class PredictionOutcome:
-    """A prediction, its band, the law that made it, the effort's unit and what was written."""
-
-    prediction: Prediction
-    band: Band
-    rung: str
-    effort_unit: str
-    position_unit: str
-    files: tuple[Path, ...]
-
-
 def predict_workspace(
     workspace: Workspace, options: PredictOptions, progress: Progress | None = None
-) -> PredictionOutcome:
+) -> tuple[Prediction, Band, FitResult]:
     """Predict the effort of empty motion, or the load at a tool's far end, for one file.
 
-    The band is calibrated on the friction recordings of the workspace. Raises MissingError where
-    the fit is missing or stale, InputError for files that are no motion.
+    Gives the prediction, its band and the fit that made it. The band is calibrated on the friction
+    recordings of the workspace. Raises MissingError where the fit is missing or stale, InputError
+    for files that are no motion.
     """
     tell = progress or (lambda done, sentence: None)
     level, table, plot = options.level, options.table, options.plot
@@ -76,17 +66,12 @@ def predict_workspace(
         band = effort_band(design, fit, level)
         tell(0.8, "prediction: weighing the motion")
         found = predict_effort(fit, band, (given,), settings.cutoff_Hz)
-    files = []
     if table is not None:
         _write_table(found, table, fit.position_unit, fit.effort_unit)
-        files.append(table)
     if plot is not None:
         _write_plot(found, band, plot, fit.effort_unit)
-        files.append(plot)
     tell(1.0, "prediction: done")
-    return PredictionOutcome(
-        found, band, fit.rung, fit.effort_unit, fit.position_unit, tuple(files)
-    )
+    return found, band, fit
 
 
 def read_motion(path: Path, joint: Joint, handle_radius_m: float) -> Recording:

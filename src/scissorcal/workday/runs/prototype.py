@@ -3,7 +3,6 @@
 import asyncio
 import signal
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -43,14 +42,6 @@ TRACK_REQUEST = (
 HAND_POINTS = 1500
 """Of a recorded hand: 30 s at 50 Hz."""
 LONGEST_HAND_s = 60.0
-
-
-@dataclass(frozen=True)
-class Exported:
-    """An offline page: its file and its size."""
-
-    path: Path
-    bytes: int
 
 
 def workspace_scene(
@@ -231,8 +222,8 @@ def serve(server: "PrototypeServer", ready: Callable[[str], None]) -> str:
 
 def export_page(
     workspace: Workspace, path: Path, package_path: Path | None = None, *, overwrite: bool = False
-) -> Exported:
-    """Write the package's page as one file that needs no server and no network.
+) -> int:
+    """Write the package's page as one file that needs no server and no network; gives its bytes.
 
     Raises InputError where the file is there already, unless ``overwrite``, or is not named as a
     page, and what `workspace_scene` raises.
@@ -245,7 +236,7 @@ def export_page(
     data = page_of(scene).encode("utf-8")
     with replacing(path) as part:
         part.write_bytes(data)
-    return Exported(path, len(data))
+    return len(data)
 
 
 def _require_aiohttp() -> None:

@@ -29,6 +29,7 @@ from scissorcal.report import (
     read_twin,
     write_comparison,
 )
+from scissorcal.report.build import ReportFiles
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.recordings import used_recordings
@@ -161,27 +162,17 @@ def _geometry(engine: Engine) -> Geometry:
     )
 
 
-@dataclass(frozen=True)
-class Compared:
-    """A comparison and its two files."""
-
-    comparison: Comparison
-    html: Path
-    json: Path
-
-
 def compare_runs(
     first: Path, second: Path, folder: Path, *, now: datetime | None = None
-) -> Compared:
-    """Write comparison.html and comparison.json into ``folder``.
+) -> tuple[Comparison, ReportFiles]:
+    """Write comparison.html and comparison.json into ``folder``; gives the comparison and both.
 
     Each side is a workspace, a report.json, or a fit (.nc). Raises MissingError where there is
     nothing, InputError where a file is none of these or the two cannot be compared.
     """
     sides = [load_side(path) for path in (first, second)]
     found = compare(*sides, created=now or datetime.now(UTC), version=VERSION)
-    files = write_comparison(found, folder)
-    return Compared(found, files.html, files.json)
+    return found, write_comparison(found, folder)
 
 
 def load_side(path: Path) -> Side:

@@ -23,7 +23,7 @@ from scissorcal.errors import InputError, MissingError
 from scissorcal.identity import digest
 from scissorcal.recording import Recording
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.options import VerifySettings
+from scissorcal.workday.options import Processes, VerifySettings
 from scissorcal.workday.pool import Pool, open_pool
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.records import Record, RecordFile
@@ -49,27 +49,24 @@ class VerifyOutcome:
 def verify_workspace(
     workspace: Workspace,
     wanted: Sequence[FitKind] = (),
-    settings: VerifySettings | None = None,
-    *,
-    workers: int | None = None,
-    cluster: str | None = None,
+    settings: VerifySettings = VerifySettings(),
+    processes: Processes = Processes(),
     progress: Progress | None = None,
 ) -> tuple[VerifyOutcome, ...]:
     """Check the fits of a workspace, those in ``wanted`` or all that there are.
 
     Every single fit is kept in fits/<what>.verify.partial.jsonl as soon as it is done, so that a
     killed run goes on where it was, and one that asks for more fits takes those that are there.
-    Their random numbers depend on seed and index alone: the result is the same for any number of
-    ``workers`` and on a ``cluster``. The whole stands in fits/<what>.verify.json at the end.
+    Their random numbers depend on seed and index alone: the result is the same in all
+    ``processes``. The whole stands in fits/<what>.verify.json at the end.
 
     Raises MissingError where a fit is missing or not of what is there now, InputError where the
     cluster cannot be used or another run holds the file.
     """
-    chosen = settings or VerifySettings()
     engine = Engine.of(workspace)
     kinds = _kinds(engine, wanted)
     outcomes = []
-    with open_pool(workers, cluster) as pool:
+    with open_pool(processes) as pool:
         for index, kind in enumerate(kinds):
             tell = share_of(progress, index, len(kinds))
             tell(0.0, f"{kind}: making ready")
@@ -79,16 +76,18 @@ def verify_workspace(
                 experiment,
                 fit,
                 simulator,
-                settings=StudySettings(seed=chosen.seed, prior=chosen.prior, spread=chosen.spread),
+                settings=StudySettings(
+                    seed=settings.seed, prior=settings.prior, spread=settings.spread
+                ),
                 sheets=sheets,
             )
-            tasks = tasks_of(study, chosen.checks, chosen.fits)
+            tasks = tasks_of(study, settings.checks, settings.fits)
             partial = workspace.verify_partial_path(kind)
-            with RecordFile(partial, _inputs_hash(engine, kind, chosen)) as file:
+            with RecordFile(partial, _inputs_hash(engine, kind, settings)) as file:
                 fitted = _run(pool, study, tasks, file, kind, tell)
                 wanted_tasks = {(task.kind, task.index) for task in tasks}
                 records = [r for r in file.records if (r["kind"], r["index"]) in wanted_tasks]
-                result = assess(study, fit, chosen.checks, records)
+                result = assess(study, fit, settings.checks, records)
                 result = replace(result, fit_content=engine.identity(f"verify {kind}"))
                 path = engine.file(f"verify {kind}")
                 save(result, path)

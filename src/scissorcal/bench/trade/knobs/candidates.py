@@ -133,14 +133,13 @@ class CandidateKnob(ABC):
     def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
         """Fit the candidate, compile it, and evaluate its torque over the scene."""
         recipe = self.recipe(as_fitted(case), setting.value)
-        found = refit(case, recipe, repeat, friction_too=self.fits == "friction")
-        assert found.cut is not None
-        changed = replace(case, recipe=recipe, cut_fit=found.cut, friction_fit=found.friction)
-        anew = [found.cut]
-        if self.fits == "friction" and found.friction is not None:
-            anew.insert(0, found.friction)
-        law = central_law(changed, found.cut, found.friction)
-        sample = candidate_sample(changed, law, found.seconds, fits=anew)
+        again = self.fits == "friction"
+        friction, cut, seconds = refit(case, recipe, repeat, friction_too=again)
+        assert cut is not None
+        changed = replace(case, recipe=recipe, cut_fit=cut, friction_fit=friction)
+        anew = (friction, cut) if again and friction is not None else (cut,)
+        law = central_law(changed, cut, friction)
+        sample = candidate_sample(changed, law, seconds, fits=anew)
         minutes = needed_minutes(case, _friction_speeds(changed), _cut_speeds(changed))
         if minutes is None:
             return replace(sample, notes=(*sample.notes, NO_MINUTES))
@@ -292,11 +291,10 @@ def candidate_sample(
     first of them the one whose hold-out error counts.
     """
     model, points = model_of_law(law), scene_places(case)
-    made = compiled(case, model)
     rng = np.random.default_rng(case.seed)
     costs = {
         PROCESSOR: Quantity(seconds, "s"),
-        **package_costs(case, model, made.compiled, rng),
+        **package_costs(case, model, compiled(case, model), rng),
     }
     holdout = holdout_rms(fits[0]) if fits else math.nan
     torque = model_torque(case, model, points)
