@@ -28,7 +28,7 @@ from scissorcal.package.exact import pick_draws
 from scissorcal.recipe.schema import FitFriction
 from scissorcal.recording.recording import Recording
 
-SETTINGS = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+SETTINGS = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
 SCATTERED = ("inertia", "coulomb_pos", "coulomb_neg", "viscous")
 SEED = 184
 

@@ -132,7 +132,7 @@ def photographed(width: int, strength: float, rng: np.random.Generator, *, known
     data = np.frombuffer(as_jpeg(picture, int(rng.integers(75, 97))), dtype=np.uint8)
     read = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), dtype=np.uint8)
     photo = Photo(read, width, height, 1, (0, 0), 1, "", "rendered.jpg")
-    return Setting(photo, believed(lens, rng) if known else None, shape, px_per_mm)
+    return Setting(photo, assumed_camera(lens, rng) if known else None, shape, px_per_mm)
 
 
 def random_shape(rng: np.random.Generator) -> BladeShape:
@@ -172,7 +172,7 @@ def _any_shape(rng: np.random.Generator) -> BladeShape:
     return replace(shape, nicks=nicks)
 
 
-def believed(lens: Lens, rng: np.random.Generator) -> Camera:
+def assumed_camera(lens: Lens, rng: np.random.Generator) -> Camera:
     """A camera fit: the true camera with errors drawn from its covariance."""
     truth = np.array([lens.focal_px, lens.focal_px, *lens.centre_px, *lens.distortion])
     sd = CAMERA_SD * np.r_[np.full(4, lens.width / 2000.0), np.ones(5)]
@@ -206,7 +206,7 @@ def measured(setting: Setting, effort: Any, rng: np.random.Generator) -> dict[st
     end = time.perf_counter()
     stations = CHECKED * setting.shape.length_m
     truth, angle = true_edge(setting.shape, stations)
-    edges = fit.belief.with_values(fit.draws)
+    edges = fit.edge_posterior.with_values(fit.draws)
     offsets, tapers = edges.offset_at(stations), np.arctan(edges.slope_at(stations))
     miss = offsets.mean(axis=0) - truth
     wrong = tapers.mean(axis=0) - angle

@@ -127,7 +127,7 @@ def _row(seed: int, name: str, fits: list[FitResult], verdicts: list[Any], truth
     return Row(
         seed,
         name,
-        tuple(fit.rung for fit in fits),
+        tuple(fit.candidate for fit in fits),
         tuple((f"{verdict.scope} {verdict.check}", verdict.why) for verdict in failed),
         tuple(estimates),
     )

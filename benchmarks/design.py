@@ -285,9 +285,9 @@ def _expected_of_list(recipe: Recipe, identity: Identity, taken: Taken) -> Band:
     """The band that the recipe's list alone would give, at the parameters of another capture."""
     friction, cut = _states(recipe, taken)
     known = torque_knowledge(recipe, friction, cut)
-    told, _ = listed_captures(recipe, identity, friction, cut)
+    information, _ = listed_captures(recipe, identity, friction, cut)
     alone = replace(known, friction=_emptied(known.friction), cut=_emptied(known.cut))
-    return expected_band(alone.plus(*told))
+    return expected_band(alone.plus(*information))
 
 
 def _emptied(known: Knowledge) -> Knowledge:

@@ -18,7 +18,7 @@ from tests.second_rig import capture_cut, capture_friction, fine, paper, recipe_
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut import teeth
-from scissorcal.calibration.cut.geometry import belief_geometry
+from scissorcal.calibration.cut.geometry import geometry_of_prior
 from scissorcal.calibration.cut.known import CutBasis, KnownFriction
 from scissorcal.calibration.cut.path_motion import find_runs, path_motion, split
 from scissorcal.calibration.cut.path_work import mean_torque
@@ -92,7 +92,7 @@ def virtual_cuts(seed: int) -> tuple[Cut, Cut]:
 
 def signals_of(scouted: Scouted, recipe: Recipe) -> tuple[teeth.PhaseSignal, ...]:
     """Phase and torque along each running stretch, by the fitted parameters."""
-    geometry = belief_geometry(recipe, edge_of(recipe))
+    geometry = geometry_of_prior(recipe, edge_of(recipe))
     values = scouted.values
     response = Response(
         "power", values["response_force"], values["response_exponent"], geometry.reference_m

@@ -107,7 +107,7 @@ def photographed(kind: str, strength: float, rng: np.random.Generator) -> View:
     data = np.frombuffer(as_jpeg(picture, int(rng.integers(75, 97))), dtype=np.uint8)
     read = np.asarray(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
     photo = Photo(read, WIDTH, HEIGHT, 1, (0, 0), 1, "", "rendered.jpg")
-    return View(photo, board, believed(lens, rng), truth, kind)
+    return View(photo, board, assumed_camera(lens, rng), truth, kind)
 
 
 def _thing(board: MarkedBoard, truth: SimPose, rng: np.random.Generator) -> PaintLayer:
@@ -118,7 +118,7 @@ def _thing(board: MarkedBoard, truth: SimPose, rng: np.random.Generator) -> Pain
     return PaintLayer([bar], truth, 0.2, shadow=0.4, shadow_m=shift, shadow_soft_m=0.005)
 
 
-def believed(lens: Lens, rng: np.random.Generator) -> Camera:
+def assumed_camera(lens: Lens, rng: np.random.Generator) -> Camera:
     """A camera fit: the true camera with errors drawn from its covariance."""
     covariance = np.diag(CAMERA_SD**2)
     covariance[0, 1] = covariance[1, 0] = 0.98 * CAMERA_SD[0] * CAMERA_SD[1]

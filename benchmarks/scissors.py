@@ -222,7 +222,7 @@ def judged(pairs: list[Pair], seed: int) -> dict[str, Any]:
     for name, fit in fits.items():
         shape, measured = pair.blades[name], groups[name][0]
         stations = CHECKED * length
-        draws = fit.belief.with_values(fit.draws).offset_at(stations)
+        draws = fit.edge_posterior.with_values(fit.draws).offset_at(stations)
         truth = true_edge(shape, stations, measured.parts.halved)
         miss = draws.mean(axis=0) - truth
         low, high = np.quantile(draws, [0.5 - NOMINAL / 2, 0.5 + NOMINAL / 2], axis=0)

@@ -3,7 +3,8 @@
     python docs/make_api.py --write     # after a change of public docstrings
     python docs/make_api.py --check     # exit code 1 if a page is not up to date
 
-One page per room: every name in the room's ``__all__`` with its signature and its docstring.
+One page per room: every name in ``__all__`` of its contract (``__init__.pyi``) with signature and
+docstring. Names of the contract that are not in it serve other rooms and their tests.
 """
 
 import argparse
@@ -111,7 +112,7 @@ def _room_page(module: ModuleType) -> str:
 
 
 def _public(module: ModuleType) -> Iterator[tuple[str, Any]]:
-    names = getattr(module, "__all__", None) or [
+    names = _documented(module) or [
         name
         for name, thing in vars(module).items()
         if not name.startswith("_") and getattr(thing, "__module__", "") == module.__name__
@@ -119,6 +120,16 @@ def _public(module: ModuleType) -> Iterator[tuple[str, Any]]:
     for name in sorted(names):
         if not name.startswith("__"):
             yield name, getattr(module, name)
+
+
+def _documented(module: ModuleType) -> list[str]:
+    stub = Path(str(module.__file__)).with_suffix(".pyi")
+    if not stub.exists():
+        return list(getattr(module, "__all__", ()))
+    for node in ast.parse(stub.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign):
+            return list(ast.literal_eval(node.value))
+    return []
 
 
 def _class(name: str, thing: type) -> list[str]:

@@ -5,11 +5,10 @@ from hashlib import sha256
 import numpy as np
 import pytest
 
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import RigSession
-from scissorcal.recording.probe import ProbeResult
+from scissorcal.device import LockstepLink, RigSession
+from scissorcal.recording import ProbeResult
+from scissorcal.workday import Workspace
 from scissorcal.workday.runs import probe
-from scissorcal.workday.workspace import Workspace
 from tests.made_once import made_once
 
 SEED = 0

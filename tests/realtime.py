@@ -17,8 +17,7 @@ import pytest
 from _pytest.reports import TestReport
 from _pytest.terminal import TerminalReporter
 
-from scissorcal.device.sim.rig import TICK_S
-from scissorcal.device.sim.server import CATCH_UP_TICKS
+from scissorcal.device import CATCH_UP_TICKS, TICK_S
 from tests.hold_up import HoldUps
 
 MARK = "realtime"

@@ -13,8 +13,8 @@ from typer.core import TyperCommand, TyperGroup
 
 import scissorcal
 from scissorcal.cli.root import scissorcal_command
-from scissorcal.recipe.library import recipe_names
-from scissorcal.workday.steps import STEPS
+from scissorcal.recipe import recipe_names
+from scissorcal.workday import STEPS
 from tests.test_docs import ROOT
 
 PACKAGE = Path(scissorcal.__file__).parent
@@ -33,9 +33,9 @@ INSERTED: dict[str, Sequence[str]] = {
     "name": ("friction.mcap",),
     "path": ("fits/cut.nc",),
     "path.name": ("friction.mcap",),
-    "photographs": ("--image *.jpg", "--image *.jpg --stances stances.csv"),
+    "photographs": ("--image *.jpg", "--image *.jpg --positions positions.csv"),
     "what": ("friction", "cut", "plate"),
-    "words": ("camera", "blade", "plate", "plate --stances FILE"),
+    "words": ("camera", "blade", "plate", "plate --positions FILE"),
     "words or what": RIG_FITS,
 }
 """What each expression within a command line may insert; a new one is to be stated here."""

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from scissorcal.cli.root import run
-from scissorcal.recording import read_telemetry
-from scissorcal.recording.telemetry import CONTROL
+from scissorcal.recording import CONTROL, read_telemetry
 from tests.test_imports import LEAVES, MAY_IMPORT
 
 ROOT = Path(__file__).parents[1]
@@ -165,7 +164,9 @@ def readme_blocks(language: str) -> list[list[str]]:
 def simulated(line: str) -> list[str]:
     """A line of the README as words, with the virtual rig and camera in place of real ones."""
     words = shlex.split(line, comments=True)
-    words = ["sim" if word.startswith("/dev/") or word == "stances.csv" else word for word in words]
+    words = [
+        "sim" if word.startswith("/dev/") or word == "positions.csv" else word for word in words
+    ]
     if "--image" in words:
         at = words.index("--image")
         words[at : at + 2] = ["--camera", "sim"]
@@ -196,7 +197,7 @@ def test_the_make_targets_of_the_readme_exist():
 def test_the_other_blocks_of_the_readme_hold_commands_alone():
     assert len(readme_blocks("sh")) == 5
     blocks = [line for block in readme_blocks("sh")[1:] for line in block]
-    assert sum("capture plate" in line and "--stances" in line for line in blocks) == 1
+    assert sum("capture plate" in line and "--positions" in line for line in blocks) == 1
     assert all(shlex.split(line, comments=True)[0] in ("scissorcal", "cd") for line in blocks)
 
 

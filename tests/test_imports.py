@@ -1,6 +1,7 @@
 """Data flows one way: which room may import which, and what `scissorcal --help` may load."""
 
 import ast
+import importlib
 import json
 import subprocess
 import sys
@@ -103,6 +104,43 @@ def test_every_room_has_a_rule() -> None:
     rooms = {room_of(module_of(path)) for path in MODULES}
     assert rooms <= set(MAY_IMPORT)
     assert [room for room, allowed in MAY_IMPORT.items() if "cli" in allowed] == ["__main__"]
+
+
+NAMED_AS_THEIR_MODULE = {
+    "device": {"capture", "completeness", "open_motion", "probe"},
+    "package": {"scene_torque", "stated_bound", "variations"},
+    "recipe": {"requirements"},
+    "render": {"rig_facts"},
+}
+"""Functions that a room cannot hand out, since a module of the room has the same name."""
+
+PATCHED = {"scissorcal.kernel._kernel", "scissorcal.workday.runs", "scissorcal.workday.demo"}
+PATCHED |= {"scissorcal.workday.tracking", "scissorcal.bench.trade", "scissorcal.bench.extremes"}
+PATCHED |= {"scissorcal.device.sim", "scissorcal.package.simplest"}
+"""Packages whose modules, not names, tests of other rooms take: to replace a part of them."""
+
+
+def test_tests_of_other_rooms_import_only_a_rooms_contract() -> None:
+    """So that a room's files can move: its contract is its ``__init__.pyi``."""
+    tests = Path(__file__).parent
+    wrong = []
+    for path in sorted(tests.rglob("*.py")):
+        own = path.relative_to(tests).parts[0]
+        for line, module, name in imports_of(path.read_text(encoding="utf-8"), "", by_name=False):
+            room = room_of(module)
+            is_deep = module.startswith("scissorcal.") and module.count(".") >= 2
+            if not is_deep or room in (own, "cli") or module in PATCHED:
+                continue
+            if name not in NAMED_AS_THEIR_MODULE.get(room, set()):
+                wrong.append(f"{path}:{line} imports {name} of {module}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_a_contract_names_what_its_room_has() -> None:
+    for stub in sorted(PACKAGE.glob("*/__init__.pyi")):
+        room = importlib.import_module(f"scissorcal.{stub.parent.name}")
+        for name in room.__all__:
+            assert getattr(room, name) is not None, (stub, name)
 
 
 @pytest.mark.parametrize("room", ["calibration", "inference", "package"])

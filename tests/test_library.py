@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import scissorcal
-from scissorcal.calibration.store import save
+from scissorcal.calibration import save
 from scissorcal.errors import InputError, MissingError
 from scissorcal.package import build_package
 from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording, Stroke, write_recording
-from scissorcal.workday.workspace import create_workspace
+from scissorcal.workday import create_workspace
 from tests.package.fits import cut_fit, friction_fit, recipe
 
 FUNCTIONS = ("open_workspace", "open_recording", "open_fit", "open_package")

@@ -10,7 +10,7 @@ import pytest
 
 from scissorcal.calibration import save
 from scissorcal.recording import write_recording
-from scissorcal.workday.workspace import create_workspace
+from scissorcal.workday import create_workspace
 from tests.calibration.results import results
 from tests.recording.made import made_recording
 from tests.workday.made import fitted_copy

@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 import scissorcal
-from scissorcal.calibration.checks import HOLD_OUT, K_HAT
-from scissorcal.calibration.plate.checks import HALVES
+from scissorcal.calibration import HALVES, HOLD_OUT, K_HAT
 from scissorcal.verdicts import Check, Verdict
 
 PACKAGE = Path(scissorcal.__file__).parent

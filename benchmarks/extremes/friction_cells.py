@@ -14,7 +14,7 @@ from scissorcal.recording import Recording
 Damage = Callable[[Recording, np.random.Generator], Recording | tuple[Recording, ...]]
 
 TRUTH = MadeFriction()
-LAW = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+LAW = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
 FAR = 5.0
 """Stated error of an estimate, in its own sds: five parameters leave this in one of 400,000 fits
 whose intervals hold what they promise."""

@@ -13,7 +13,7 @@ from scissorcal.recording import Recording, Stroke
 
 STROKES_A_SHEET = 4
 STEP_M, BEGIN_M = 0.034, -0.018
-"""How far the sledge moves between strokes, and where it begins."""
+"""How far the carriage moves between strokes, and where it begins."""
 
 
 @dataclass(frozen=True)

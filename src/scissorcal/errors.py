@@ -4,6 +4,7 @@ Every message is a whole sentence that names the file or device, the place in it
 """
 
 import errno
+import warnings
 from pathlib import Path
 
 
@@ -130,3 +131,18 @@ def file_error(error: OSError, path: Path, kept: str = "") -> InputError | None:
     named = error.filename2 or error.filename
     shown = named if isinstance(named, str) else path
     return InputError(f"{sentence.format(shown)} {kept}".rstrip())
+
+
+OLD_WORDS_UNTIL = "0.2"
+"""Version that no longer reads the old words of options, recipe keys and files."""
+
+
+class OldWordWarning(FutureWarning):
+    """An old word was read: the sentence names the new one, and the version that needs it."""
+
+
+def warn_of_old_word(old: str, new: str, source: str = "") -> None:
+    """Warn that ``old`` is now called ``new``; ``source`` is the file that has the old word."""
+    where = f"{source}: " if source else ""
+    sentence = f"{where}{old} is now called {new}. Version {OLD_WORDS_UNTIL} reads {new} only."
+    warnings.warn(sentence, OldWordWarning, stacklevel=3)

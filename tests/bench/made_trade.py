@@ -7,7 +7,7 @@ from dataclasses import replace
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.point import Error, Quantity, Sample, Setting
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from tests.guard import GUARD_S
 
 FAILING = "impossible"

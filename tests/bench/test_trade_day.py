@@ -8,12 +8,16 @@ from scissorcal.bench.trade.knob import make_knob, scene_knobs
 from scissorcal.bench.trade.result import Trade
 from scissorcal.bench.trade.study import tasks_of
 from scissorcal.errors import InputError
-from scissorcal.workday.demo.day import make_day
-from scissorcal.workday.engine import Engine
-from scissorcal.workday.options import Processes, TradeOptions
-from scissorcal.workday.runs.bench import trade_workspace
-from scissorcal.workday.runs.bench_case import load_case
-from scissorcal.workday.workspace import Workspace, create_workspace
+from scissorcal.workday import (
+    Engine,
+    Processes,
+    TradeOptions,
+    Workspace,
+    create_workspace,
+    load_case,
+    make_day,
+    trade_workspace,
+)
 
 
 @pytest.fixture(scope="module")

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from scissorcal.bench.trade.case import Case, Photographed
-from scissorcal.calibration.plate.checks import RESIDUALS
+from scissorcal.calibration import RESIDUALS
 from scissorcal.identity import file_digest
-from scissorcal.model import Edge, EdgeBelief
-from scissorcal.vision.geometry.camera import Camera
+from scissorcal.model import Edge, EdgeDistribution
+from scissorcal.vision import Camera
+from scissorcal.workday import inputs_hash
 from scissorcal.workday.runs import bench_case
-from scissorcal.workday.runs.bench_case import inputs_hash
 from tests.bench.trade.cases import case
 from tests.package.fits import recipe
 
 CAMERA = Camera(1000.0, 1000.0, 599.5, 449.5, (0.0,) * 5, 1200, 900, np.eye(9))
 LINE = Edge("line", offset_m=-0.008, taper_rad=0.03, length_m=0.07)
-EDGE = EdgeBelief(LINE, ("offset_m",), np.diag([1e-10]))
+EDGE = EdgeDistribution(LINE, ("offset_m",), np.diag([1e-10]))
 
 
 class Files(SimpleNamespace):

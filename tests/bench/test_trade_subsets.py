@@ -3,8 +3,7 @@
 import numpy as np
 
 from scissorcal.bench.trade.knobs.capture import kept, movements, shortened
-from scissorcal.recording.header import Stroke
-from scissorcal.recording.recording import SAMPLE_DTYPE, UNLOADED_MARK, Recording
+from scissorcal.recording import SAMPLE_DTYPE, UNLOADED_MARK, Recording, Stroke
 
 KINDS = ("closing", "opening", "closing", "opening", "closing", "opening", "excitation")
 SPEEDS = (0.1, 0.1, 0.5, 0.5, 0.1, 0.1, float("nan"))

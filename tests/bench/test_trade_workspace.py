@@ -19,13 +19,10 @@ from scissorcal.bench.trade.study import Task
 from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, TOGETHER, Together
 from scissorcal.bench.trade.torque import WORST
 from scissorcal.errors import InputError, MissingError
-from scissorcal.recipe.library import schemas_dir
-from scissorcal.report.twin import twin_text
-from scissorcal.workday.options import Processes, TradeOptions
+from scissorcal.recipe import schemas_dir
+from scissorcal.report import twin_text
+from scissorcal.workday import ON_A_CLUSTER, Processes, TradeOptions, Workspace, trade_workspace
 from scissorcal.workday.runs import bench
-from scissorcal.workday.runs.bench import trade_workspace
-from scissorcal.workday.runs.bench_case import ON_A_CLUSTER
-from scissorcal.workday.workspace import Workspace
 from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, Steps, made_case
 from tests.guard import GUARD_S
 from tests.workday.made import quick_workspace
@@ -52,7 +49,8 @@ class Ran(NamedTuple):
     json: Path
 
 
-def run(workspace: Workspace, processes: Processes = Processes(1), **options: object) -> Ran:
+def run(workspace: Workspace, cluster: str | None = None, **options: object) -> Ran:
+    processes = Processes(None if cluster else 1, cluster)
     found = trade_workspace(workspace, TradeOptions(**options), processes)  # type: ignore[arg-type]
     return Ran(*found, workspace.trade_html, workspace.trade_json)
 
@@ -144,7 +142,7 @@ def test_a_cluster_measures_no_photographs_and_says_why(
     whole = bench.open_pool
     monkeypatch.setattr(bench, "open_pool", lambda processes: whole(Processes(1)))
     run(workspace, knobs=("plate",))
-    found = run(workspace, Processes(cluster="tcp://host:1"))
+    found = run(workspace, "tcp://host:1")
     assert found.trade.measured_now == ALL
     steps, plate = found.trade.curves
     assert len(steps.points) == len(ERRORS) + 1
@@ -153,7 +151,7 @@ def test_a_cluster_measures_no_photographs_and_says_why(
     page = found.html.read_text(encoding="utf-8")
     assert "photographs are read from files of this computer" in page
     with pytest.raises(InputError, match="--knob plate: It is left out with --cluster"):
-        run(workspace, Processes(cluster="tcp://host:1"), knobs=("plate",))
+        run(workspace, "tcp://host:1", knobs=("plate",))
 
 
 def test_an_interrupted_run_goes_on_where_it_was(

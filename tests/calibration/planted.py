@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.recording.recording import Recording
+from scissorcal.recording import Recording
 
 FRICTION_Nm = 0.016
 SMOOTH = 15

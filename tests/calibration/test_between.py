@@ -14,14 +14,14 @@ from scissorcal.calibration.verify.check import StudySettings, assess, make_stud
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.calibration.verify.simulator import friction_simulator
 from scissorcal.calibration.verify.study import run
-from scissorcal.model.transforms import LOG
-from scissorcal.package.exact import pick_draws
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.model import LOG
+from scissorcal.package import pick_draws
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording
 from tests.calibration.friction.test_fit import emps
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
-SETTINGS = FitFriction(rung="coulomb+viscous", symmetry="symmetric", critic=False)
+SETTINGS = FitFriction(law="coulomb+viscous", symmetry="symmetric", critic=False)
 
 
 def recordings(*truths: Truth) -> tuple[Recording, ...]:
@@ -90,7 +90,7 @@ def test_a_second_recording_of_emps_with_another_inertia_is_found():
     samples["motor_torque"][:60] = real.samples["motor_torque"][:60]
     samples["motor_torque"][-60:] = real.samples["motor_torque"][-60:]
     given = (real, dataclasses.replace(real, samples=samples, source="second.mat"))
-    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+    settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
     single, fit = fitted(given[:1], settings), fitted(given, settings)
     assert fit.diagnostics["between_recordings_z"]["inertia"] > 5
     inertia, before = fit.parameter("inertia"), single.parameter("inertia")
@@ -209,7 +209,7 @@ def test_the_jackknife_on_a_true_law_agrees_with_the_fit():
 
     The inertia rests on the one excitation, which no other stroke repeats.
     """
-    fit = fitted(recordings(Truth()), FitFriction(rung="coulomb+viscous", symmetry="asymmetric"))
+    fit = fitted(recordings(Truth()), FitFriction(law="coulomb+viscous", symmetry="asymmetric"))
     found = fit.diagnostics["jackknife_sd"]
     assert "inertia" not in found
     for name in ("coulomb_pos", "coulomb_neg"):
@@ -217,7 +217,7 @@ def test_the_jackknife_on_a_true_law_agrees_with_the_fit():
 
 
 def test_on_emps_lack_of_fit_repeats_and_the_jackknife_does_not_see_it():
-    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+    settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
     fit = fitted((emps(),), settings)
     for name in ("coulomb_pos", "coulomb_neg"):
         assert fit.parameter(name).sd == pytest.approx(0.20, abs=0.03)

@@ -8,9 +8,8 @@ import pytest
 from scissorcal.calibration import FittedParameter
 from scissorcal.calibration.caveats import COLUMN, FEW_COUNTS, caveats_by_parameter, caveats_of
 from scissorcal.cli.fit_law import parameter_facts, text
-from scissorcal.report.subjects.posterior import parameters_panel
-from scissorcal.workday.runs.fit import FitOutcome
-from scissorcal.workday.states import StepState
+from scissorcal.report import parameters_panel
+from scissorcal.workday import FitOutcome, StepState
 from tests.package.fits import cut_fit, friction_fit, recipe
 
 UNVERIFIED = StepState("fit cut", "unverified", "")

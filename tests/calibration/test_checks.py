@@ -14,12 +14,10 @@ from scissorcal.calibration.fit_model import Outcome
 from scissorcal.calibration.result import StrokeError, worst_stroke
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.cli.fit_law import text
-from scissorcal.inference import Posterior, SearchStatus, infer
-from scissorcal.inference.status import SamplingStatus
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording, Stroke
-from scissorcal.workday.runs.fit import FitOutcome
-from scissorcal.workday.states import StepState
+from scissorcal.inference import Posterior, SamplingStatus, SearchStatus, infer
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording, Stroke
+from scissorcal.workday import FitOutcome, StepState
 from tests.calibration.test_comparison import line
 from tests.calibration.truth import QUICK, Truth, friction_recording, make_recording, sweep
 
@@ -214,7 +212,7 @@ def steady(truth: Truth, rng: np.random.Generator) -> Recording:
 
 def test_a_rejected_fit_is_not_printed_as_a_calibration(tmp_path):
     rng = np.random.default_rng(2)
-    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+    settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
     found = fit_friction((steady(Truth(), rng),), settings, effort="draft", rng=rng)
     assert "strokes" in {verdict.check for verdict in found.rejected}
     state = StepState("fit friction", "failed", "")

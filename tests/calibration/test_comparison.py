@@ -15,8 +15,8 @@ from scissorcal.calibration.fit_candidate import (
 )
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.model.transforms import IDENTITY
-from scissorcal.recording.recording import Joint
+from scissorcal.model import IDENTITY
+from scissorcal.recording import Joint
 
 STROKES, BINS = 12, 40
 

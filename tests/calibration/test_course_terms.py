@@ -5,8 +5,7 @@ import pytest
 
 from scissorcal.calibration.leftover import course_of
 from scissorcal.calibration.signals.filtering import Bins
-from scissorcal.model.course_terms import LIBRARY
-from scissorcal.model.friction_terms import TERMS
+from scissorcal.model import LIBRARY, TERMS
 
 TIME = np.linspace(0.0, 2.0, 20001)
 STEP = TIME[1] - TIME[0]

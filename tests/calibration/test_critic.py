@@ -19,13 +19,13 @@ from scissorcal.calibration.critic import (
 from scissorcal.calibration.fit_candidate import fit_candidate
 from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.model.course_terms import LIBRARY
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.model import LIBRARY
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording
 from tests.calibration.friction.test_fit import emps
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
 SEEDS = range(10)
 MISSING = {
     "rate^2": lambda opening, rate: 5e-4 * rate**2,
@@ -141,7 +141,7 @@ def test_the_critic_is_asked_at_standard_effort_only_unless_it_is_asked_for():
         ("standard", True, False),
         ("draft", False, True),
     ):
-        settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=critic)
+        settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=critic)
         rng = np.random.default_rng(7)
         found = fit_friction(
             (recording,), settings, effort=effort, rng=rng, run=FrictionRun(critic=asked)

@@ -5,13 +5,13 @@ import pytest
 
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.fit_model import FrictionRun
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.recipe import FitFriction
 from scissorcal.verdicts import Verdict
 from tests.calibration.planted import planted
 from tests.second_rig import capture_friction, coarse, fine, recipe_for
 from tests.second_rig.parameters import draw_truth
 
-LAW = FitFriction(rung="stribeck+angle", symmetry="asymmetric")
+LAW = FitFriction(law="stribeck+angle", symmetry="asymmetric")
 NAMES = {
     "drift": "sign*time",
     "ripple": "wave(2 periods)",

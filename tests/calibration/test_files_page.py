@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_friction, save
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.recipe import FitFriction
 from tests.calibration.test_predictive import repeated
 
 ROOT = Path(__file__).parents[2]
@@ -24,7 +24,7 @@ EXPECTED = (
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder: Path = tmp_path_factory.mktemp("workspace")
     rng = np.random.default_rng(1)
-    wanted = FitFriction(rung="coulomb+viscous", critic=False)
+    wanted = FitFriction(law="coulomb+viscous", critic=False)
     found = fit_friction((repeated(rng),), wanted, effort="standard", rng=rng)
     save(found, folder / "fits" / "friction.nc")
     return folder

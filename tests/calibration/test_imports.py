@@ -18,7 +18,7 @@ from scissorcal.calibration import fit_friction, load_fit, save
 from scissorcal.recipe.schema import FitFriction
 from tests.calibration.truth import QUICK, Truth, friction_recording
 recording = friction_recording(Truth(), np.random.default_rng(1), QUICK)
-settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=True)
+settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=True)
 path = Path(sys.argv[1])
 for effort in ("draft", "standard"):
     fit = fit_friction((recording,), settings, effort=effort, rng=np.random.default_rng(2))

@@ -15,8 +15,8 @@ from scissorcal.calibration import (
     save,
 )
 from scissorcal.calibration.assemble import REPLICATES, _rounded
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording, Stroke
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording, Stroke
 from tests.calibration.truth import (
     QUICK,
     RATE_HZ,
@@ -52,7 +52,7 @@ def repeated(rng: np.random.Generator) -> Recording:
 @pytest.fixture(scope="module")
 def fitted() -> FitResult:
     rng = np.random.default_rng(1)
-    wanted = FitFriction(rung="coulomb+viscous", critic=False)
+    wanted = FitFriction(law="coulomb+viscous", critic=False)
     return fit_friction((repeated(rng),), wanted, effort="standard", rng=rng)
 
 
@@ -114,7 +114,7 @@ def test_replicates_have_the_spread_and_autocorrelation_of_the_residuals(
 def test_log_likelihoods_are_those_of_the_draws_beside_them(data: Any, fitted: FitResult) -> None:
     """Evaluated again at every tenth stored draw, stroke by stroke, with the law of the fit."""
     recording = repeated(np.random.default_rng(1))
-    settings = FitFriction(rung="coulomb+viscous", critic=False)
+    settings = FitFriction(law="coulomb+viscous", critic=False)
     design = friction_experiment((recording,), settings, fitted)
     problem = design.candidate(design.observed).problem(design.series)
     found, likelihood = fitted.predictive, data.log_likelihood.torque.values[0]
@@ -131,7 +131,7 @@ def test_log_likelihoods_are_those_of_the_draws_beside_them(data: Any, fitted: F
 
 def test_loo_by_arviz_agrees_with_the_fit_s_own(data: Any, fitted: FitResult) -> None:
     found = arviz.loo(data, pointwise=True)
-    own = next(rung for rung in fitted.rungs if rung["chosen"])
+    own = next(candidate for candidate in fitted.candidates if candidate["chosen"])
     level = float(data.reference.log_likelihood.sum())
     assert found.n_data_points == len(fitted.held_out)
     assert float(found.elpd_loo) + level == pytest.approx(own["loo"], abs=0.5)
@@ -148,15 +148,15 @@ def test_compare_by_arviz_orders_the_candidates_as_the_fit_does(
     }
     assert len(candidates) > 1
     found = arviz.compare(candidates, ic="loo")
-    ordered = sorted(fitted.rungs, key=lambda rung: -rung["loo"])
-    assert list(found.index) == [rung["name"] for rung in ordered]
-    gaps = [ordered[0]["loo"] - rung["loo"] for rung in ordered]
+    ordered = sorted(fitted.candidates, key=lambda candidate: -candidate["loo"])
+    assert list(found.index) == [candidate["name"] for candidate in ordered]
+    gaps = [ordered[0]["loo"] - candidate["loo"] for candidate in ordered]
     np.testing.assert_allclose(found["elpd_diff"], gaps, atol=1.0)
 
 
 def test_draft_effort_has_replicates_and_no_log_likelihood(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
-    wanted = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+    wanted = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
     recording = friction_recording(Truth(), rng, QUICK)
     save(fit_friction((recording,), wanted, effort="draft", rng=rng), tmp_path / "friction.nc")
     found = load_fit(tmp_path / "friction.nc").predictive

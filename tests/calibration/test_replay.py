@@ -5,11 +5,11 @@ import pytest
 
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.replay import compare_with_replay, replay_from_stroke
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.recipe import FitFriction
 from tests.calibration.test_checks import fitted, motion
 from tests.calibration.truth import Truth, friction_recording
 
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
 
 
 @pytest.fixture(scope="module")

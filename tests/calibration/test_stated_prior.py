@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.parameters import Layout, Parameter, StatedPrior
-from scissorcal.model.transforms import LOG
+from scissorcal.model import LOG
 
 NAMES = ("response_force", "response_exponent", "noise_scale", "kappa")
 LAYOUT = Layout(tuple(Parameter(n, "1", LOG, 0.0, 2.0, "") for n in NAMES))

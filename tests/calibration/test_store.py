@@ -21,7 +21,7 @@ from scissorcal.calibration.store import EARLIER
 from scissorcal.calibration.verify.result import FORMAT, VerifyResult
 from scissorcal.errors import InputError
 from scissorcal.verdicts import Verdict
-from scissorcal.vision.geometry.pose import Pose
+from scissorcal.vision import Pose
 from tests.calibration.results import difference, results
 
 RESULTS = results()
@@ -84,7 +84,7 @@ def test_h5py_alone_reads_a_file(tmp_path: Path) -> None:
         np.testing.assert_array_equal(file["observed_data/torque"][:], fit.series.measured)
         assert file["posterior_predictive/torque"].shape == (1, 4, len(fit.series.measured))
         facts = json.loads(file.attrs["scissorcal"])
-        assert facts["rung"] == fit.rung
+        assert facts["candidate"] == fit.candidate
         assert facts["draws"]["variables"][0] == "/posterior/" + fit.parameters[0].name
         assert json.loads(file.attrs["header"])["inputs_hash"] == fit.inputs_hash
 
@@ -190,7 +190,7 @@ def checked() -> VerifyResult:
         format=FORMAT,
         what="cut",
         fit_hash="abc",
-        rung="power",
+        candidate="power",
         effort="draft",
         seed=1,
         calibration=None,

@@ -22,9 +22,7 @@ from scissorcal.calibration.summary import (
     summarise,
 )
 from scissorcal.errors import InputError
-from scissorcal.recording import Joint, Recording
-from scissorcal.recording.layout import empty_samples
-from scissorcal.recording.strokes import label_strokes
+from scissorcal.recording import Joint, Recording, empty_samples, label_strokes
 
 LOW, HIGH = 0.2, 1.0
 RATE_HZ = 250.0

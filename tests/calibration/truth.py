@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording, Stroke
+from scissorcal.recording import SAMPLE_DTYPE, Recording, Stroke
 
 RATE_HZ = 1000
 

@@ -16,15 +16,10 @@ import typer
 from scissorcal.cli.lazy import LazyGroup
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.root import run
-from scissorcal.recipe.library import builtin_recipe, schemas_dir
-from scissorcal.recipe.schema import Recipe
-from scissorcal.vision.sim.sim_camera import (
-    SIM_LENS,
-    render_card_photographs,
-    render_plate_photographs,
-)
+from scissorcal.recipe import Recipe, builtin_recipe, schemas_dir
+from scissorcal.vision import SIM_LENS, render_card_photographs, render_plate_photographs
+from scissorcal.workday import Workspace
 from scissorcal.workday.tracking import sim_world
-from scissorcal.workday.workspace import Workspace
 from tests.made_once import copied
 from tests.probed_once import probed_once as probed_once
 from tests.workday.made import fitted_copy
@@ -104,7 +99,7 @@ def calibrated_once(album: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
         for words in (
             ("init", folder, "--recipe", "paper-80gsm"),
             ("import", album / "camera.yml"),
-            ("capture", "plate", "-i", *cards, "--stances", album / "stances.csv"),
+            ("capture", "plate", "-i", *cards, "--positions", album / "positions.csv"),
         ):
             with pytest.raises(SystemExit) as ended:
                 run([str(word) for word in words])
@@ -141,12 +136,14 @@ def recipe() -> Recipe:
 
 @pytest.fixture(scope="session")
 def album(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Three photographs of a plate, nine of the card with stances.csv, and camera.yml."""
+    """Three photographs of a plate, nine of the card with positions.csv, and camera.yml."""
     folder = tmp_path_factory.mktemp("plates")
     render_plate_photographs(recipe, folder, 0, count=3)
-    stances = render_card_photographs(recipe, folder, 0)
-    rows = [f"{path.name},{advance:g},{opening:g}" for path, (advance, opening) in stances.items()]
-    (folder / "stances.csv").write_text("\n".join(["file,advance_mm,opening_deg", *rows]) + "\n")
+    positions = render_card_photographs(recipe, folder, 0)
+    rows = [
+        f"{path.name},{advance:g},{opening:g}" for path, (advance, opening) in positions.items()
+    ]
+    (folder / "positions.csv").write_text("\n".join(["file,advance_mm,opening_deg", *rows]) + "\n")
     lens = SIM_LENS
     store = cv2.FileStorage(str(folder / "camera.yml"), cv2.FILE_STORAGE_WRITE)
     store.write("image_width", lens.width)

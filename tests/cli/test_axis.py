@@ -1,4 +1,4 @@
-"""``--axis advance``: capture, fit and trust check of the sledge, and what does not go with it."""
+"""``--axis advance``: capture, fit and trust check of the carriage, and what is refused."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ repeats = 1
 excitation_s = 3.0
 
 [fit.friction_advance]
-rung = "coulomb+viscous"
+law = "coulomb+viscous"
 symmetry = "symmetric"
 """
 
@@ -25,7 +25,7 @@ def quick(workspace: Path) -> Path:
     return workspace
 
 
-def test_a_sledge_is_captured_fitted_and_reported(quick: Path, cli: Cli) -> None:
+def test_a_carriage_is_captured_fitted_and_reported(quick: Path, cli: Cli) -> None:
     said = cli("capture", "friction", "--axis", "advance", "--device", "sim", "--json")
     assert said.code == 0, said.err
     result = said.envelope["result"]
@@ -66,7 +66,7 @@ def test_a_sledge_is_captured_fitted_and_reported(quick: Path, cli: Cli) -> None
         (("verify",), "--axis advance is of friction"),
     ],
 )
-def test_what_does_not_go_with_the_sledge_is_refused(
+def test_what_does_not_go_with_the_carriage_is_refused(
     words: tuple[str, ...], said: str, quick: Path, cli: Cli
 ) -> None:
     found = cli(*words, "--axis", "advance")

@@ -7,9 +7,9 @@ import pytest
 from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade import study
 from scissorcal.cli import bench as bench_command
+from scissorcal.workday import Workspace
 from scissorcal.workday.demo import day
 from scissorcal.workday.runs import bench
-from scissorcal.workday.workspace import Workspace
 from tests.bench.made_trade import MADE, made_case
 from tests.cli.conftest import Cli
 

@@ -9,8 +9,7 @@ import jsonschema
 import pytest
 
 from scissorcal.bench.extremes import compare
-from scissorcal.workday.schemas import generate
-from scissorcal.workday.workspace import Workspace
+from scissorcal.workday import Workspace, generate
 
 from .conftest import Cli
 

@@ -10,8 +10,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scissorcal.vision.sim import Lens, Looks, SimPose, as_jpeg, render, target_layers
-from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD
+from scissorcal.vision import (
+    BLADE_MAT,
+    CAMERA_BOARD,
+    Lens,
+    Looks,
+    SimPose,
+    as_jpeg,
+    render,
+    target_layers,
+)
 from tests.cli.conftest import Cli
 
 EYE = Lens(620.0, (324.0, 236.0), 640, 480, (-0.1, 0.02, 0.0, 0.0, 0.0))

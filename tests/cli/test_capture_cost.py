@@ -6,15 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.device.advance_trajectory import advance_plan
-from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.trajectory import Plan, friction_plan
+from scissorcal.device import Plan, advance_plan, cut_plan, friction_plan
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.load import parse_recipe
-from scissorcal.recipe.pace import CaptureKind, capture_cost, refuse_long
-from scissorcal.recipe.schema import Recipe
-from scissorcal.workday.stock import nominal_identity
+from scissorcal.recipe import (
+    CaptureKind,
+    Recipe,
+    builtin_recipe,
+    capture_cost,
+    parse_recipe,
+    refuse_long,
+)
+from scissorcal.workday import nominal_identity
 
 from .conftest import Cli
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from scissorcal.package import open_package
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe import schemas_dir
 from scissorcal.recording import write_recording
-from scissorcal.workday.workspace import Workspace
+from scissorcal.workday import Workspace
 from tests.calibration.truth import Stroke, Truth, make_recording
 from tests.report.pages import panel_of, read_page, values_of
 from tests.workday.made import quick_workspace, record_cut, record_friction

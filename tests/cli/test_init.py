@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.recipe.library import recipe_names, recipe_path
+from scissorcal.recipe import recipe_names, recipe_path
 
 from .conftest import Cli
 

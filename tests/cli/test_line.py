@@ -5,8 +5,8 @@ from unittest.mock import patch
 import pytest
 
 from scissorcal.kernel import ConfigKey
-from scissorcal.recipe.schema import Line
-from scissorcal.workday.rigs import line_of, open_rig
+from scissorcal.recipe import Line
+from scissorcal.workday import line_of, open_rig
 from tests.device.in_step import in_step, patient
 from tests.device.recipes import changed
 

@@ -9,10 +9,10 @@ import pytest
 
 from scissorcal.cli.fit_plate import facts, text
 from scissorcal.cli.track import track_line
-from scissorcal.recipe.euler_angles import EulerAngles
-from scissorcal.report.subjects.plate_pose import plate_panels
-from scissorcal.vision.geometry.pose import Pose
-from scissorcal.workday.envelope import plain
+from scissorcal.recipe import EulerAngles
+from scissorcal.report import plate_panels
+from scissorcal.vision import Pose
+from scissorcal.workday import plain
 from tests.report.geometry_fits import plate_fit
 
 SD = np.diag([1e-3] * 3 + [1e-4] * 3) ** 2

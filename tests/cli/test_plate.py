@@ -6,12 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from scissorcal.recipe.schema import Recipe
-from scissorcal.vision.geometry.pose import Pose, difference
-from scissorcal.vision.sim import SimPose
-from scissorcal.vision.sim.sim_camera import (
-    sim_plate_scene,
-)
+from scissorcal.recipe import Recipe
+from scissorcal.vision import Pose, SimPose, difference, sim_plate_scene
 from tests.cli.conftest import Cli
 
 
@@ -62,7 +58,7 @@ def test_a_plate_is_captured_fitted_and_known_in_the_rigs_frame(
     assert "quaternion, camera: w 0." in printed
     assert "yaw, pitch, roll: intrinsic z-y'-x''" in printed
 
-    said = cli("capture", "plate", "-i", *cards(album), "--stances", album / "stances.csv")
+    said = cli("capture", "plate", "-i", *cards(album), "--positions", album / "positions.csv")
     assert said.code == 0
     assert "9 photographs of the rig markers" in said.out
     envelope = cli("fit", "plate", "--json").envelope
@@ -78,14 +74,14 @@ def test_a_plate_is_captured_fitted_and_known_in_the_rigs_frame(
 def test_nothing_is_kept_of_what_is_wrong(
     cli: Cli, workspace: Path, album: Path, tmp_path: Path
 ) -> None:
-    said = cli("capture", "plate", "-i", cards(album)[0], "-i", album / "stances.csv", "--json")
+    said = cli("capture", "plate", "-i", cards(album)[0], "-i", album / "positions.csv", "--json")
     assert said.code == 0, "the card's photographs show the plate's target too"
     empty = tmp_path / "nothing.jpg"
     cv2.imwrite(str(empty), np.full((600, 800, 3), 120, np.uint8))
     before = captured(workspace)
     for words in (
         ["-i", empty],
-        ["-i", album / "stances.csv"],
+        ["-i", album / "positions.csv"],
         ["-i", tmp_path / "no-such.jpg"],
         ["-i", cards(album)[0]],
     ):
@@ -95,21 +91,21 @@ def test_nothing_is_kept_of_what_is_wrong(
         assert captured(workspace) == before
 
 
-def test_stances_are_checked_line_by_line(
+def test_positions_are_checked_line_by_line(
     cli: Cli, workspace: Path, album: Path, tmp_path: Path
 ) -> None:
-    table = tmp_path / "stances.csv"
+    table = tmp_path / "positions.csv"
     for text, words in (
         ("file,advance_mm\nrig-01.jpg,3\n", "needs a first line"),
         ("file,advance_mm,opening_deg\nrig-01.jpg,3,wide\n", "line 2"),
-        ("file,advance_mm,opening_deg\nother.jpg,3,20\n", "has no stance: add a line"),
+        ("file,advance_mm,opening_deg\nother.jpg,3,20\n", "has no position: add a line"),
     ):
         table.write_text(text)
-        said = cli("capture", "plate", "-i", cards(album)[0], "--stances", table)
+        said = cli("capture", "plate", "-i", cards(album)[0], "--positions", table)
         assert said.code == 2
         assert words in said.err
     assert captured(workspace) == []
-    said = cli("capture", "plate", "-i", cards(album)[0], "--stances", tmp_path / "none.csv")
+    said = cli("capture", "plate", "-i", cards(album)[0], "--positions", tmp_path / "none.csv")
     assert said.code == 2
     assert "none.csv does not exist" in said.err
 
@@ -118,10 +114,10 @@ def test_a_rig_that_stood_still_is_refused(cli: Cli, workspace: Path, album: Pat
     cli("import", album / "camera.yml")
     assert cli("capture", "plate", "-i", *plates(album)).code == 0
     one = cards(album)[0]
-    assert cli("capture", "plate", "-i", one, "--stances", album / "stances.csv").code == 0
+    assert cli("capture", "plate", "-i", one, "--positions", album / "positions.csv").code == 0
     said = cli("fit", "plate", "--json")
     assert said.code == 3
-    assert "the rig has the same stance in all pictures" in said.envelope["result"]["error"]
+    assert "the rig has the same position in all pictures" in said.envelope["result"]["error"]
     assert not (workspace / "fits" / "plate.nc").exists()
 
 
@@ -173,15 +169,15 @@ def test_no_such_camera_or_video(
     said = cli(*words, "--camera", "gone.mp4")
     assert said.code == 2
     assert "gone.mp4 does not exist" in said.err
-    said = cli(*words, "--camera", album / "stances.csv")
+    said = cli(*words, "--camera", album / "positions.csv")
     assert said.code == 2
-    assert "stances.csv is text, not a video" in said.err
+    assert "positions.csv is text, not a video" in said.err
     assert captured(workspace) == []
 
 
 def test_contradictions_are_refused(cli: Cli, workspace: Path, album: Path) -> None:
     assert cli("capture", "plate").code == 2
     assert cli("capture", "plate", "-i", "a.jpg", "--camera", "0").code == 2
-    said = cli("capture", "plate", "--camera", "0", "--stances", album / "stances.csv")
+    said = cli("capture", "plate", "--camera", "0", "--positions", album / "positions.csv")
     assert said.code == 2
-    assert "The rig's stances are not known" in said.err
+    assert "The rig's positions are not known" in said.err

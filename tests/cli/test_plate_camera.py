@@ -6,14 +6,17 @@ from pathlib import Path
 import pytest
 
 from scissorcal.errors import DeviceError
-from scissorcal.recording import read_recording, read_telemetry
-from scissorcal.recording.telemetry import FRAME, PICTURE, POSE
-from scissorcal.vision.live import Frame
-from scissorcal.workday.options import SIM_RIG, CaptureOptions, FitOptions
-from scissorcal.workday.runs.capture import capture_into
-from scissorcal.workday.runs.fit import fit_workspace
-from scissorcal.workday.tracking.sim_world import SimWorld
-from scissorcal.workday.workspace import Workspace
+from scissorcal.recording import FRAME, PICTURE, POSE, read_recording, read_telemetry
+from scissorcal.vision import Frame
+from scissorcal.workday import (
+    SIM_RIG,
+    CaptureOptions,
+    FitOptions,
+    SimWorld,
+    Workspace,
+    capture_into,
+    fit_workspace,
+)
 from tests.cli.conftest import Cli
 from tests.package.fits import recipe as known_recipe
 from tests.render.conftest import on_estimated_plate, package_for
@@ -127,7 +130,7 @@ def test_without_the_rigs_frame_it_says_what_to_photograph(
     cli("import", album / "camera.yml")
     said = cli("render", *SIM, "--package", packages["both"])
     assert said.code == 5
-    assert "'scissorcal capture plate --camera sim --stances sim'" in said.err
+    assert "'scissorcal capture plate --camera sim --positions sim'" in said.err
     assert "known" in said.err
     assert recordings(workspace) == []
 

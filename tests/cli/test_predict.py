@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from scissorcal.recording import export_table, read_recording
-from scissorcal.workday.workspace import Workspace
+from scissorcal.workday import Workspace
 from tests.workday.made import fitted_copy, quick_workspace, record_friction
 
 from .conftest import Cli

@@ -20,12 +20,10 @@ from typing import Any
 import aiohttp
 import pytest
 
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.sim.process import SimProcess
+from scissorcal.device import LockstepLink, SimProcess
 from scissorcal.recording import RecordingFacts, RecordingWriter, Stroke, read_recording
-from scissorcal.render.engine import REQUEST
-from scissorcal.workday.runs.prototype import workspace_hands
-from scissorcal.workday.workspace import Workspace
+from scissorcal.render import REQUEST
+from scissorcal.workday import Workspace, workspace_hands
 from tests.guard import GUARD_S
 from tests.prototype.made import ask, heard, samples_of
 from tests.strange_device import StrangeDevice

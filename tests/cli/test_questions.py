@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 
 from scissorcal.cli import questions
-from scissorcal.prototype.rig_commands import ENVIRONMENT, QUESTION
+from scissorcal.prototype import ENVIRONMENT, QUESTION
 from tests.guard import GUARD_S
 
 PROGRAM = (

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe import builtin_recipe, parse_recipe
 
 from .conftest import Cli
 

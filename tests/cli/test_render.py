@@ -7,11 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.package import PackageOptions, build_package
-from scissorcal.package.manifest import RigRecord
+from scissorcal.package import PackageOptions, RigRecord, build_package
 from scissorcal.recording import read_recording
-from scissorcal.workday.runs.package import recorded_rig
-from scissorcal.workday.workspace import Workspace
+from scissorcal.workday import Workspace, recorded_rig
 from tests.cli.conftest import Cli
 from tests.package.fits import cut_fit, friction_fit, recipe
 

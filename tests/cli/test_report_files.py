@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.foreign.formats import REPORT
-from scissorcal.workday.workspace import Workspace
+from scissorcal.foreign import REPORT
+from scissorcal.workday import Workspace
 
 from .conftest import Cli
 from .test_signatures import SIGN, day, signed_day

@@ -8,12 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.diagnosis import diagnose
-from scissorcal.device.doctor import Examination
-from scissorcal.device.link import PortLink
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.sim.faults import Faults
-from scissorcal.device.sim.process import SimProcess
+from scissorcal.device import Examination, Faults, LockstepLink, PortLink, SimProcess, diagnose
 from tests.device.in_step import in_step, patient
 from tests.device.test_doctor import SOUND
 

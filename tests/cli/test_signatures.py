@@ -11,10 +11,8 @@ from pathlib import Path
 import pytest
 
 from scissorcal.cli.root import run
-from scissorcal.package import open_package
-from scissorcal.package.archive import MANIFEST_FILE
-from scissorcal.package.review import stated_digest
-from scissorcal.workday.workspace import Workspace
+from scissorcal.package import MANIFEST_FILE, open_package, stated_digest
+from scissorcal.workday import Workspace
 from tests.workday.made import fitted_copy, record_cut
 
 from .conftest import Cli

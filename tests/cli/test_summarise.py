@@ -123,7 +123,7 @@ def test_options_that_cannot_be_are_refused(
     assert log.read_bytes() == before
 
 
-def test_a_force_on_a_sledge_is_no_torque(here: Path, cli: Cli) -> None:
+def test_a_force_on_a_carriage_is_no_torque(here: Path, cli: Cli) -> None:
     logged(here / "a.csv", 1.0, 1)
     words = ("--joint", "linear", "-u", "opening=mm")
     found = cli("summarise", "a.csv", *COLUMNS, *words, "--json").envelope["result"]

@@ -12,15 +12,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scissorcal.calibration.plate.track_lines import TrackHead, TrackPose, TrackRow
-from scissorcal.device.sim.process import SimProcess
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import read_recording, read_telemetry
-from scissorcal.recording.telemetry import FRAME, PICTURE, POSE
-from scissorcal.vision.geometry.pose import Pose, difference
-from scissorcal.vision.live import Frame
-from scissorcal.vision.sim import SimPose, chained
-from scissorcal.vision.sim.sim_camera import OPENINGS_DEG, SIM_LENS, render_frame, sim_plate_scene
+from scissorcal.calibration import TrackHead, TrackPose, TrackRow
+from scissorcal.device import SimProcess
+from scissorcal.recipe import Recipe
+from scissorcal.recording import FRAME, PICTURE, POSE, read_recording, read_telemetry
+from scissorcal.vision import (
+    OPENINGS_DEG,
+    SIM_LENS,
+    Frame,
+    Pose,
+    SimPose,
+    chained,
+    difference,
+    render_frame,
+    sim_plate_scene,
+)
 from tests.cli.conftest import Cli
 from tests.guard import GUARD_S
 

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.recording import read_recording
-from scissorcal.recording.until import UNTIL_MARK, UntilMark
+from scissorcal.recording import UNTIL_MARK, UntilMark, read_recording
 
 from .conftest import Cli
 

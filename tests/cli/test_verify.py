@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.workday.engine import Engine
-from scissorcal.workday.workspace import Workspace
+from scissorcal.workday import Engine, Workspace
 from tests.calibration.truth import Truth
 from tests.workday.made import fitted_copy, quick_workspace, record_friction
 

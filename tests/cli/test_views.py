@@ -12,8 +12,7 @@ from scissorcal.cli.live_view import LiveView, effort_plot
 from scissorcal.cli.output import table
 from scissorcal.cli.progress import progress
 from scissorcal.cli.terminal import drawn
-from scissorcal.device.coverage import OPENING, CoverageGrid
-from scissorcal.device.recorder import Recorder
+from scissorcal.device import OPENING, CoverageGrid, Recorder
 from scissorcal.errors import InputError, VerdictError
 from scissorcal.recording import SAMPLE_DTYPE, RecordingWriter
 

@@ -1,4 +1,4 @@
-"""A blade on a sledge against an elastic disc, integrated in substeps; what the law controls.
+"""A blade on a carriage against an elastic disc, integrated in substeps; what the law controls.
 
 Written for the tests alone: nothing of it is shared with the law, its gains or the virtual rig.
 Everything is plain Python on numbers; a tick is `SUBSTEPS` steps of the midpoint rule.
@@ -13,7 +13,7 @@ SUBSTEPS = 20
 
 @dataclass(frozen=True)
 class Blade:
-    """A blade of length `length` on a sledge; its centre of mass is off the pivot.
+    """A blade of length `length` on a carriage; its centre of mass is off the pivot.
 
     `dry` friction builds up over `bristle` of motion (Dahl). `coupling` is mass times distance of
     the centre of mass. Efforts act `delay_s` after the sample that they answer, behind motors of

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device import LockstepLink
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey
-from scissorcal.tracking.plate_pose import PlatePose, level_plate
+from scissorcal.tracking import PlatePose, level_plate
 from tests.control.virtual import Run, go, points, prepare, specimen
 
 MATERIAL = 2.0

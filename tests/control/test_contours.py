@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from scissorcal.control.contours import contour_at, foot_of, on_plate
-from scissorcal.model.surface import Cylinder, HeightField, Plane, Sphere
-from scissorcal.tracking.plate_pose import PlatePose, fixed_pose, level_plate
+from scissorcal.model import Cylinder, HeightField, Plane, Sphere
+from scissorcal.tracking import PlatePose, fixed_pose, level_plate
 
 NONE = np.zeros((6, 6))
 LEVEL = level_plate((0.0, 0.0, 0.0))[0]

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from scissorcal.control.control_result import control_figures
-from scissorcal.device.sim.rig import VirtualRig
+from scissorcal.device import VirtualRig
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import CONTROL_DTYPE, ControlFlag, HybridFlag, Mode
-from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
-from scissorcal.recording import Joint, RecordingWriter, read_recording, read_telemetry
-from scissorcal.recording.telemetry import CONTROL
-from scissorcal.tracking.plate_pose import PlatePose
+from scissorcal.model import Cylinder, Plane, Sphere, Surface
+from scissorcal.recording import CONTROL, Joint, RecordingWriter, read_recording, read_telemetry
+from scissorcal.tracking import PlatePose
 from scissorcal.verdicts import failed
 from tests.control.virtual import go, points, posed, prepare, rms, seen, specimen
 

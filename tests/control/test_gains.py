@@ -20,7 +20,7 @@ from scissorcal.control import (
     friction_rates,
 )
 from scissorcal.control.gains import TOUCH_FORCE_N
-from scissorcal.device.control import Axis, Gains, loop_margins
+from scissorcal.device import Axis, Gains, loop_margins
 from scissorcal.errors import InputError
 from scissorcal.kernel import HybridConfig
 from tests.control.loop_poles import contact_decay

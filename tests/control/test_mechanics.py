@@ -9,14 +9,13 @@ from scissorcal.control.contours import foot_of
 from scissorcal.control.mechanics import FASTEST_rad_per_s, axis_friction
 from scissorcal.control.settings import Material, Settings, control_settings
 from scissorcal.control.surface_path import map_contour, time_path
-from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device import LockstepLink
 from scissorcal.errors import InputError
+from scissorcal.kernel import fill_struct
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.layout import fill_struct
-from scissorcal.model.friction import FrictionLaw, friction_torque
-from scissorcal.model.surface import Cylinder, Plane
-from scissorcal.recipe.schema import Limits
-from scissorcal.tracking.plate_pose import PlatePose, level_plate
+from scissorcal.model import Cylinder, FrictionLaw, Plane, friction_torque
+from scissorcal.recipe import Limits
+from scissorcal.tracking import PlatePose, level_plate
 from tests.control.virtual import mechanics, points, specimen
 
 LIMITS = Limits()
@@ -95,13 +94,13 @@ def test_stiff_material_is_refused_with_what_would_do() -> None:
         settings(stiffness=3e5)
 
 
-def test_a_place_beyond_the_sledge_is_refused() -> None:
+def test_a_place_beyond_the_carriage_is_refused() -> None:
     rig = mechanics(specimen())
     identity = LockstepLink("office-paper", np.random.default_rng(1)).identity
     pose = PlatePose(0.0, *level_plate((20.0, 10.0, 0.0)), np.zeros((6, 6)))
     path = points(290.0, 310.0)
     contour = map_contour(path, Plane(), pose, 0.4)
-    with pytest.raises(InputError, match=r"x = .* mm the sledge would stand at"):
+    with pytest.raises(InputError, match=r"x = .* mm the carriage would stand at"):
         control_settings(
             rig, identity, Limits(), Material(1e4, 0.2, 1.0),
             time_path(path, contour, 1e-3), 400.0,

@@ -16,8 +16,8 @@ from scissorcal.control.surface_path import (
     time_path,
 )
 from scissorcal.errors import InputError
-from scissorcal.model.surface import Cylinder, HeightField, Plane, Surface
-from scissorcal.tracking.plate_pose import PlatePose, level_plate
+from scissorcal.model import Cylinder, HeightField, Plane, Surface
+from scissorcal.tracking import PlatePose, level_plate
 from tests.control.virtual import points
 
 POSE = PlatePose(0.0, *level_plate((20.0, 10.0, 0.0)), np.zeros((6, 6)))

@@ -12,15 +12,12 @@ import pytest
 from scissorcal.control.follow import Job, control
 from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.settings import Material
-from scissorcal.device.link import open_link
-from scissorcal.device.session import Operator, RigSession
-from scissorcal.device.sim.process import SimProcess
-from scissorcal.device.sim.specimen import load_specimen
+from scissorcal.device import Operator, RigSession, SimProcess, load_specimen, open_link
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import ConfigKey
-from scissorcal.model.surface import Plane
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.tracking.plate_pose import PlatePose, fixed_pose, level_plate
+from scissorcal.model import Plane
+from scissorcal.recipe import builtin_recipe
+from scissorcal.tracking import PlatePose, fixed_pose, level_plate
 from tests.control.virtual import mechanics, points
 
 pytestmark = pytest.mark.realtime

@@ -230,7 +230,7 @@ def test_the_integral_does_not_wind_up_against_a_limit() -> None:
 
 
 def test_the_path_yields_before_the_force() -> None:
-    """A path that jumps by 6 mm asks for more than a weak sledge has."""
+    """A path that jumps by 6 mm asks for more than a weak carriage has."""
     steering = steered(LATE, SOFT, effort_limit=(0.5, 2.0), path_error_most=1e-2)
     steering.run(1.2, resting())
     run = steering.run(1.0, resting(angle=0.3))

@@ -13,19 +13,20 @@ from scissorcal.control.follow import Job, control
 from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.path_file import SurfacePoints
 from scissorcal.control.settings import Material
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import Operator, RigSession
-from scissorcal.device.sim.rig import VirtualRig
-from scissorcal.device.sim.specimen import Specimen, load_specimen
-from scissorcal.device.sim.truth import true_parameters
+from scissorcal.device import (
+    LockstepLink,
+    Operator,
+    RigSession,
+    Specimen,
+    VirtualRig,
+    load_specimen,
+    true_parameters,
+)
 from scissorcal.kernel import ControlFlag, HybridFlag
-from scissorcal.model.blade_point import BladePoint
-from scissorcal.model.friction import FrictionLaw
-from scissorcal.model.mechanism import AxisLaw
-from scissorcal.model.surface import Plane, Surface
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recording.probe import Estimate, ProbeResult
-from scissorcal.tracking.plate_pose import PlatePose, PoseSource, fixed_pose, level_plate
+from scissorcal.model import AxisLaw, BladePoint, FrictionLaw, Plane, Surface
+from scissorcal.recipe import builtin_recipe
+from scissorcal.recording import Estimate, ProbeResult
+from scissorcal.tracking import PlatePose, PoseSource, fixed_pose, level_plate
 
 PLATE: dict[str, Any] = {"place_mm": (20.0, 10.0, 0.0), "extent_mm": (-20.0, 150.0)}
 FLAT = Plane()
@@ -49,11 +50,11 @@ def mechanics(truth: Specimen) -> RigMechanics:
     length = 1e-3 * blade.length_mm
     offset = 1e-3 * blade.offset_mm + length * math.tan(math.radians(blade.taper_deg))
     centre = math.radians(truth.mechanism.friction.angle_center_deg)
-    sledge = FrictionLaw({"coulomb": advance.coulomb_N, "viscous": advance.viscous_N_s_per_m})
+    carriage = FrictionLaw({"coulomb": advance.coulomb_N, "viscous": advance.viscous_N_s_per_m})
     return RigMechanics(
         tip=BladePoint(length, offset, blade.moving_blades),
         opening=AxisLaw(values["inertia"], FrictionLaw(law, centre), values["offset"]),
-        advance=AxisLaw(advance.mass_kg, sledge),
+        advance=AxisLaw(advance.mass_kg, carriage),
         friction_sd=4e-4,
         delay_s=DELAY_S,
         torque_sd=1e-3,

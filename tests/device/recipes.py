@@ -1,7 +1,6 @@
 """Recipes of the library, with some keys changed; and short ones, for captures in tests."""
 
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe, builtin_recipe
 
 
 def changed(name: str, **tables: dict[str, object]) -> Recipe:

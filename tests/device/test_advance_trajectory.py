@@ -1,4 +1,4 @@
-"""The plan of a capture of the sledge: within the stops, the force and the speeds, or refused."""
+"""The plan of a capture of the carriage: within the stops, the force and the speeds, or refused."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from scissorcal.device.advance_trajectory import (
 from scissorcal.device.capture import planned
 from scissorcal.device.trajectory import opening_range
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed
 
@@ -44,7 +44,7 @@ def test_every_speed_is_swept_both_ways_and_the_mass_is_excited():
     assert planned(RECIPE, IDENTITY, "friction-advance").strokes == plan.strokes
 
 
-def test_the_blades_stand_open_and_the_sledge_in_the_middle_of_its_stops():
+def test_the_blades_stand_open_and_the_carriage_in_the_middle_of_its_stops():
     reference = advance_plan(RECIPE, IDENTITY).segments[0].reference
     assert np.ptp(reference.opening) == 0.0
     assert reference.opening[0] == opening_range(RECIPE, IDENTITY)[1]

@@ -33,7 +33,7 @@ from scissorcal.kernel import (
     decode,
     encode,
 )
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.recording import Recording, read_recording
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed, short
@@ -183,7 +183,7 @@ def test_a_person_is_asked_with_the_motors_off(tmp_path: Path) -> None:
     assert sum("Paused" in note for note in recording.notes) == 2
 
 
-def test_a_person_cuts_by_hand_on_a_rig_without_motors_for_the_sledge(tmp_path: Path) -> None:
+def test_a_person_cuts_by_hand_on_a_rig_without_motors_for_the_carriage(tmp_path: Path) -> None:
     recipe = short("paper-80gsm")
     link = like_a_real_rig(recipe, capabilities=int(Capability.HANDLE_FORCE_SENSOR))
 

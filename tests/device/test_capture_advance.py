@@ -1,4 +1,4 @@
-"""Captures of the sledge in virtual time: as planned, recorded whole, counted, and stopped."""
+"""Captures of the carriage in virtual time: as planned, recorded whole, counted, and stopped."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.recording import Recording, read_header, read_recording
 from tests.device.recipes import changed
 
@@ -51,7 +51,7 @@ def taken(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, CaptureR
     return read_recording(path), report
 
 
-def test_the_sledge_follows_the_plan_and_the_blades_stand(taken):
+def test_the_carriage_follows_the_plan_and_the_blades_stand(taken):
     recording, report = taken
     samples = recording.samples
     plan = advance_plan(RECIPE, link_of(specimen()).identity)
@@ -113,9 +113,9 @@ def test_what_is_missing_and_used_is_counted_in_millimetres(taken):
     assert "mm) have less than" in cells
 
 
-def test_a_blocked_sledge_stops_the_capture_and_what_was_recorded_stays(tmp_path):
+def test_a_blocked_carriage_stops_the_capture_and_what_was_recorded_stays(tmp_path):
     path = tmp_path / "blocked.mcap"
-    with pytest.raises(DeviceError, match="nothing blocks the sledge") as ended:
+    with pytest.raises(DeviceError, match="nothing blocks the carriage") as ended:
         captured(path, link_of(specimen(coulomb_N=60.0)))
     assert ended.value.stop == "ADVANCE_STANDS"
     recording = read_recording(path)

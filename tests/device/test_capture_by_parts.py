@@ -240,7 +240,7 @@ def test_a_rig_in_real_time_idles_while_the_next_part_is_chosen(tmp_path: Path) 
 
 
 def test_a_press_is_reached_with_the_blades_clear_of_the_material() -> None:
-    """Presses come in any order: the blades open wide, the sledge moves, then they close."""
+    """Presses come in any order: the blades open wide, the carriage moves, then they close."""
     recipe = changed("press-only")
     whole = cut_plan(recipe, IDENTITY).segments[0].reference
     count = recipe.capture.cut.strokes_per_sheet

@@ -13,10 +13,8 @@ from scissorcal.device.completeness import completeness
 from scissorcal.device.counting import count_recorded, count_used
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.session import RigSession
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import read_recording
-from scissorcal.recording.recording import Recording
-from scissorcal.recording.until import UNTIL_MARK, UntilMark
+from scissorcal.recipe import Recipe
+from scissorcal.recording import UNTIL_MARK, Recording, UntilMark, read_recording
 from tests.device.recipes import short
 
 RECIPE = short("paper-80gsm")

@@ -31,8 +31,8 @@ from scissorcal.device.paths import PathBuilder
 from scissorcal.device.slow_sliding import StribeckFall
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Identity
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recording.probe import Estimate, ProbeResult
+from scissorcal.recipe import builtin_recipe
+from scissorcal.recording import Estimate, ProbeResult
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed
 from tests.strange_device.device import StrangeDevice
@@ -160,8 +160,8 @@ def test_designs_keep_their_margins(tick_us: int, delay_ms: float) -> None:
     )
     margins = loop_margins(axis, found.opening)
     assert margins.enough
-    sledge = replace(axis, inertia=ADVANCE_MASS_KG, viscous=4.0, inertia_factor=2.0)
-    assert loop_margins(sledge, found.advance).enough
+    carriage = replace(axis, inertia=ADVANCE_MASS_KG, viscous=4.0, inertia_factor=2.0)
+    assert loop_margins(carriage, found.advance).enough
     assert verdict.value <= margins.phase_deg + 1e-9
 
 

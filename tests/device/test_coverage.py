@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scissorcal.device.coverage import CoverageGrid, coverage_of, even_cells
 from scissorcal.device.cut_trajectory import cut_openings, cut_plan
 from scissorcal.device.trajectory import friction_plan
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from scissorcal.recording import SAMPLE_DTYPE
 from tests.device.conftest import IDENTITY
 

@@ -13,7 +13,8 @@ from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import StopReason
 from scissorcal.package import ModelPackage
-from scissorcal.render.rig_facts import rig_facts, with_probe
+from scissorcal.render import with_probe
+from scissorcal.render.rig_facts import rig_facts
 from tests.render.conftest import paper as paper
 from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 from tests.strange_device.mechanics import Hand
@@ -53,9 +54,9 @@ STOPS = {
 """What stops a capture of friction."""
 
 STOPS_OF_A_CUT = {
-    "sledge motor reversed": "RUNAWAY_ADVANCE",
-    "sledge encoder reversed": "RUNAWAY_ADVANCE",
-    "sledge encoder stuck": "ADVANCE_STANDS",
+    "carriage motor reversed": "RUNAWAY_ADVANCE",
+    "carriage encoder reversed": "RUNAWAY_ADVANCE",
+    "carriage encoder stuck": "ADVANCE_STANDS",
     "5 ms late": "OSCILLATION",
 }
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from scissorcal.device.rig_record import identity_facts, identity_of
 from scissorcal.errors import InputError
-from scissorcal.kernel.messages import Identity
+from scissorcal.kernel import Identity
 from tests.bench.trade.cases import IDENTITY
 
 FACTS = identity_facts(IDENTITY)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.calibration.signals.steadiness import steadiness
+from scissorcal.calibration import steadiness
 from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.capture_gains import Probed, capture_gains
 from scissorcal.device.control import Axis, Gains, greatest_fall
@@ -15,9 +15,9 @@ from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.probe import probe
 from scissorcal.device.session import RigSession
 from scissorcal.device.slow_sliding import StribeckFall
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.recording import Recording, read_recording
-from scissorcal.workday.runs.sweep_speeds import with_usable_sweeps
+from scissorcal.workday import with_usable_sweeps
 from tests.device.recipes import changed
 from tests.second_rig import Rig, draw_truth, fine, recipe_for
 from tests.second_rig import capture_friction as capture_on_second_rig

@@ -18,10 +18,8 @@ from scissorcal.device.trajectory import (
     usable_opening,
 )
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.model.edge_points import edge_through
-from scissorcal.recipe.edge import Edge, StatedCurve
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.pace import TURN_ACCELERATION
+from scissorcal.model import edge_through
+from scissorcal.recipe import TURN_ACCELERATION, Edge, StatedCurve, builtin_recipe
 from tests.device.conftest import IDENTITY
 from tests.device.recipes import changed
 

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from scissorcal.device.unanswered import MOST_ENERGY_J, refuse_unanswered
 from scissorcal.errors import DeviceError
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.probe import Estimate
+from scissorcal.recipe import Recipe, builtin_recipe
+from scissorcal.recording import Estimate
 from tests.device.recipes import changed
 from tests.device.test_link import IDENTITY
 

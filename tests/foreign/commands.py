@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from scissorcal.cli.root import run
-from scissorcal.recipe.library import recipe_path
+from scissorcal.recipe import recipe_path
 from tests.foreign.samples import DRAWN, SAMPLES
 from tests.recording.logs import COLUMNS, UNITS
 from tests.recording.test_import_formats import MAT_COLUMNS, MAT_UNITS

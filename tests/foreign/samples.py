@@ -15,32 +15,32 @@ import numpy as np
 from PIL import Image
 from scipy.io import savemat
 
-from scissorcal.calibration.store import load, read_header, save
-from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.calibration import VerifyResult, load, read_header, save
 from scissorcal.foreign.formats import PHOTO_INDEX
 from scissorcal.identity import bytes_digest
-from scissorcal.inference.checkpoint import Walk, load_walks, save_walks
-from scissorcal.package.keys import holds, read_public_keys, signer
-from scissorcal.package.review import Review
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import load_recipe, parse_recipe
-from scissorcal.recipe.plate_layers import plate_pieces, plate_sentence
-from scissorcal.recipe.plate_surface import probed_surface
+from scissorcal.inference import Walk, load_walks, save_walks
+from scissorcal.package import Review, holds, read_public_keys, signer
+from scissorcal.recipe import (
+    load_recipe,
+    parse_recipe,
+    plate_pieces,
+    plate_sentence,
+    probed_surface,
+    recipe_path,
+)
 from scissorcal.recording import (
+    PICTURE,
+    Recording,
     import_table,
     read_attachments,
     read_recording,
     read_telemetry,
+    summary,
 )
 from scissorcal.recording import (
     read_header as read_recording_header,
 )
-from scissorcal.recording.recording import Recording
-from scissorcal.recording.summarising import summary
-from scissorcal.recording.telemetry import PICTURE
-from scissorcal.vision.camera_files import read_camera_file, write_camera_file
-from scissorcal.vision.photo import read_photo
-from scissorcal.vision.stances import read_stances
+from scissorcal.vision import read_camera_file, read_photo, read_rig_positions, write_camera_file
 from tests.calibration.results import results
 from tests.calibration.test_store import checked
 from tests.foreign.seals import (
@@ -226,9 +226,7 @@ def _read_package(path: Path) -> None:
 
 
 def _report(path: Path) -> None:
-    from scissorcal.report import document_of_fit
-    from scissorcal.report.document import ReportDocument
-    from scissorcal.report.twin import twin_text
+    from scissorcal.report import ReportDocument, document_of_fit, twin_text
     from tests.report.fits import cut_fit
 
     document: ReportDocument = document_of_fit(cut_fit(), None)
@@ -236,8 +234,7 @@ def _report(path: Path) -> None:
 
 
 def _read_report(path: Path) -> None:
-    from scissorcal.workday import facts
-    from scissorcal.workday.runs.report import load_side
+    from scissorcal.workday import facts, load_side
 
     assert isinstance(facts.report(path)["inputs"], str)
     load_side(path)
@@ -294,8 +291,7 @@ def _photo_index(path: Path) -> None:
 
 def _read_photo_index(path: Path) -> None:
     from scissorcal.foreign import read_foreign, reading
-    from scissorcal.workday import facts
-    from scissorcal.workday.photographs import PhotoIndex
+    from scissorcal.workday import PhotoIndex, facts
 
     with reading(path, PHOTO_INDEX):
         PhotoIndex.model_validate_json(read_foreign(path, PHOTO_INDEX))
@@ -308,7 +304,7 @@ def _path(path: Path) -> None:
 
 
 def _read_path(path: Path) -> None:
-    from scissorcal.control.path_file import read_path
+    from scissorcal.control import read_path
 
     points = read_path(path)
     assert np.isfinite(points.x).all()
@@ -323,13 +319,13 @@ def _read_surface(path: Path) -> None:
     assert probed_surface(path, 0.02).surface is not None
 
 
-def _stances(path: Path) -> None:
+def _positions(path: Path) -> None:
     lines = "".join(f"r-{i}.jpg,3{i},2{i}\n" for i in range(3))
     path.write_text(f"file,advance_mm,opening_deg\n{lines}")
 
 
-def _read_stances(path: Path) -> None:
-    assert np.isfinite(list(read_stances(path).values())).all()
+def _read_positions(path: Path) -> None:
+    assert np.isfinite(list(read_rig_positions(path).values())).all()
 
 
 def _track_lines(path: Path) -> None:
@@ -340,7 +336,7 @@ def _track_lines(path: Path) -> None:
 
 
 def _read_track_lines(path: Path) -> None:
-    from scissorcal.calibration.plate.track_lines import read_track_lines
+    from scissorcal.calibration import read_track_lines
 
     read_track_lines(path)
 
@@ -357,7 +353,7 @@ def _read_checkpoint(path: Path) -> None:
 
 
 def _state_index(path: Path) -> None:
-    from scissorcal.workday.index import FileIndex
+    from scissorcal.workday import FileIndex
 
     (path.parent / "a").write_bytes(b"content")
     index = FileIndex(path.parent)
@@ -367,7 +363,7 @@ def _state_index(path: Path) -> None:
 
 
 def _read_state_index(path: Path) -> None:
-    from scissorcal.workday.index import FileIndex
+    from scissorcal.workday import FileIndex
 
     folder = path.parent / "indexed"
     (folder / ".scissorcal").mkdir(parents=True, exist_ok=True)
@@ -438,7 +434,7 @@ SAMPLES: dict[str, Sample] = {
     "path CSV": Sample("path.csv", _path, _read_path),
     "drawing SVG": Sample("plate.svg", _drawing, _read_drawing),
     "surface CSV": Sample("heights.csv", _surface, _read_surface),
-    "stances CSV": Sample("stances.csv", _stances, _read_stances),
+    "positions CSV": Sample("positions.csv", _positions, _read_positions),
     "track of lines": Sample("track.jsonl", _track_lines, _read_track_lines),
     "checkpoint": Sample("walks.npz", _checkpoint, _read_checkpoint, changed_member),
     "file index": Sample("index.json", _state_index, _read_state_index),

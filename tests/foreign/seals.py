@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Callable
 
 from scissorcal.identity import bytes_digest
-from scissorcal.package.manifest import content_hash
+from scissorcal.package import content_hash
 
 Change = Callable[[bytes], bytes]
 Seal = Callable[[bytes, Change], bytes]

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scissorcal.errors import InputError
-from scissorcal.vision.camera_files import CameraFile, read_camera_file
+from scissorcal.vision import CameraFile, read_camera_file
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "cameras"
 MATRIX = [[900.0, 0.0, 642.0], [0.0, 905.0, 358.0], [0.0, 0.0, 1.0]]

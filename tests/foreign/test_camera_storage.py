@@ -8,8 +8,7 @@ import pytest
 
 from scissorcal.errors import InputError
 from scissorcal.foreign.text_tree import parse_xml, parse_yaml
-from scissorcal.vision.camera_files import read_camera_file
-from scissorcal.vision.camera_files.keys import matrix_of, number_of
+from scissorcal.vision import matrix_of, number_of, read_camera_file
 
 STYLES = {
     "yml": cv2.FILE_STORAGE_FORMAT_YAML,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.drawing import read_drawing
+from scissorcal.recipe import read_drawing
 from tests.foreign.drawings import BOX, HEAD, MISPLACED, READ, RECT, UNREAD
 
 CASES = Path(__file__).resolve().parents[2].parent / "shared" / "cases" / "svg"

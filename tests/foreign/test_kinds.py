@@ -19,11 +19,9 @@ from scissorcal.foreign import formats, open_foreign
 from scissorcal.foreign.formats import Format
 from scissorcal.foreign.kinds import kind_of
 from scissorcal.package import open_package
-from scissorcal.recipe.library import builtin_recipe, recipe_path
-from scissorcal.recipe.load import load_recipe
+from scissorcal.recipe import builtin_recipe, load_recipe, recipe_path
 from scissorcal.recording import import_table, read_recording, write_recording
-from scissorcal.vision.camera_files import read_camera_file
-from scissorcal.vision.photo import read_photo
+from scissorcal.vision import read_camera_file, read_photo
 from tests.calibration.results import results
 from tests.recording.made import made_recording
 

@@ -10,19 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.signals.sensors import channels_of
-from scissorcal.calibration.signals.survey import survey
+from scissorcal.calibration import channels_of, survey
 from scissorcal.errors import InputError
-from scissorcal.recording import ImportOptions, Joint, Recording, import_table
-from scissorcal.recording.faulty_values import (
+from scissorcal.recording import (
+    ImportOptions,
+    Joint,
+    Recording,
     continued_clock,
+    empty_samples,
+    import_table,
     jumps_in,
     lone_excursion,
     marks_in,
     overflows,
+    size_note,
 )
-from scissorcal.recording.layout import empty_samples
-from scissorcal.recording.quantities import size_note
 from tests.recording.logs import imported
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "logs"

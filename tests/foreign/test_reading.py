@@ -11,21 +11,14 @@ from typing import Any
 
 import pytest
 
-from scissorcal.calibration.store import load
-from scissorcal.calibration.verify.result import VerifyResult
-from scissorcal.control.path_file import read_path
+from scissorcal.calibration import VerifyResult, load
+from scissorcal.control import read_path
 from scissorcal.errors import InputError
 from scissorcal.foreign import Format, open_foreign, parse_json, read_foreign, reading
 from scissorcal.package import open_package
-from scissorcal.recipe.drawing import read_drawing
-from scissorcal.recipe.load import load_recipe, parse_recipe
-from scissorcal.recipe.plate_surface import probed_surface
-from scissorcal.recording import import_table, read_header, read_recording
-from scissorcal.recording.chunks import run_end
-from scissorcal.vision.camera_files import read_camera_file
-from scissorcal.vision.live import frames_of
-from scissorcal.vision.photo import read_photo
-from scissorcal.vision.stances import read_stances
+from scissorcal.recipe import load_recipe, parse_recipe, probed_surface, read_drawing
+from scissorcal.recording import import_table, read_header, read_recording, run_end
+from scissorcal.vision import frames_of, read_camera_file, read_photo, read_rig_positions
 from tests.recording.logs import COLUMNS
 from tests.recording.made import made_samples, written_live
 
@@ -41,7 +34,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "a.zip": open_package,
     "a.toml": load_recipe,
     "path.csv": read_path,
-    "stances.csv": read_stances,
+    "positions.csv": read_rig_positions,
     "plate.svg": read_drawing,
     "heights.csv": lambda path: probed_surface(path, 0.02),
     "cut.verify.json": lambda path: load(path, VerifyResult),
@@ -177,8 +170,7 @@ def test_a_run_of_messages_is_compared_in_proportion_to_its_length(
     """Messages of two channels in turn: what is compared grows with the bytes, not their square."""
     import numpy as np
 
-    from scissorcal.recording import chunks
-    from scissorcal.recording.layout import MESSAGE_DTYPE
+    from scissorcal.recording import MESSAGE_DTYPE, chunks
 
     looked = 0
 

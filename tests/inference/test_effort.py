@@ -1,4 +1,4 @@
-"""Each rung of effort against known densities, and what it says where there is none."""
+"""Each level of effort against known densities, and what it says where there is none."""
 
 import warnings
 from collections.abc import Callable

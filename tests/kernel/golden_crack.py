@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scissorcal.calibration.verify.simulated_recordings import Sheet, crack_law
+from scissorcal.calibration import Sheet, crack_law
 from scissorcal.model import Cutting, Edge, Response
 from tests.kernel.reference_crack import stored, walk
 

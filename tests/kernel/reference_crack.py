@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import brentq
 
-from scissorcal.model import Cutting
-from scissorcal.model.edge import edge_height
+from scissorcal.model import Cutting, edge_height
 
 
 @dataclass

@@ -108,7 +108,7 @@ def test_compilers_that_cannot_be_fetched_are_named_in_one_sentence(
 def test_the_builder_of_this_checkout_builds_what_is_read(build: ModuleType) -> None:
     """The list of the build and the paths of the readers are two; here they meet."""
     from scissorcal.kernel.web_module import web_module
-    from scissorcal.prototype.document import TEMPLATE
+    from scissorcal.prototype import TEMPLATE
 
     targets = {file.target for file in build.FILES}
     assert TEMPLATE in targets

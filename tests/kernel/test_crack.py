@@ -8,15 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.calibration.verify.simulated_recordings import (
-    Sheet,
-    Unevenness,
-    crack_law,
-    material_torque,
-)
+from scissorcal.calibration import Sheet, Unevenness, crack_law, material_torque
 from scissorcal.kernel import CrackPath, walk_crack
-from scissorcal.model import Cutting, Edge, Response, settled_contact
-from scissorcal.model.cutting import torque_at
+from scissorcal.model import Cutting, Edge, Response, settled_contact, torque_at
 from tests.kernel import golden_crack
 from tests.kernel.reference_crack import walk
 

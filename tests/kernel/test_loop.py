@@ -30,7 +30,7 @@ from scissorcal.kernel import (
     encode,
     run_loop,
 )
-from scissorcal.recording.recording import SAMPLE_DTYPE
+from scissorcal.recording import SAMPLE_DTYPE
 from tests.guard import GUARD_S
 from tests.kernel.zoo import make_tables
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from scissorcal.device.control import Axis
-from scissorcal.device.control_design import Demand, design_gains
+from scissorcal.device import Axis, Demand, design_gains
 from scissorcal.kernel import Mode, Servo, ServoConfig, State, StateFlag, StopReason
 from tests.kernel.test_servo_watch import CONFIG, FRICTION, INERTIA, WATCH, Joint, tracking
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError, ModelError
-from scissorcal.model import Cutting, Edge, EdgeBelief, FrictionLaw, Response
+from scissorcal.model import Cutting, Edge, EdgeDistribution, FrictionLaw, Response
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.model.mechanism import AxisLaw
 from scissorcal.model.surface import Cylinder, HeightField, Sphere
@@ -30,7 +30,7 @@ NAMES = [
     (CUTTING, "closure", "worke", "work"),
     (LAW, "values", {"colomb_pos": 0.01}, "coulomb_pos"),
     (LAW, "values", {"viscos": 0.01}, "viscous"),
-    (EdgeBelief(EDGE, ("offset_m",), np.eye(1)), "names", ("offset",), "offset_m"),
+    (EdgeDistribution(EDGE, ("offset_m",), np.eye(1)), "names", ("offset",), "offset_m"),
 ]
 
 

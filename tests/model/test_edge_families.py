@@ -1,4 +1,4 @@
-"""The families of edges, and a belief about one."""
+"""The families of edges, and distributions of one."""
 
 import math
 
@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from scissorcal.model import Cutting, Edge, EdgeBelief, Response, draw_edges, edge_height
+from scissorcal.model import Cutting, Edge, EdgeDistribution, Response, draw_edges, edge_height
 from scissorcal.model.bspline import spline_design, spline_value
 from scissorcal.model.cutting import settled_contact
 
@@ -74,34 +74,38 @@ def test_only_a_line_is_straight():
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_belief_gives_its_edge_back_and_draws_with_its_covariance(family):
+def test_a_distribution_gives_its_edge_back_and_draws_with_its_covariance(family):
     names = NAMES[family]
     rng = np.random.default_rng(3)
     root = rng.standard_normal((len(names), len(names))) * 1e-5
-    belief = EdgeBelief(EDGES[family], names, root @ root.T)
-    assert belief.with_values(belief.mean) == EDGES[family]
-    assert belief.with_values(dict(zip(names, belief.mean, strict=True))) == EDGES[family]
-    values = belief.draws(rng, 20_000)
+    distribution = EdgeDistribution(EDGES[family], names, root @ root.T)
+    assert distribution.with_values(distribution.mean) == EDGES[family]
+    assert (
+        distribution.with_values(dict(zip(names, distribution.mean, strict=True))) == EDGES[family]
+    )
+    values = distribution.draws(rng, 20_000)
     np.testing.assert_allclose(
-        np.cov(values, rowvar=False), belief.covariance, atol=0.05 * belief.covariance.max()
+        np.cov(values, rowvar=False),
+        distribution.covariance,
+        atol=0.05 * distribution.covariance.max(),
     )
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_drawn_edges_broadcast_with_stations_angles_and_the_crack(family):
     names = NAMES[family]
-    belief = EdgeBelief(EDGES[family], names, 1e-12 * np.eye(len(names)))
+    distribution = EdgeDistribution(EDGES[family], names, 1e-12 * np.eye(len(names)))
     rng = np.random.default_rng(4)
-    values = belief.draws(rng, 5)
-    edges = belief.with_values(values)
+    values = distribution.draws(rng, 5)
+    edges = distribution.with_values(values)
     assert edges.shape == (5, 1)
-    assert draw_edges(belief, rng, 3).shape == (3, 1)
+    assert draw_edges(distribution, rng, 3).shape == (3, 1)
     response = Response("power", 2.0, 1.5, 1e-3)
     x, beta = np.linspace(0.01, 0.07, 4), np.linspace(0.2, 0.5, 4)
     many = edge_height(edges, x, beta)
     settled = settled_contact(Cutting(edges, response, 2, 0.0, 5.0), 2 * beta)
     for row in range(5):
-        one = belief.with_values(values[row])
+        one = distribution.with_values(values[row])
         assert one.shape == ()
         view = edge_height(one, x, beta)
         np.testing.assert_allclose(many.height[row], view.height, atol=1e-14)
@@ -109,8 +113,8 @@ def test_drawn_edges_broadcast_with_stations_angles_and_the_crack(family):
         np.testing.assert_allclose(settled[row], alone, atol=1e-12)
 
 
-def test_a_belief_of_the_wrong_size_is_refused():
+def test_a_distribution_of_the_wrong_size_is_refused():
     with pytest.raises(ValueError, match="covariance"):
-        EdgeBelief(EDGES["line"], ("offset_m",), np.eye(2))
+        EdgeDistribution(EDGES["line"], ("offset_m",), np.eye(2))
     with pytest.raises(ValueError, match="2 values"):
-        EdgeBelief(EDGES["line"], ("offset_m", "taper_rad"), np.eye(2)).with_values([1.0])
+        EdgeDistribution(EDGES["line"], ("offset_m", "taper_rad"), np.eye(2)).with_values([1.0])

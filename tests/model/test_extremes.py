@@ -5,7 +5,7 @@ import pytest
 
 from scissorcal.model import Cutting, Edge, Response, edge_height, mean_share, settled_contact
 from scissorcal.model.cutting import contact_after_run, torque_at
-from scissorcal.package.exact import ExactModel
+from scissorcal.package import ExactModel
 
 SOFT = Response("power", 2.0, 1.6, 3e-4)
 DEEP_NICK = Edge(

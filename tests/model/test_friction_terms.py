@@ -9,7 +9,7 @@ from scissorcal.model import FrictionLaw, friction_torque, presliding_state
 from scissorcal.model.friction import angle_factor, angle_slope, friction_level
 from scissorcal.model.friction_terms import PARAMETERS, TERMS, law_names, terms_of
 from scissorcal.model.terms import Motion, Role
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.recipe import FitFriction
 
 paths = st.lists(st.floats(-1, 1), min_size=2, max_size=40).map(np.array)
 

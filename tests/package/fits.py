@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from scissorcal.calibration import FitResult, FitSeries, FittedParameter
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe, builtin_recipe
 
 UNITS = {"response_force": "N", "response_exponent": "1", "fracture_energy": "J/m", "kappa": "1"}
 FRICTION = {
@@ -83,7 +82,7 @@ def cut_fit(
     return _result("cut", values, structure, spread, seed, draws)
 
 
-RUNGS = {
+LAW_PARAMETERS = {
     "coulomb": ("inertia", "offset", "coulomb"),
     "coulomb+viscous": ("inertia", "offset", "coulomb", "viscous"),
     "stribeck": ("inertia", "offset", "coulomb", "viscous", "stribeck", "stribeck_rate"),
@@ -103,7 +102,7 @@ def friction_fit(
     """A friction fit; keywords replace single parameters. Closing has 20 % more if asymmetric."""
     structure = {"law": law, "symmetric": symmetric, "joint": "rotary", "angle_center": 0.55}
     kept = {}
-    for name, value in ({key: FRICTION[key] for key in RUNGS[law]} | values).items():
+    for name, value in ({key: FRICTION[key] for key in LAW_PARAMETERS[law]} | values).items():
         if symmetric or name not in ("offset", "coulomb", "viscous"):
             kept[name] = value
         elif name != "offset":
@@ -145,7 +144,7 @@ def _result(
     return FitResult(
         what=what,
         effort="standard",
-        rung="synthetic",
+        candidate="synthetic",
         structure=structure,
         parameters=parameters,
         draws=cloud,
@@ -154,7 +153,7 @@ def _result(
             nothing, none, none, nothing, nothing, nothing, nothing, nothing, nothing, nothing
         ),
         held_out=(),
-        rungs=(),
+        candidates=(),
         diagnostics={},
         verdicts=(),
         effort_unit="N m",

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from scissorcal.errors import InputError, MissingError, ScissorcalError
-from scissorcal.foreign.formats import PACKAGE
+from scissorcal.foreign import PACKAGE
 from scissorcal.package import PackageSummary, build_package, check_package, open_package
 from scissorcal.package.archive import array_bytes, member_of
 from scissorcal.package.manifest import content_hash

@@ -13,7 +13,7 @@ from scissorcal.package import (
     build_package,
     open_package,
 )
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from tests.package.fits import cut_fit, friction_fit, recipe
 
 OUTSIDE = "ignore::scissorcal.package.OutsideCoverageWarning"

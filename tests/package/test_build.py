@@ -23,7 +23,7 @@ from scissorcal.package import (
     read_manifest,
 )
 from scissorcal.package.manifest import PoseRecord
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.verdicts import Verdict
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.report.geometry_fits import plate_fit
@@ -346,7 +346,7 @@ def test_draws_are_thinned_to_what_the_band_needs(paper: PackageSummary, tmp_pat
 
 @pytest.mark.parametrize("law", ["coulomb", "coulomb+viscous", "stribeck", "stribeck+angle"])
 @pytest.mark.parametrize("symmetric", [True, False])
-def test_every_rung_of_friction_compiles(law: str, symmetric: bool, tmp_path: Path) -> None:
+def test_every_law_of_friction_compiles(law: str, symmetric: bool, tmp_path: Path) -> None:
     chosen = recipe(simplify=False)
     summary = build_package(
         chosen,

@@ -10,7 +10,7 @@ import pytest
 from scissorcal.calibration import FitResult
 from scissorcal.errors import InputError
 from scissorcal.package import PackageSummary, build_package, check_package, open_package
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.verdicts import failed
 from tests.package.fits import cut_fit, recipe, with_edge
 

@@ -8,7 +8,7 @@ import pytest
 
 from scissorcal.package import PackageSummary, manifest_schema_text
 from scissorcal.package.manifest import Manifest
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe import schemas_dir
 
 SCHEMA = "manifest.schema.json"
 

@@ -12,7 +12,7 @@ from scissorcal.package.simplest.candidates import Aspect, Candidate, simpler_ca
 from scissorcal.package.simplest.difference import Scene, difference, felt
 from scissorcal.package.simplest.law import Law, column
 from scissorcal.package.simplest.project import Projection, Reference, project
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from tests.package.fits import cut_fit, friction_fit, recipe, with_edge
 
 DRAWS = 30

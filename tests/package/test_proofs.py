@@ -8,15 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.model import Edge, FrictionLaw, Response
-from scissorcal.model.curvature import (
+from scissorcal.model import (
+    Edge,
+    FrictionLaw,
+    Response,
     edge_breaks,
     edge_curvature,
+    friction_level,
     level_curvature,
     response_breaks,
     response_curvature,
 )
-from scissorcal.model.friction import friction_level
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.bound import ExactTorque
 from scissorcal.package.compile import compile_model, scene_ranges, table_file, table_laws, table_of

@@ -7,16 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scissorcal.calibration import FitResult
-from scissorcal.calibration.cut.unknowns import SceneMean
-from scissorcal.model import edge_height
-from scissorcal.model.cutting import within_thickness
+from scissorcal.calibration import FitResult, SceneMean
+from scissorcal.model import edge_height, within_thickness
 from scissorcal.package import PackageOptions, build_package, open_package
 from scissorcal.package.exact import FitDraws, central_model
 from scissorcal.package.reach import data_reach, reach_sentences
 from scissorcal.package.scene_torque import scene_torque
-from scissorcal.recipe.schema import Recipe
-from scissorcal.report.subjects.scene import scene_sentence
+from scissorcal.recipe import Recipe
+from scissorcal.report import scene_sentence
 from tests.package.fits import cut_fit, friction_fit, recipe
 
 WIDE: dict[str, Any] = {"opening_deg": (12.0, 50.0), "contact_mm": (15.0, 60.0)}

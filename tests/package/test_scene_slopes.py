@@ -2,10 +2,10 @@
 
 import pytest
 
-from scissorcal.calibration.design.state import expected_cut, expected_friction
+from scissorcal.calibration import expected_cut, expected_friction
 from scissorcal.errors import InputError
 from scissorcal.package.scene_slopes import torque_knowledge
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from scissorcal.package.simplest.choice import scene_choice, spare_sweeps_s
 from scissorcal.package.simplest.model import Simplified, simplest_model
 from scissorcal.package.simplest.record import AspectRecord
 from scissorcal.package.table_cost import table_bytes
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.render.rig_facts import rig_facts
 from scissorcal.verdicts import failed
 from tests.package import fits

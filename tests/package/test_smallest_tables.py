@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.kernel.compiled_step import missing_tools
+from scissorcal.kernel import missing_tools
 from scissorcal.package import PackageSummary, build_package, open_package, put_review
 from scissorcal.package.average import AverageTorque
 from scissorcal.package.bound import ExactTorque

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Browser, Page
 
-from scissorcal.kernel.tables import TABLE_NAMES
+from scissorcal.kernel import TABLE_NAMES
 from scissorcal.prototype.page_parts import Numbers
 from tests.browser import PAGE, Seen, bundled, open_file, put_back
 

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe import parse_recipe, recipe_path
 from tests.prototype.design_bed import EDGE, ENERGY_J_PER_M, THICKNESS_MM, Bed, open_bed
 
 SHEET = [[0, -30], [80, -30], [80, 30], [0, 30]]

@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Browser
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.drawing import read_drawing
-from scissorcal.recipe.load import parse_recipe
-from scissorcal.recipe.plate_layers import plate_pieces
-from scissorcal.recipe.svg.elements import shown_shapes
+from scissorcal.recipe import parse_recipe, plate_pieces, read_drawing, shown_shapes
 from tests.foreign.drawings import HEAD, MISPLACED, READ, RECT, UNREAD
 from tests.model.drawn import assert_pieces, golden_cases, golden_files, numbers, pieces_of
 from tests.prototype.design_bed import Bed, open_bed

@@ -7,12 +7,10 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, expect
 
-from scissorcal.model.plate_pieces import Layer, Outline
+from scissorcal.model import Layer, Outline
 from scissorcal.prototype.page_parts import layers_part
-from scissorcal.recipe.load import parse_recipe
-from scissorcal.recipe.plate_layers import plate_pieces
-from scissorcal.workday.runs.prototype import workspace_plate
-from scissorcal.workday.workspace import create_workspace
+from scissorcal.recipe import parse_recipe, plate_pieces
+from scissorcal.workday import create_workspace, workspace_plate
 from tests.model.drawn import numbers
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design_page import HOLED, spans

@@ -10,12 +10,10 @@ from playwright.sync_api import Browser
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.kernel.tables import Table
-from scissorcal.model.edge import Edge
-from scissorcal.model.edge_points import edge_through
-from scissorcal.package.tables import hermite
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.kernel import Table
+from scissorcal.model import Edge, edge_through
+from scissorcal.package import hermite
+from scissorcal.recipe import parse_recipe, recipe_path
 from tests.model.golden_edges import golden
 from tests.prototype.design_bed import Bed, open_bed
 from tests.prototype.test_design import SHEET, box, drawn, layer, recipe_of

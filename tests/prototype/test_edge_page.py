@@ -11,14 +11,10 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.friction.layout import at_typical
-from scissorcal.kernel import Kernel
-from scissorcal.kernel.tables import Table
-from scissorcal.model.edge import Edge
-from scissorcal.model.edge_points import edge_through
-from scissorcal.package import build_package, open_package
-from scissorcal.package.exact import FitDraws, central_model
-from scissorcal.package.model_package import ModelPackage
+from scissorcal.calibration import at_typical
+from scissorcal.kernel import Kernel, Table
+from scissorcal.model import Edge, edge_through
+from scissorcal.package import FitDraws, ModelPackage, build_package, central_model, open_package
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import scene_of
 from tests.browser import open_file, put_back

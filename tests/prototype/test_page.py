@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from scissorcal.package import build_package, open_package
-from scissorcal.package.model_package import ModelPackage
-from scissorcal.package.variations import central_values, variations
+from scissorcal.package import ModelPackage, build_package, central_values, open_package
+from scissorcal.package.variations import variations
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.scene import scene_of
 from tests.browser import Seen, open_file, put_back, wait_until

@@ -262,11 +262,11 @@ def test_a_first_question_that_was_not_confirmed_waits(tmp_path: Path) -> None:
         commands.arm("render", PAGE)
         commands.start("render", PAGE)
         asked = await told.wait_for(lambda state: state.request is not None)
-        assert asked.request == "Keep clear of the sledge."
+        assert asked.request == "Keep clear of the carriage."
         commands.stop()
         assert (await told.end()).request is None
 
-    trial(tmp_path, act, **program(ASKS + "ask('Keep clear of the sledge.')"))
+    trial(tmp_path, act, **program(ASKS + "ask('Keep clear of the carriage.')"))
 
 
 def test_progress_is_told_and_lines_of_any_length_and_bytes_are_borne(tmp_path: Path) -> None:

@@ -11,10 +11,7 @@ import numpy as np
 import pytest
 
 from scissorcal.prototype.rig_feed import COLUMNS, Look, QUIET_s, RigFeed
-from scissorcal.recording.following import RecordingFollower
-from scissorcal.recording.recovering import recover
-from scissorcal.recording.samplefile import create_locked
-from scissorcal.recording.telemetry import POSE
+from scissorcal.recording import POSE, RecordingFollower, create_locked, recover
 from tests.guard import GUARD_S
 
 from .made import a_writer, samples_of

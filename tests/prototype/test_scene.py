@@ -9,9 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from scissorcal.package import ModelPackage, PackageSummary, build_package, open_package
-from scissorcal.package.compile import table_file
-from scissorcal.package.variations import Variations, central_values, variations
+from scissorcal.package import (
+    ModelPackage,
+    PackageSummary,
+    Variations,
+    build_package,
+    central_values,
+    open_package,
+    table_file,
+)
+from scissorcal.package.variations import variations
 from scissorcal.prototype.page_parts import Numbers, Slider
 from scissorcal.prototype.scene import NODES, Scene, scene_of, slider_nodes
 from tests.package.conftest import pad

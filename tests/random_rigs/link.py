@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scissorcal.device.link import check_echo, check_identity
+from scissorcal.device import check_echo, check_identity
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Config, ConfigEcho, Hello, Identity, decode, encode
 

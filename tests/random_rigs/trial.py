@@ -3,11 +3,11 @@
 import math
 from dataclasses import dataclass
 
-from scissorcal.device.probe.probe import ProbeRefusedError, probe
-from scissorcal.device.session import Operator, RigSession
+from scissorcal.device import Operator, ProbeRefusedError, RigSession
+from scissorcal.device.probe.probe import probe
 from scissorcal.errors import DeviceError
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recording.probe import ProbeResult
+from scissorcal.recipe import builtin_recipe
+from scissorcal.recording import ProbeResult
 
 from .link import RigLink
 from .person import Person

@@ -12,8 +12,8 @@ import pytest
 
 import scissorcal
 from scissorcal.errors import InputError
-from scissorcal.foreign.formats import DRAWING
-from scissorcal.model.plate_pieces import Outline, spans_on_line
+from scissorcal.foreign import DRAWING
+from scissorcal.model import Outline, spans_on_line
 from scissorcal.recipe.drawing import parse_drawing, read_drawing
 from scissorcal.recipe.svg.curves import FLAT_MM
 from scissorcal.recipe.svg.elements import MOST_POINTS, MOST_POINTS_OF_FILE, MOST_SHAPES

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.model.surface import Cylinder, HeightField, Plane, Sphere
+from scissorcal.model import Cylinder, HeightField, Plane, Sphere
 from scissorcal.recipe.library import recipe_path
 from scissorcal.recipe.load import parse_recipe
 from scissorcal.recipe.plate_surface import PlateSurface, plate_surface, probed_surface

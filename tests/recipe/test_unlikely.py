@@ -187,4 +187,4 @@ def test_any_document_is_judged_in_sentences(document: Any) -> None:
     if isinstance(document, dict):
         for one in unlikely_numbers(document):
             assert one.sentence.endswith((".", "it."))
-            assert len(one.told) < 1000
+            assert len(one.full_sentence) < 1000

@@ -9,7 +9,7 @@ from mcap.reader import make_reader
 from numpy.typing import NDArray
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.euler_angles import EulerAngles
+from scissorcal.recipe import EulerAngles
 from scissorcal.recording import (
     RecordingWriter,
     export_channel,

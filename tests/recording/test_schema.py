@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.recipe import schemas_dir
 from scissorcal.recording import (
     SAMPLE_DTYPE,
     Stroke,

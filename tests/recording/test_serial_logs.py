@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from scissorcal.calibration.signals.survey import survey
+from scissorcal.calibration import survey
 from scissorcal.errors import InputError
 from scissorcal.recording import ImportOptions, Joint, Recording, import_table, textfile
 from scissorcal.recording.resolution import noise_of, stroke_threshold

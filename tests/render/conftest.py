@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.package import ModelPackage, build_package, open_package
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from tests.package.fits import cut_fit, friction_fit, recipe
 
 

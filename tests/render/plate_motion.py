@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.kernel import ModelTables
-from scissorcal.render import PlatePose
+from scissorcal.tracking import PlatePose
 from tests.kernel.reference_plate import Placed, ReferencePlate
 
 Samples = NDArray[np.void]

@@ -10,7 +10,7 @@ from benchmarks.stability import draw_loops, simulate
 from scissorcal.errors import InputError
 from scissorcal.kernel import Kernel, Table
 from scissorcal.package import ModelPackage
-from scissorcal.recording.probe import Estimate, ProbeResult
+from scissorcal.recording import Estimate, ProbeResult
 from scissorcal.render.admission import admit, passivity_config, rendered_tables
 from scissorcal.render.admission_rule import (
     LoopFacts,

@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import Operator, RigSession
-from scissorcal.device.sim.faults import Faults
+from scissorcal.device import Faults, LockstepLink, Operator, RigSession
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability, ConfigKey, Identity, StateFlag
 from scissorcal.package import ModelPackage
-from scissorcal.recipe.schema import Limits
+from scissorcal.recipe import Limits
 from scissorcal.recording import Recording, read_attachments, read_recording
 from scissorcal.render import Rendering, RenderResult, VirtualStrokes, open_writer, render
 from scissorcal.render.rig_facts import RigFacts, rig_facts

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.link import open_link
-from scissorcal.device.session import RigSession
+from scissorcal.device import RigSession, open_link
 from scissorcal.kernel import ConfigKey
 from scissorcal.package import ModelPackage
 from scissorcal.recording import read_recording

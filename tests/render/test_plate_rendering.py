@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import RigSession
+from scissorcal.device import LockstepLink, RigSession
 from scissorcal.errors import MissingError
 from scissorcal.kernel import SampleFlag
 from scissorcal.package import ModelPackage

@@ -9,9 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.link import open_link
-from scissorcal.device.session import Operator, RigSession
-from scissorcal.device.sim.process import SimProcess
+from scissorcal.device import Operator, RigSession, SimProcess, open_link
 from scissorcal.kernel import ConfigKey
 from scissorcal.package import ModelPackage
 from scissorcal.recording import read_recording

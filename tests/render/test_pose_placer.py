@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 
 from scissorcal.errors import MissingError
 from scissorcal.kernel import SAMPLE_DTYPE, ModelTables, Section
-from scissorcal.package import ModelPackage
-from scissorcal.package.manifest import PoseRecord
+from scissorcal.package import ModelPackage, PoseRecord
 from scissorcal.recording import RecordingWriter, read_attachments
-from scissorcal.render import PlatePose
 from scissorcal.render.pose_placer import (
     BACK_SHARE,
     ROW_NAMES,
@@ -28,6 +26,7 @@ from scissorcal.render.pose_placer import (
 )
 from scissorcal.render.pose_section import pose_section
 from scissorcal.render.pose_torque import PoseTorque
+from scissorcal.tracking import PlatePose
 from tests.kernel.zoo import make_tables
 from tests.render.plate_motion import FLAT, turned
 

@@ -8,8 +8,7 @@ import pytest
 
 from scissorcal.errors import InputError
 from scissorcal.identity import bytes_digest
-from scissorcal.package import ModelPackage, check_package, open_package
-from scissorcal.package.manifest import canonical
+from scissorcal.package import ModelPackage, canonical, check_package, open_package
 from scissorcal.render.admission import admit_package
 from tests.package.test_archive import forge
 from tests.render.test_engine import rig

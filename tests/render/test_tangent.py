@@ -10,10 +10,8 @@ from hypothesis import strategies as st
 
 from scissorcal.errors import InputError
 from scissorcal.kernel import Kernel, ModelTables, Piece, PiecesModel, Strip, Table
-from scissorcal.model import Cutting, Edge, Response
-from scissorcal.model.cutting import torque_at
-from scissorcal.package.layer_slopes import LayerSlopes
-from scissorcal.package.tangent import Tangent
+from scissorcal.model import Cutting, Edge, Response, torque_at
+from scissorcal.package import LayerSlopes, Tangent
 from scissorcal.render.admission import admit
 from scissorcal.render.admission_rule import allowed_stiffness
 from scissorcal.render.derating import LEAST_FACTOR, needs_of, needs_on

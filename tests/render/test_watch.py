@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scissorcal.device.motion import Samples
+from scissorcal.device import Samples
 from scissorcal.kernel import SAMPLE_DTYPE, SampleFlag, StateFlag
 from scissorcal.recording import label_strokes
 from scissorcal.render import latency_of

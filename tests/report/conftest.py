@@ -9,9 +9,8 @@ from typing import Any
 
 import pytest
 
-from scissorcal.calibration.result import FitResult
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.schema import Recipe
+from scissorcal.calibration import FitResult
+from scissorcal.recipe import Recipe, recipe_path
 from scissorcal.report import RecordingSummary, build_report, sheet_from_mapping
 from scissorcal.verdicts import Verdict
 from tests.report import fits

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
-from scissorcal.recording.recording import Stroke, StrokeKind
+from scissorcal.calibration import FitResult, FitSeries, FittedParameter, StrokeError
+from scissorcal.recording import Stroke, StrokeKind
 from scissorcal.report import RecordingSummary
 from scissorcal.verdicts import Verdict
 
@@ -55,12 +55,12 @@ def friction_fit(seed: int = 1) -> FitResult:
         _parameter("stribeck_rate", "rad/s", 0.121, 0.022, 0.45, "where it has faded to 37 %"),
         _parameter("angle_slope", "1/rad", 0.39, 0.31, 0.91, "change over the opening"),
     )
-    rungs = (
-        _rung("coulomb, symmetric", -48211.4, 0.00214),
-        _rung("coulomb + viscous, symmetric", -49876.2, 0.00161),
-        _rung("stribeck, symmetric", -51902.8, 0.00119, chosen=True),
-        _rung("stribeck, asymmetric", -51888.1, 0.00119),
-        _rung("stribeck + angle, symmetric", -51901.9, 0.00118),
+    candidates = (
+        _candidate("coulomb, symmetric", -48211.4, 0.00214),
+        _candidate("coulomb + viscous, symmetric", -49876.2, 0.00161),
+        _candidate("stribeck, symmetric", -51902.8, 0.00119, chosen=True),
+        _candidate("stribeck, asymmetric", -51888.1, 0.00119),
+        _candidate("stribeck + angle, symmetric", -51901.9, 0.00118),
     )
     verdicts = (
         Verdict(
@@ -86,7 +86,7 @@ def friction_fit(seed: int = 1) -> FitResult:
         ),
         Verdict("fit.friction", "trust check", "not_evaluated", None, None, "Each speed ran once."),
     )
-    return _fit("friction", "stribeck, symmetric", parameters, pieces, rungs, verdicts, rng)
+    return _fit("friction", "stribeck, symmetric", parameters, pieces, candidates, verdicts, rng)
 
 
 def cut_fit(seed: int = 2) -> FitResult:
@@ -108,10 +108,10 @@ def cut_fit(seed: int = 2) -> FitResult:
         _parameter("kappa", "1", 0.61, 0.05, 0.19, "share of the energy at which a crack stops"),
         _parameter("torque_offset", "N m", 0.0003, 0.0002, 0.05, "torque read at rest"),
     )
-    rungs = (
-        _rung("power, smooth", -20110.0, 0.00611),
-        _rung("power, rippled", -20431.5, 0.00598, chosen=True),
-        _rung("exponential, rippled", -20429.9, float("nan")),
+    candidates = (
+        _candidate("power, smooth", -20110.0, 0.00611),
+        _candidate("power, rippled", -20431.5, 0.00598, chosen=True),
+        _candidate("exponential, rippled", -20429.9, float("nan")),
     )
     verdicts = (
         Verdict(
@@ -130,7 +130,9 @@ def cut_fit(seed: int = 2) -> FitResult:
             "fit.cut", "hold-out", "pass", 0.066, 0.07, "New strokes are predicted.", "at most"
         ),
     )
-    return _fit("cut", "power, rippled, work closure", parameters, pieces, rungs, verdicts, rng)
+    return _fit(
+        "cut", "power, rippled, work closure", parameters, pieces, candidates, verdicts, rng
+    )
 
 
 def linear_fit(seed: int = 3) -> FitResult:
@@ -184,7 +186,9 @@ def without_numbers(fit: FitResult) -> FitResult:
         held_out=tuple(
             replace(error, speed=nan, rms=inf, relative_rms=nan) for error in fit.held_out
         ),
-        rungs=tuple({**rung, "bic": nan, "held_out_rms": inf} for rung in fit.rungs),
+        candidates=tuple(
+            {**candidate, "bic": nan, "held_out_rms": inf} for candidate in fit.candidates
+        ),
         diagnostics={"k_hat": np.float64(nan), "ess": inf, "inflation": (nan, 2.0)},
         verdicts=(Verdict(f"fit.{fit.what}", "k-hat", "not_evaluated", nan, inf, "No weights."),),
     )
@@ -270,7 +274,7 @@ def _parameter(
     )
 
 
-def _rung(name: str, bic: float, error: float, *, chosen: bool = False) -> dict[str, object]:
+def _candidate(name: str, bic: float, error: float, *, chosen: bool = False) -> dict[str, object]:
     return {
         "name": name,
         "parameters": 4 + len(name.split("+")),
@@ -283,10 +287,10 @@ def _rung(name: str, bic: float, error: float, *, chosen: bool = False) -> dict[
 
 def _fit(
     what: str,
-    rung: str,
+    candidate: str,
     parameters: tuple[FittedParameter, ...],
     pieces: list[dict[str, Array]],
-    rungs: tuple[dict[str, object], ...],
+    candidates: tuple[dict[str, object], ...],
     verdicts: tuple[Verdict, ...],
     rng: np.random.Generator,
 ) -> FitResult:
@@ -305,14 +309,14 @@ def _fit(
     return FitResult(
         what="friction" if what == "friction" else "cut",
         effort="standard",
-        rung=rung,
-        structure={"law": rung, "joint": "rotary", "angle_center": 0.54},
+        candidate=candidate,
+        structure={"law": candidate, "joint": "rotary", "angle_center": 0.54},
         parameters=parameters,
         draws=mean + sd * rng.normal(size=(200, len(mean))),
         map_point=mean,
         series=series,
         held_out=held_out,
-        rungs=rungs,
+        candidates=candidates,
         diagnostics={
             "k_hat": 0.21,
             "effective_samples": 1804.2,

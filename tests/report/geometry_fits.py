@@ -6,21 +6,25 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from scissorcal.calibration.camera.result import CameraFit, CrossValidation, PixelMap, ViewError
-from scissorcal.calibration.edge.result import (
+from scissorcal.calibration import (
     Band,
     BladeFit,
     BladeResult,
+    CameraFit,
+    CrossValidation,
+    EdgeCandidate,
     FoundNick,
     PhotographRow,
-    RungRow,
+    PixelMap,
+    PlateFit,
+    PoseHalves,
+    PoseView,
+    ViewError,
 )
-from scissorcal.calibration.plate.result import Halves, PlateFit, PoseView
-from scissorcal.model import Edge, EdgeBelief
+from scissorcal.model import Edge, EdgeDistribution
 from scissorcal.report import Geometry
 from scissorcal.verdicts import Verdict
-from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose
+from scissorcal.vision import Camera, Pose
 
 CAMERA_SD = np.array([0.5, 0.5, 0.4, 0.4, 1e-3, 3e-3, 1e-4, 1e-4, 0.0])
 
@@ -43,8 +47,8 @@ def camera_fit() -> CameraFit:
         ),
         origin="fitted",
         board="camera board",
-        rung="k1, k2, p1, p2",
-        rungs=(_rung("k1", behind=9.0), _rung("k1, k2, p1, p2", chosen=True)),
+        candidate="k1, k2, p1, p2",
+        candidates=(_candidate("k1", behind=9.0), _candidate("k1, k2, p1, p2", chosen=True)),
         draws=np.zeros((4, 9)),
         views=(_view("board-1.jpg", 0.11), _view("board-2.jpg", 0.52), _view("board-3.jpg", 0.09)),
         bulge_mm=(0.2, 0.0),
@@ -71,7 +75,7 @@ def imported_camera() -> CameraFit:
         fit,
         camera=camera,
         origin="imported",
-        rungs=(),
+        candidates=(),
         views=(),
         noise_px=nan,
         stretch=nan,
@@ -90,11 +94,11 @@ def blade_result(*, metric: bool = True, nicked: bool = True) -> BladeResult:
     offset = edge.offset_at(station)
     fit = BladeFit(
         name="blade",
-        belief=EdgeBelief(edge, names, np.diag(sd**2)),
+        edge_posterior=EdgeDistribution(edge, names, np.diag(sd**2)),
         draws=np.zeros((4, 3)),
-        rungs=(
-            RungRow("line", 90.0, False, 1.4, 9e-6, 1e-3, 2e-6),
-            RungRow("arc", 104.0, True, 1.2, 1e-6, 1e-3, 2e-6),
+        candidates=(
+            EdgeCandidate("line", 90.0, False, 1.4, 9e-6, 1e-3, 2e-6),
+            EdgeCandidate("arc", 104.0, True, 1.2, 1e-6, 1e-3, 2e-6),
         ),
         station=station,
         offset=_band(offset, 2e-5),
@@ -131,7 +135,7 @@ def plate_fit() -> PlateFit:
             PoseView("plate-1.jpg", 24, 24, 0.06, 0.055, 60.0, 0.41, 40.0, 3.1, 0.01, 0.02),
             PoseView("plate-2.jpg", 24, 20, 0.30, 0.06, 60.0, 0.41, 40.0, float("inf"), 0.4, 0.9),
         ),
-        halves=Halves(0.05, 0.07, 6.1),
+        halves=PoseHalves(0.05, 0.07, 6.1),
         rms_px=0.07,
         noise_px=0.05,
         verdicts=(Verdict("fit.plate", "at rest", "not_evaluated", None, 3.0, "Take several."),),
@@ -169,7 +173,7 @@ def noise(path: Path, size: tuple[int, int]) -> Path:
     return path
 
 
-def _rung(name: str, *, behind: float = 0.0, chosen: bool = False) -> dict[str, object]:
+def _candidate(name: str, *, behind: float = 0.0, chosen: bool = False) -> dict[str, object]:
     return {
         "name": name,
         "free": 6,

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter
-from scissorcal.recording.recording import Recording
+from scissorcal.calibration import FitResult, FitSeries, FittedParameter
+from scissorcal.recording import Recording
 from tests.calibration.truth import Truth
 from tests.report.fits import cut_fit, friction_fit
 
@@ -80,7 +80,7 @@ def _known(
         structure=structure,
         sources=sources,
         diagnostics=diagnostics,
-        rungs=(),
+        candidates=(),
     )
 
 

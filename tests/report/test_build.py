@@ -12,11 +12,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from scissorcal.calibration.result import FitSeries, FittedParameter
+from scissorcal.calibration import FitSeries, FittedParameter
 from scissorcal.errors import InputError, MissingError
-from scissorcal.package import Review
-from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.package import REPORT_PAGE, REPORT_TWIN, Review
+from scissorcal.recipe import schemas_dir
 from scissorcal.report import Fact, FactSheet, build_report, sign_page
 from scissorcal.report.signature_block import unsigned_digest
 from scissorcal.report.twin import schema_text
@@ -119,9 +118,9 @@ def test_a_failure_half_way_leaves_the_old_report_whole(
 def test_words_from_outside_never_become_markup(tmp_path: Path) -> None:
     fit = replace(
         linear_fit(),
-        rung=HOSTILE,
+        candidate=HOSTILE,
         parameters=tuple(_hostile(p) for p in linear_fit().parameters),
-        rungs=({"name": HOSTILE, "bic": 1.0, "held_out_rms": 1.0, "chosen": True},),
+        candidates=({"name": HOSTILE, "bic": 1.0, "held_out_rms": 1.0, "chosen": True},),
         verdicts=(Verdict(HOSTILE, HOSTILE, "fail", 1.0, 2.0, f"`{HOSTILE}` {HOSTILE} $x$ `"),),
         diagnostics={HOSTILE: HOSTILE},
         notes=(f"`{HOSTILE}`",),
@@ -148,7 +147,7 @@ def test_odd_units_reach_the_figures_as_text(unit: str, tmp_path: Path) -> None:
 def test_a_fit_without_samples_is_still_reported(tmp_path: Path) -> None:
     none, whole = np.zeros(0), np.zeros(0, np.int64)
     series = FitSeries(none, whole, whole, none, none, none, none, none, none, none)
-    fit = replace(cut_fit(), series=series, held_out=(), rungs=(), parameters=(), verdicts=())
+    fit = replace(cut_fit(), series=series, held_out=(), candidates=(), parameters=(), verdicts=())
     report = built(tmp_path, [fit], [])
     assert "holds no samples" in report.page.text
     decision = values_of(panel_of(report.twin, "decision-trust"))["cut"]["decision"]

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.report import Side, compare, document_of, document_of_fit
 from scissorcal.report.comparison import Comparison
 from scissorcal.report.panel import Panel
@@ -71,7 +71,7 @@ def test_runs_of_another_material_law_or_kind_are_refused() -> None:
             Side("a", document_of_fit(known_cut(Truth()), None)),
             Side("b", document_of_fit(known_friction(Truth()), None)),
         )
-    other = replace(known_cut(Truth()), rung="exponential, smooth")
+    other = replace(known_cut(Truth()), candidate="exponential, smooth")
     with pytest.raises(InputError, match="have other laws"):
         compared(one, Side("b", document_of_fit(other, None)))
 

@@ -6,15 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.calibration.result import FitResult, Proposal, ReplayComparison, ReplayRow
-from scissorcal.calibration.verify.result import (
+from scissorcal.calibration import (
     FORMAT,
     Calibration,
     Coverage,
+    FitResult,
     Halves,
     HalvesRow,
+    Proposal,
     RankBand,
     RankedQuantity,
+    ReplayComparison,
+    ReplayRow,
     Sensitivity,
     SensitivityRow,
     VerifyResult,
@@ -71,7 +74,7 @@ def checked(fit: FitResult, ranks: tuple[int, ...]) -> VerifyResult:
         FORMAT,
         "friction",
         fit.inputs_hash,
-        fit.rung,
+        fit.candidate,
         fit.effort,
         0,
         Calibration(

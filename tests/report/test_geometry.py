@@ -11,11 +11,8 @@ import jsonschema
 import numpy as np
 import pytest
 
-from scissorcal.calibration.edge.result import SeenPair
-from scissorcal.calibration.result import FitResult
-from scissorcal.recipe.library import schemas_dir
-from scissorcal.recipe.requirements import GeometryKind
-from scissorcal.recipe.schema import Recipe
+from scissorcal.calibration import FitResult, SeenPair
+from scissorcal.recipe import GeometryKind, Recipe, schemas_dir
 from scissorcal.report import Geometry, build_report
 from scissorcal.report.pictures import PICTURE_BYTES, PictureFile, place_pictures
 from tests.report.conftest import CREATED, Built, paper

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.result import FitResult
-from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
+from scissorcal.calibration import FitResult
+from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
 from scissorcal.report import RecordingSummary, sheet_from_mapping, summarise_recording
 from scissorcal.report.headline import Headline, geometry_headline, write_headline
 from scissorcal.report.inputs import Cell, Evidence
@@ -48,7 +48,7 @@ def good(fit: FitResult) -> FitResult:
 
 def test_a_fit_without_its_trust_check_is_unverified() -> None:
     headline = headline_of(good(friction_fit()))
-    assert headline.stance == "unverified"
+    assert headline.assessment == "unverified"
     assert "is not verified: it passed all 4 checks, but" in headline.sentence
     assert "trust" not in headline.sentence
     assert headline.next_steps[0].startswith("Run `scissorcal verify friction`")
@@ -60,12 +60,12 @@ def test_a_fit_that_passed_is_trusted_with_its_error() -> None:
     ranks = Verdict("verify.friction", "calibration", "pass", 0.4, 0.005, "Ranks are uniform.")
     fit = replace(fit, verdicts=fit.verdicts[:-1])
     alone = write_headline(fit, (halves,))
-    assert (alone.stance, alone.brief) == (
+    assert (alone.assessment, alone.brief) == (
         "unverified",
         "passed all 4 checks; coverage not counted",
     )
     headline = write_headline(fit, (ranks, halves))
-    assert headline.stance == "trust"
+    assert headline.assessment == "trust"
     assert "passed all 5 checks" in headline.sentence
     assert "% (median; worst" in headline.sentence
     assert headline.next_steps == ("Read on, and sign with `scissorcal report sign`.",)
@@ -73,7 +73,7 @@ def test_a_fit_that_passed_is_trusted_with_its_error() -> None:
 
 def test_one_failure_rejects_and_says_what_to_do() -> None:
     headline = headline_of(cut_fit())
-    assert headline.stance == "reject"
+    assert headline.assessment == "reject"
     assert "whiteness failed" in headline.sentence
     assert headline.next_steps[0] == next(
         v.why for v in cut_fit().verdicts if v.check == "whiteness"
@@ -100,7 +100,7 @@ def test_a_failure_of_an_unknown_check_states_its_reason() -> None:
 )
 def test_doubts_ask_for_care(change: dict[str, object], words: str) -> None:
     headline = headline_of(replace(good(friction_fit()), **change))  # type: ignore[arg-type]
-    assert headline.stance == "care"
+    assert headline.assessment == "care"
     assert words in headline.sentence
     assert headline.next_steps
 
@@ -109,7 +109,7 @@ def test_a_parameter_that_repeats_its_prior_asks_for_care() -> None:
     fit = good(friction_fit())
     silent = replace(fit.parameters[-1], identifiability=0.97)
     headline = headline_of(replace(fit, parameters=(*fit.parameters[:-1], silent)))
-    assert headline.stance == "care"
+    assert headline.assessment == "care"
     assert "`angle_slope` repeats the prior" in headline.sentence
 
 

@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.curves import (
+from scissorcal.calibration import (
     EdgePlace,
+    FitResult,
     force_along_edge,
     fracture_work,
+    friction_curve,
+    friction_map,
     response_curve,
 )
-from scissorcal.calibration.friction.curve import friction_curve, friction_map
-from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
 from scissorcal.package.scene_torque import scene_torque
-from scissorcal.recording.recording import Stroke
+from scissorcal.recording import Stroke
 from scissorcal.report.document import fit_panels
 from scissorcal.report.inputs import Evidence
 from scissorcal.report.strokes import strokes_of
@@ -195,7 +196,7 @@ def test_the_response_is_the_law_with_other_candidates_beside_it() -> None:
     truth = Truth()
     fit = swept_like(truth)
     values = {"response_force": 0.6, "response_exponent": 2.0, "fracture_energy": 0.5}
-    rungs = (
+    candidates = (
         {"name": "power, smooth", "chosen": True, "equivalent": True},
         {
             "name": "exponential, smooth",
@@ -205,7 +206,7 @@ def test_the_response_is_the_law_with_other_candidates_beside_it() -> None:
         },
         {"name": "spline, smooth", "equivalent": True},
     )
-    curve = response_curve(replace(fit, rungs=rungs))
+    curve = response_curve(replace(fit, candidates=candidates))
     x = curve.indentation
     expected = np.array([truth.response(delta) for delta in x])
     assert np.allclose(curve.force, expected, rtol=0.02, atol=1e-6)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from scissorcal.recording.probe import PROBE_KEY, Estimate, ProbeResult, Swing
+from scissorcal.recording import PROBE_KEY, Estimate, ProbeResult, Swing
 from scissorcal.report.inputs import RecordingSummary
 from scissorcal.report.subjects.rig import rig_panels
 

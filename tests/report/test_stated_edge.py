@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe import parse_recipe
 from scissorcal.report.subjects.stated_edge import stated_edge_panel
 from tests.workday.made import RECIPE
 

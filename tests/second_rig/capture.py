@@ -6,13 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.advance_trajectory import advance_plan
-from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.hand import hand_travel
-from scissorcal.device.rig_record import identity_facts
-from scissorcal.device.trajectory import Plan, friction_plan
+from scissorcal.device import (
+    Plan,
+    advance_plan,
+    cut_plan,
+    friction_plan,
+    hand_travel,
+    identity_facts,
+)
 from scissorcal.kernel import Capability, Identity, StateFlag
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from scissorcal.recording import SAMPLE_DTYPE, Joint, Kind, Recording, Stroke, label_strokes
 
 from .hand import hand_timeline

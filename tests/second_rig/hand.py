@@ -3,7 +3,7 @@
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.device.trajectory import Plan
+from scissorcal.device import Plan
 
 from .parameters import Rig
 from .simulate import HAND, Timeline

@@ -3,8 +3,7 @@
 import math
 from dataclasses import replace
 
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe, builtin_recipe
 
 from .parameters import Blades, Friction, Material, Mechanism, Motor, Rig, Sensors, Servo
 

@@ -77,7 +77,7 @@ def test_empty_sweeps_keep_energy_too() -> None:
 
 
 def part_of_a_cut(rig: Rig, ticks: int) -> Timeline:
-    from scissorcal.device.cut_trajectory import cut_plan
+    from scissorcal.device import cut_plan
     from tests.second_rig import identity_of
 
     whole = driven_timeline(cut_plan(recipe_for(rig, sheets=1), identity_of(rig)))

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.control import world as first_world
 from scipy.spatial.transform import Rotation
 
-from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
+from scissorcal.model import Cylinder, Plane, Sphere, Surface
 
 from . import SHAPES, Scene, draw_world
 from .motion import SPEED_M_PER_S, SPIN_RAD_PER_S, moved

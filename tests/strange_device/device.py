@@ -34,7 +34,7 @@ class StrangeDevice:
         self.rng = np.random.default_rng(seed)
         low = OPENING_LOW if f.jammed_at_rad is None else f.jammed_at_rad
         self.blades = Axis(f.inertia, 4e-3, f.dry_Nm, low, OPENING_HIGH, 0.6)
-        self.sledge = Axis(0.35, 3.0, 0.6, ADVANCE_LOW, ADVANCE_HIGH, -0.05)
+        self.carriage = Axis(0.35, 3.0, 0.6, ADVANCE_LOW, ADVANCE_HIGH, -0.05)
         self.hand: Hand | None = None
         self.sheet: Sheet | None = None
         self.time_s = 0.0
@@ -163,7 +163,7 @@ class StrangeDevice:
         brakes = self._fault
         dt = self.tick_s / SUBSTEPS
         share = 1.0 - math.exp(-dt / f.motor_lag_s) if f.motor_lag_s > 0.0 else 1.0
-        blades, sledge = self.blades, self.sledge
+        blades, carriage = self.blades, self.carriage
         for step in range(SUBSTEPS):
             self._motor += share * (given - self._motor)
             motor = f.motor_sign * f.torque_gain * self._motor
@@ -174,9 +174,11 @@ class StrangeDevice:
                 self._hand_torque = self.hand.torque(at, blades.place, blades.rate)
             effort = motor + self._hand_torque - (BRAKE_NM_S * blades.rate if brakes else 0.0)
             if self.sheet is not None:
-                effort += self.sheet.resists(blades.place, sledge.place)
+                effort += self.sheet.resists(blades.place, carriage.place)
             blades.push(effort, dt)
-            sledge.push(f.advance_motor_sign * force - (40.0 * sledge.rate if brakes else 0.0), dt)
+            carriage.push(
+                f.advance_motor_sign * force - (40.0 * carriage.rate if brakes else 0.0), dt
+            )
             self.largest_rate = max(self.largest_rate, abs(blades.rate))
         self.largest_force = max(self.largest_force, abs(force))
 
@@ -188,8 +190,8 @@ class StrangeDevice:
         true = self.blades.place if f.encoder_sign > 0 else middle - self.blades.place
         opening = f.encoder_scale * true + f.encoder_zero_rad + f.encoder_noise_rad * noise[2]
         opening = RESOLUTION_RAD * math.floor(opening / RESOLUTION_RAD)
-        sledge = self.sledge.place if f.advance_encoder_sign > 0 else -self.sledge.place
-        advance = RESOLUTION_M * math.floor(sledge / RESOLUTION_M)
+        carriage = self.carriage.place if f.advance_encoder_sign > 0 else -self.carriage.place
+        advance = RESOLUTION_M * math.floor(carriage / RESOLUTION_M)
         torque = 0.0 if f.measured_frozen else f.measured_gain * self._motor
         torque += f.measured_zero_Nm + TORQUE_NOISE_NM * noise[0]
         force = -self._hand_torque / RADIUS_M * f.force_gain

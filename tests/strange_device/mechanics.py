@@ -1,4 +1,4 @@
-"""Blades and sledge: inertia, viscous and dry friction, stops; a hand and a sheet act on them."""
+"""Blades and carriage: inertia, viscous and dry friction, stops; a hand and a sheet act on them."""
 
 import math
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """A strange device in virtual time, as a link that scissorcal takes."""
 
-from scissorcal.device.link import check_echo, check_identity
+from scissorcal.device import check_echo, check_identity
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Config, ConfigEcho, Hello, Identity, decode, encode
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scissorcal.device import Reference
 from scissorcal.device.open_motion import open_motion
-from scissorcal.device.paths import Reference
 from scissorcal.kernel import ServoConfig, StopReason
 
 from . import FAULTS, StrangeDevice, VirtualPort, wire

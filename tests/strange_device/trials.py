@@ -7,18 +7,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from scissorcal.device.capture import capture, open_writer
+from scissorcal.device import Operator, RigSession, open_writer, unloaded_sentence
+from scissorcal.device.capture import capture
 from scissorcal.device.probe.probe import probe
-from scissorcal.device.recorder import unloaded_sentence
-from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError, ScissorcalError
 from scissorcal.package import ModelPackage
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe, builtin_recipe
 from scissorcal.recording import Recording, read_recording
-from scissorcal.render import Rendering, render
+from scissorcal.render import Rendering, RigFacts, render
 from scissorcal.render import open_writer as open_render_writer
-from scissorcal.render.rig_facts import RigFacts
 from scissorcal.verdicts import failed
 
 from .device import StrangeDevice
@@ -117,7 +114,7 @@ def render_trial(
 ) -> Outcome:
     """Render on a device with one fault, a hand at the handles; ``rig`` is what is known of it."""
     device = StrangeDevice(faults or FAULTS[name], seed=SEED)
-    device.sledge.place = RENDER_ADVANCE_M
+    device.carriage.place = RENDER_ADVANCE_M
     device.blades.place = Hand().high
     path = folder / "render.mcap"
 

@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 
-from scissorcal.model.blade_point import BladePoint
-from scissorcal.model.friction import FrictionLaw
-from scissorcal.model.mechanism import AxisLaw
-from scissorcal.model.surface import Plane
+from scissorcal.model import AxisLaw, BladePoint, FrictionLaw, Plane
 from scissorcal.tracking.contacts import EVERY_S, TipContact, TipContacts
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.tracker import Outcome, PoseTracker

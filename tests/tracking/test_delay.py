@@ -6,7 +6,7 @@ from benchmarks.control.pose_run import settings_for
 from benchmarks.control.world import Scenario, circle, make_world, plane
 from scipy.stats import chi2
 
-from scissorcal.model.surface import Plane
+from scissorcal.model import Plane
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.delay import DelayFit, _last, measure_delay
 from scissorcal.tracking.rows import CameraPose

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from scissorcal.aliases import Array
 from scissorcal.errors import DeviceError
-from scissorcal.model.surface import Plane
+from scissorcal.model import Plane
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PoseFollower
 from scissorcal.tracking.rotation import pose_error

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.control.pose_run import settings_for
 from benchmarks.control.world import Scenario
 
-from scissorcal.model.surface import Plane
+from scissorcal.model import Plane
 from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PoseFollower
 from scissorcal.tracking.judge import RowCounts, TrackFigures, track_figures, track_verdicts

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from scissorcal.model.surface import Cylinder, Plane, Sphere, Surface
+from scissorcal.model import Cylinder, Plane, Sphere, Surface
 from scissorcal.tracking.filter import RIG_BIAS, SIZE, FilterState, start_state
 from scissorcal.tracking.rows import (
     CameraPose,

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import parse_recipe, read_text
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe, parse_recipe, read_text, recipe_path
 from scissorcal.tracking.filter import BIAS, POSE, start_state
 from scissorcal.tracking.settings import TrackingSettings, settings_of
 

@@ -10,7 +10,7 @@ from benchmarks.control.world import Scenario, World, circle, make_world, plane
 from scipy.spatial.transform import Rotation
 
 from scissorcal.errors import InputError
-from scissorcal.model.surface import Plane
+from scissorcal.model import Plane
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import ForceErrors, TrackingSettings
 from scissorcal.tracking.tracker import Outcome, PoseTracker

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from scissorcal.device.sim.plate_contact import plate_pose
-from scissorcal.device.sim.specimen import load_specimen
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.device import load_specimen, plate_pose
+from scissorcal.recipe import builtin_recipe
 from scissorcal.vision.sim.sim_camera import sim_plate_scene, touched_plate
 
 

@@ -8,31 +8,22 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.device.motion import Samples
-from scissorcal.device.session import RigSession
-from scissorcal.device.sim.specimen import Specimen, load_specimen
+from scissorcal.device import RigSession, Samples, Specimen, load_specimen
 from scissorcal.kernel import ConfigKey, SampleFlag
-from scissorcal.model.mechanism import AxisLaw
-from scissorcal.model.surface import Plane
+from scissorcal.model import AxisLaw, Plane
 from scissorcal.package import ModelPackage
-from scissorcal.recipe.load import parse_recipe
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe, parse_recipe
 from scissorcal.recording import read_recording
 from scissorcal.render import (
-    PlatePose,
     Rendering,
     RenderResult,
     VirtualStrokes,
     open_writer,
     render,
+    rendered_tables,
 )
-from scissorcal.render.admission import rendered_tables
-from scissorcal.tracking.contacts import TipContacts
-from scissorcal.tracking.rotation import pose_error
-from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.rig_frame import PicturePose
-from scissorcal.vision.live import Frame
-from scissorcal.vision.sim.sim_camera import SIM_LENS
+from scissorcal.tracking import PlatePose, TipContacts, pose_error
+from scissorcal.vision import SIM_LENS, Frame, PicturePose, Pose
 from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.inputs import REST_RATE_RAD_PER_S
 from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession

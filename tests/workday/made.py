@@ -48,7 +48,7 @@ speeds_rad_per_s = [0.1, 0.3, 0.8]
 effort = "draft"
 
 [fit.friction]
-rung = "coulomb+viscous"
+law = "coulomb+viscous"
 symmetry = "symmetric"
 
 [fit.cut]
@@ -60,7 +60,7 @@ toughness_J_per_m2 = { median = 5000.0, factor_90 = 10.0 }
 
 
 def quick_workspace(folder: Path) -> Workspace:
-    """Make a workspace whose fits try one rung only, at draft effort."""
+    """Make a workspace whose fits try one candidate only, at draft effort."""
     folder.mkdir(parents=True)
     workspace = Workspace(folder)
     workspace.recipe_path.write_text(RECIPE, encoding="utf-8")

@@ -6,10 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scissorcal.device import Faults, LockstepLink, Operator, RigSession
 from scissorcal.device import capture as rig_capture
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import Operator, RigSession
-from scissorcal.device.sim.faults import Faults
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import StopReason
 from scissorcal.recording import read_recording, write_recording

@@ -10,9 +10,9 @@ import pytest
 from scissorcal.identity import file_digest
 from scissorcal.kernel import ModelTables, PiecesModel
 from scissorcal.package import ModelPackage, open_package
-from scissorcal.recipe.library import recipe_path
+from scissorcal.recipe import recipe_path
 from scissorcal.recording import read_recording
-from scissorcal.render.derating import needs_on, softened
+from scissorcal.render import needs_on, softened
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.reviewed import reviewed_content

@@ -15,20 +15,12 @@ import numpy as np
 import pytest
 
 from scissorcal.aliases import Array
+from scissorcal.device import Blade, Cut, LockstepLink, RigSession, Sheet, Specimen, blade_on
 from scissorcal.device import capture as rig_capture
-from scissorcal.device.crossing import Blade
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import RigSession
-from scissorcal.device.sim.blade import blade_on
-from scissorcal.device.sim.cutting import Cut
-from scissorcal.device.sim.material import Sheet
-from scissorcal.device.sim.specimen import Specimen
 from scissorcal.errors import InputError
 from scissorcal.kernel import Kernel
-from scissorcal.package import ModelPackage, open_package
-from scissorcal.package.build import build_package
-from scissorcal.recipe.edge import edge_sentence, stated_curve
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.package import ModelPackage, build_package, open_package
+from scissorcal.recipe import edge_sentence, parse_recipe, stated_curve
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.plan import make_plan

@@ -10,11 +10,9 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from scissorcal.calibration.store import load_fit, save
-from scissorcal.calibration.verify.result import VerifyResult
-from scissorcal.device.capture import capture, open_writer
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import RigSession
+from scissorcal.calibration import VerifyResult, load_fit, save
+from scissorcal.device import LockstepLink, RigSession, open_writer
+from scissorcal.device.capture import capture
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recording import read_recording, write_recording
 from scissorcal.verdicts import Status, Verdict
@@ -244,7 +242,7 @@ def check_of(workspace: Workspace, what: Literal["friction", "cut"], status: Sta
         format="scissorcal-verify/1",
         what=what,
         fit_hash=fit.inputs_hash,
-        rung=fit.rung,
+        candidate=fit.candidate,
         effort=fit.effort,
         seed=0,
         calibration=None,

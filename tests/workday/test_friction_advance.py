@@ -1,4 +1,4 @@
-"""The sledge's friction among the steps: only where a scene needs it, or where it was asked for."""
+"""The carriage's friction among the steps: where a scene needs it, or where it was asked for."""
 
 import re
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from scissorcal.errors import InputError, MissingError
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe import parse_recipe
 from scissorcal.recipe.requirements import requirements
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import restore, versions
@@ -27,7 +27,7 @@ repeats = 1
 excitation_s = 3.0
 
 [fit.friction_advance]
-rung = "coulomb+viscous"
+law = "coulomb+viscous"
 symmetry = "symmetric"
 critic = false
 """
@@ -51,7 +51,7 @@ def workspace(tmp_path: Path) -> Workspace:
 
 @pytest.fixture(scope="module")
 def day(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
-    """A workspace with a capture and a fit of the sledge."""
+    """A workspace with a capture and a fit of the carriage."""
     made = create_workspace(tmp_path_factory.mktemp("advance") / "work", "paper-80gsm")
     with made.recipe_path.open("a", encoding="utf-8") as file:
         file.write(SHORT)
@@ -72,7 +72,7 @@ def test_a_force_along_the_cut_with_friction_needs_it(workspace):
     assert shown(workspace) == STEPS
     plan = make_plan(workspace)
     (step,) = [step for step in plan.steps if step.name == f"fit {NAME}"]
-    assert "the sledge's own comes on top" in step.why
+    assert "the carriage's own comes on top" in step.why
     assert step.command == "scissorcal fit friction --axis advance"
     without = parse_recipe(text.replace("render_friction = true", "render_friction = false"))
     assert not requirements(without).needs_capture(NAME)
@@ -150,6 +150,6 @@ def test_a_capture_without_travel_is_refused_before_the_rig_is_probed(workspace)
 
 def test_its_recordings_can_be_excluded(workspace):
     captured = capture_into(workspace, "friction-advance", SIM_RIG)
-    exclude_recording(workspace, captured.path.name, "the sledge was held")
+    exclude_recording(workspace, captured.path.name, "the carriage was held")
     found = Engine.of(workspace).state(f"capture {NAME}")
     assert (found.state, found.found) == ("missing", "every recording is excluded")

@@ -14,15 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scissorcal.calibration import FitResult
-from scissorcal.calibration.cut.laws import allowed_laws
-from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.trajectory import friction_plan
+from scissorcal.calibration import FitResult, allowed_laws
+from scissorcal.device import cut_plan, friction_plan
 from scissorcal.package import ModelPackage, build_package, open_package
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import parse_recipe
+from scissorcal.recipe import Recipe, parse_recipe, recipe_path
 from scissorcal.recipe.requirements import requirements
-from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.steps import BY_NAME
 from scissorcal.workday.workspace import Workspace

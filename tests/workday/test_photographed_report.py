@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.calibration.plate.result import PlateFit
-from scissorcal.calibration.store import load, save
+from scissorcal.calibration import PlateFit, load, save
 from scissorcal.errors import InputError, MissingError
 from scissorcal.identity import file_digest
 from scissorcal.workday.engine import Engine

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.device.session import RigSession
+from scissorcal.device import RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.sim_world import SimWorld

@@ -6,8 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from scissorcal.device.link import PortLink
-from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device import LockstepLink, PortLink
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey
 from scissorcal.workday.rigs import open_rig

@@ -7,7 +7,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from scissorcal.recipe.library import recipe_names, recipe_path, schemas_dir
+from scissorcal.recipe import recipe_names, recipe_path, schemas_dir
 from scissorcal.workday.schemas import SOURCES, fallen_behind, generate, main, write
 
 

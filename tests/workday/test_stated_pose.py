@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from scissorcal.device.sim.plate_contact import plate_pose
-from scissorcal.device.sim.specimen import TouchedPlate
+from scissorcal.device import TouchedPlate, plate_pose
 from scissorcal.errors import InputError
-from scissorcal.tracking.plate_pose import level_plate
+from scissorcal.tracking import level_plate
 from scissorcal.workday.tracking.stated_pose import stated_pose
 
 SAME = (

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from scissorcal.calibration.design import CaptureList, choose_captures
-from scissorcal.calibration.design.choice import first_captures
-from scissorcal.calibration.design.state import expected_cut, expected_friction
-from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.trajectory import friction_plan
-from scissorcal.package.scene_slopes import torque_knowledge
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.load import parse_recipe
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recipe.show import with_designed_captures
+from scissorcal.calibration import (
+    CaptureList,
+    choose_captures,
+    expected_cut,
+    expected_friction,
+    first_captures,
+)
+from scissorcal.device import cut_plan, friction_plan
+from scissorcal.package import torque_knowledge
+from scissorcal.recipe import Recipe, builtin_recipe, parse_recipe, with_designed_captures
 from scissorcal.workday.stock import (
     capture_stock,
     designed_recipe,
@@ -44,7 +44,7 @@ def test_what_a_list_lacks_stays_as_the_recipe_has_it() -> None:
 
 
 def test_the_text_of_a_designed_recipe_says_what_it_captures() -> None:
-    from scissorcal.recipe.library import recipe_path
+    from scissorcal.recipe import recipe_path
 
     text = recipe_path("paper-80gsm").read_text(encoding="utf-8")
     recipe = designed_recipe(parse_recipe(text), LIST)
@@ -79,8 +79,8 @@ def test_a_designed_list_takes_the_minutes_that_its_plan_takes(name: str) -> Non
     cut = expected_cut(recipe, friction)
     identity = nominal_identity(recipe)
     stock = capture_stock(recipe, identity, friction, cut)
-    for told in (one.told.scores for one in stock.sweeps.values()):
-        values = np.linalg.eigvalsh(told)
+    for scores in (one.information.scores for one in stock.sweeps.values()):
+        values = np.linalg.eigvalsh(scores)
         assert values.min() > -1e-12 * values.max()
     least = first_captures(stock)
     wanted = designed_recipe(recipe, least)

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from scissorcal.device.sim.specimen import Specimen, load_specimen
-from scissorcal.device.sim.truth import average_torque
+from scissorcal.device import Specimen, average_torque, load_specimen
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from scissorcal.workday.demo.day import torque_error
 
 

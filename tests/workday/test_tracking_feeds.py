@@ -1,4 +1,4 @@
-"""Where a track's events come from: threads, sources that do not fit, devices without a sledge."""
+"""A track's sources of events: threads, sources that do not fit, devices without a carriage."""
 
 import threading
 import time
@@ -12,13 +12,13 @@ import pytest
 
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.recording import SAMPLE_DTYPE
-from scissorcal.vision.live import Frame, LocatedFrame, timed
+from scissorcal.vision import Frame, LocatedFrame, timed
 from scissorcal.workday.tracking import feeds
 from scissorcal.workday.tracking.feeds import (
     CameraThread,
     live_feed,
     refuse_strange_pairs,
-    refuse_without_sledge,
+    refuse_without_carriage,
 )
 from scissorcal.workday.tracking.track_recorder import TrackPicture
 from tests.guard import GUARD_S
@@ -194,13 +194,13 @@ def test_sources_that_fit_are_taken(camera: str, device: str) -> None:
     refuse_strange_pairs(camera, device)
 
 
-def test_a_device_without_a_sledge_is_named() -> None:
+def test_a_device_without_a_carriage_is_named() -> None:
     identity = SimpleNamespace(name="scissors", advance_min=0.0, advance_max=0.0)
     link: Any = SimpleNamespace(identity=identity)
-    with pytest.raises(DeviceError, match=r"device scissors has no sledge.*--device none"):
-        refuse_without_sledge(link)
+    with pytest.raises(DeviceError, match=r"device scissors has no carriage.*--device none"):
+        refuse_without_carriage(link)
     identity.advance_max = 0.1
-    refuse_without_sledge(link)
+    refuse_without_carriage(link)
 
 
 @pytest.mark.parametrize("rate_Hz", [0.0, float("inf"), 1e6, -30.0])

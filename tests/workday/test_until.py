@@ -5,14 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.design import expected_band
-from scissorcal.device.parts import Part
-from scissorcal.package.scene_slopes import torque_knowledge
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import Joint, Recording, Stroke
-from scissorcal.recording.layout import empty_samples
-from scissorcal.recording.until import UntilMark
+from scissorcal.calibration import expected_band
+from scissorcal.device import Part
+from scissorcal.package import torque_knowledge
+from scissorcal.recipe import Recipe, builtin_recipe
+from scissorcal.recording import Joint, Recording, Stroke, UntilMark, empty_samples
 from scissorcal.workday.stock import EXCITATION_S
 from scissorcal.workday.until import (
     NO_FIT,
@@ -79,7 +76,7 @@ def after_a_failed_fit(recipe: Recipe) -> tuple[UntilMark, Part | None]:
     choose = UntilTolerance("friction", recipe, IDENTITY, Earlier(), Limits(60.0))
     part = choose(NOTHING, 0.0)
     assert part is not None
-    told = [offer.told for offer in choose._stock.sweeps.values()]
+    told = [offer.information for offer in choose._stock.sweeps.values()]
     knowledge = choose._friction.knowledge.plus(sum(told[1:], told[0]))
     choose._friction = replace(choose._friction, knowledge=knowledge)
     following = choose(replace(NOTHING, strokes=part.strokes), 0.0)
@@ -108,7 +105,7 @@ def test_friction_that_is_not_rendered_is_judged_by_what_was_measured() -> None:
     choose = UntilTolerance("friction", recipe, IDENTITY, Earlier(), Limits(4.0))
     known = torque_knowledge(recipe, choose._friction, choose._cut)
     assert not choose._judge(known).reached
-    told = [offer.told for offer in choose._stock.sweeps.values()]
+    told = [offer.information for offer in choose._stock.sweeps.values()]
     assert choose._judge(known.plus(sum(told[1:], told[0]))).reached
 
 

@@ -7,21 +7,12 @@ import numpy as np
 from benchmarks.consistency import nees
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.plate.fit import plate_target
-from scissorcal.device.motion import Motion
-from scissorcal.device.session import RigSession
-from scissorcal.model.blade_point import BladePoint
-from scissorcal.model.surface import Plane
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import parse_recipe, read_text
-from scissorcal.recipe.priors import PlatePriors
-from scissorcal.recipe.schema import Recipe
-from scissorcal.tracking.contacts import TipContacts
-from scissorcal.tracking.rotation import pose_error
-from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.rig_frame import RigPose
-from scissorcal.vision.sim.sim_camera import SIM_LENS, sim_plate_scene
+from scissorcal.calibration import plate_target
+from scissorcal.device import Motion, RigSession
+from scissorcal.model import BladePoint, Plane
+from scissorcal.recipe import PlatePriors, Recipe, parse_recipe, read_text, recipe_path
+from scissorcal.tracking import TipContacts, pose_error
+from scissorcal.vision import SIM_LENS, Camera, Pose, RigPose, sim_plate_scene
 from scissorcal.workday.tracking.feeds import idle_rig, sim_feed, sim_rig_feed
 from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import SimCamera, SimWorld

@@ -1,52 +1,5 @@
 """From recordings and photographs to fits: recording + model + inference -> result."""
 
-import importlib
-from typing import TYPE_CHECKING, Any
+import lazy_loader
 
-if TYPE_CHECKING:
-    from scissorcal.calibration.cut import CutExperiment, cut_experiment, cutting_from, fit_cut
-    from scissorcal.calibration.fit_model import CutRun, Experiment, FrictionRun
-    from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
-    from scissorcal.calibration.friction.model import FrictionExperiment
-    from scissorcal.calibration.result import FitResult, FitSeries, FittedParameter, StrokeError
-    from scissorcal.calibration.store import load, load_any_fit, load_fit, read_header, save
-
-__all__ = [
-    "CutExperiment",
-    "CutRun",
-    "Experiment",
-    "FitResult",
-    "FitSeries",
-    "FittedParameter",
-    "FrictionExperiment",
-    "FrictionRun",
-    "StrokeError",
-    "cut_experiment",
-    "cutting_from",
-    "fit_cut",
-    "fit_friction",
-    "friction_experiment",
-    "load",
-    "load_any_fit",
-    "load_fit",
-    "read_header",
-    "save",
-]
-
-_HOMES = {
-    "cut.fit": ("cut_experiment", "fit_cut"),
-    "cut.model": ("CutExperiment",),
-    "cut.structure": ("cutting_from",),
-    "fit_model": ("CutRun", "Experiment", "FrictionRun"),
-    "friction.fit": ("fit_friction", "friction_experiment"),
-    "friction.model": ("FrictionExperiment",),
-    "result": ("FitResult", "FitSeries", "FittedParameter", "StrokeError"),
-    "store": ("load", "load_any_fit", "load_fit", "read_header", "save"),
-}
-
-
-def __getattr__(name: str) -> Any:
-    for home, names in _HOMES.items():
-        if name in names:
-            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

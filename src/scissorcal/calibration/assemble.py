@@ -99,11 +99,11 @@ def assemble(
     return FitResult(
         what=what,
         effort=outcome.effort,
-        rung=chosen.candidate.name,
+        candidate=chosen.candidate.name,
         structure=outcome.structure,
         series=series,
         held_out=held_out,
-        rungs=rows,
+        candidates=rows,
         diagnostics=diagnostics,
         verdicts=(*trust, *particulars.verdicts),
         effort_unit=joint.effort_unit,

@@ -138,23 +138,23 @@ class BetweenRecordings:
 
     def notes(self, nuisance: tuple[str, ...]) -> tuple[str, ...]:
         """Which parameters differ by recording and by how much, in one sentence."""
-        told = []
+        differences = []
         for i, parameter in enumerate(self.layout.parameters):
             if parameter.name in nuisance or self.largest_z[i] < FAR_APART:
                 continue
             values = self.layout.columns(self.points)[:, i]
-            told.append(
+            differences.append(
                 f"{parameter.name} from {values.min():.4g} to {values.max():.4g} {parameter.unit} "
                 f"({self.largest_z[i]:.1f} standard deviations)"
             )
         head = f"{len(self.points)} recordings were fitted each by itself. "
-        if not told:
+        if not differences:
             return (
                 f"{head}Their parameters agree within {FAR_APART:g} standard deviations; so few "
                 "recordings could agree by chance, and the intervals allow for that.",
             )
         return (
-            f"{head}They differ in {', '.join(told)}. The intervals are of the mean over "
+            f"{head}They differ in {', '.join(differences)}. The intervals are of the mean over "
             "recordings and include this; a single new recording may lie as far away as these.",
         )
 
@@ -276,8 +276,8 @@ def jackknife(
     of their information to one group are left out, as no other repeats it; empty for fewer than
     three strokes.
     """
-    rung = design.candidate(design.observed)
-    law, problem = rung.reduced, rung.problem(design.series)
+    candidate = design.candidate(design.observed)
+    law, problem = candidate.reduced, candidate.problem(design.series)
     if not isinstance(law, ReducedLaw) or len(law.moments.labels) < 3:
         return {}
     full, information = design.layout.columns(point), np.diag(law.information(point))
@@ -295,8 +295,8 @@ def jackknife(
     variance = np.mean((pseudo - centre) ** 2 / (size - 1.0), axis=0)
     return {
         name: float(np.sqrt(value))
-        for name, value, told in zip(design.layout.names, variance, repeated, strict=True)
-        if told and name not in nuisance
+        for name, value, determined in zip(design.layout.names, variance, repeated, strict=True)
+        if determined and name not in nuisance
     }
 
 
@@ -309,8 +309,8 @@ def _inferred(
 ) -> Posterior:
     """Normal approximation of the posterior by the bins (n,) of one recording."""
     outside = np.setdiff1d(law.moments.labels, np.unique(design.strokes[here]))
-    rung = replace(design.candidate(design.observed), starts=point[None, :])
-    over = replace(rung.problem(design.series, here), reduced=law.without(outside))
+    candidate = replace(design.candidate(design.observed), starts=point[None, :])
+    over = replace(candidate.problem(design.series, here), reduced=law.without(outside))
     return infer(over, "draft", rng, optimum=search(over))
 
 

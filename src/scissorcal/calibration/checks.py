@@ -68,8 +68,8 @@ def trust_verdicts(
     """Judge a fit: its numbers, search, draws, bounds, data, strokes, unseen strokes."""
     chosen, posterior, design = outcome.chosen, outcome.posterior, outcome.design
     what, contact = design.what, design.contact(outcome.point)
-    believed = (p.name for p in chosen.candidate.layout.parameters if p.believed)
-    nuisance = (*design.nuisance, *believed)
+    from_others = (p.name for p in chosen.candidate.layout.parameters if p.measured_prior)
+    nuisance = (*design.nuisance, *from_others)
     verdicts = (
         _finite(chosen, posterior, diagnostics),
         _search(posterior, nuisance),

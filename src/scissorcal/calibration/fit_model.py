@@ -12,7 +12,7 @@ from scissorcal.calibration.result import Effort
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.zeros import FELT
 from scissorcal.inference import Posterior, Stop
-from scissorcal.model import EdgeBelief
+from scissorcal.model import EdgeDistribution
 from scissorcal.verdicts import Verdict
 
 
@@ -131,7 +131,7 @@ class CutRun(FitRun):
     Where one of ``edge_verdicts``, those on that edge, failed, the fit fails too.
     """
 
-    edge: EdgeBelief | None = None
+    edge: EdgeDistribution | None = None
     edge_verdicts: tuple[Verdict, ...] = ()
 
 
@@ -140,7 +140,7 @@ class Named(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of the law, as :attr:`FitResult.rung` has it."""
+        """Name of the law, as :attr:`FitResult.candidate` has it."""
         ...
 
 
@@ -157,7 +157,7 @@ def candidates_for(
     """The candidates that are fitted at an effort, simplest first.
 
     Draft fits one: the only one that the recipe leaves, else the one that the last fit of the
-    workspace chose (``last_chosen``, its :attr:`FitResult.rung`), else the one that such data
+    workspace chose (``last_chosen``, its :attr:`FitResult.candidate`), else the one that such data
     usually support, which ``usual`` picks of them. Standard and thorough compare all of them, or
     those that ``among`` names, if any. A name that no candidate has is passed over: the recipe may
     have changed since. ValueError where there is no candidate.

@@ -117,7 +117,7 @@ def edge_picture(photo: BladePhoto, fits: Mapping[str, BladeFit]) -> NDArray[np.
     edges, marks = [], []
     for name, measured in zip(photo.names, photo.measured, strict=True):
         fit = fits[name]
-        unit = measured.length / fit.belief.edge.length_m if not measured.metric else 1.0
+        unit = measured.length / fit.edge_posterior.edge.length_m if not measured.metric else 1.0
         edges.append(_scaled_edge(fit, unit))
         marks.append(
             [
@@ -129,7 +129,7 @@ def edge_picture(photo: BladePhoto, fits: Mapping[str, BladeFit]) -> NDArray[np.
 
 
 def _scaled_edge(fit: BladeFit, unit: float) -> Callable[[Array], Array]:
-    edge = fit.belief.edge
+    edge = fit.edge_posterior.edge
     return lambda station: edge.offset_at(station / unit) * unit
 
 

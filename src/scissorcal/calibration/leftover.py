@@ -96,11 +96,11 @@ class Leftover:
         for name, indices in self.findings.items():
             used = [i for i in indices if i in own]
             if used:
-                along, told = scores[:, used], squares[:, used] @ free[:, used]
-                told = told.reshape(len(along), -1)
+                along, unit = scores[:, used], squares[:, used] @ free[:, used]
+                unit = unit.reshape(len(along), -1)
                 if len(indices) == 1:
-                    along, told = _summed(along, self.piece), _summed(told, self.piece)
-                found[name] = _chance(along, told.reshape(-1, len(used), len(used)), variance)
+                    along, unit = _summed(along, self.piece), _summed(unit, self.piece)
+                found[name] = _chance(along, unit.reshape(-1, len(used), len(used)), variance)
         return {name: min(1.0, len(found) * chance) for name, chance in found.items()}
 
     def weighed(self, weights: Array) -> tuple[Array, Array]:
@@ -335,19 +335,19 @@ def course_of(bins: Bins, load: Array | None) -> Course:
     )
 
 
-def _chance(scores: Array, told: Array, variance: float) -> float:
-    """Chance of what pieces say of terms together: ``scores`` (k, q), and ``told`` (k, q, q).
+def _chance(scores: Array, unit: Array, variance: float) -> float:
+    """Chance of what pieces say of terms together: ``scores`` (k, q), and ``unit`` (k, q, q).
 
     The latter are the scores that a coefficient of one would give.
     """
     from scipy.special import chdtrc, fdtrc
 
-    total, summed = told.sum(axis=0), scores.sum(axis=0)
+    total, summed = unit.sum(axis=0), scores.sum(axis=0)
     count = len(total)
     inverse = np.linalg.pinv(total, hermitian=True)
     by_noise = float(chdtrc(count, summed @ inverse @ summed / variance))
-    weight = np.einsum("kij,ji->k", told, inverse) / count
-    apart = scores - told @ (inverse @ summed)
+    weight = np.einsum("kij,ji->k", unit, inverse) / count
+    apart = scores - unit @ (inverse @ summed)
     apart /= np.sqrt(np.maximum(1.0 - weight, WITHIN_ROUNDING))[:, None]
     squared = float(summed @ np.linalg.pinv(apart.T @ apart, hermitian=True) @ summed)
     freedom = 1.0 / float(np.sum(weight**2)) - count

@@ -14,8 +14,8 @@ from scissorcal.model.transforms import Transform
 class Parameter:
     """One parameter with its prior: normal in u, where its value is ``transform.natural(u)``.
 
-    ``mean`` and ``sd`` are the prior's in u. ``believed`` marks a prior from other measurements:
-    these data need not narrow it.
+    ``mean`` and ``sd`` are the prior's in u. ``measured_prior`` marks a prior from other
+    measurements: these data need not narrow it.
     """
 
     name: str
@@ -24,7 +24,7 @@ class Parameter:
     mean: float
     sd: float
     meaning: str
-    believed: bool = False
+    measured_prior: bool = False
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Layout:
                     **FittedParameter.summary_of(natural[:, index]),
                     identifiability=float(min(u.std(ddof=1) / parameter.sd, 1.0)),
                     meaning=parameter.meaning,
-                    believed=parameter.believed,
+                    measured_prior=parameter.measured_prior,
                 )
             )
         return tuple(rows)

@@ -48,9 +48,9 @@ class Result:
     ``title`` names the kind of result in messages, ``command`` computes it again. ``what`` names
     the quantity, ``inputs_hash`` identifies all that the result depends on, as the
     workspace states it (empty outside one). Where a result has
-    them, ``effort``, ``rung`` (the chosen candidate model), ``rungs``, ``verdicts``, ``sources``
-    and ``notes`` are fields. Subclasses are frozen dataclasses with ``repr=False``; the store
-    writes their fields as they are annotated.
+    them, ``effort``, ``candidate`` (the chosen candidate model), ``candidates``, ``verdicts``,
+    ``sources`` and ``notes`` are fields. Subclasses are frozen dataclasses with ``repr=False``; the
+    store writes their fields as they are annotated.
     """
 
     title: ClassVar[str] = "fit"
@@ -61,7 +61,7 @@ class Result:
     @property
     def model(self) -> str:
         """The chosen candidate model in words; empty where there is only one model."""
-        return str(getattr(self, "rung", ""))
+        return str(getattr(self, "candidate", ""))
 
     @property
     def words(self) -> str:
@@ -117,7 +117,7 @@ def in_words(mean: float, sd: float, q05: float, q50: float, q95: float) -> str:
 class FittedParameter:
     """One parameter with its marginal posterior, in ``unit``.
 
-    ``believed`` marks a prior from another measurement, such as photographs of the edge.
+    ``measured_prior`` marks a prior from another measurement, such as photographs of the edge.
     ``identifiability`` is the ratio of posterior to prior standard deviation: near 0 the data
     determine the parameter, near 1 the prior does.
     """
@@ -131,7 +131,7 @@ class FittedParameter:
     q95: float
     identifiability: float
     meaning: str = ""
-    believed: bool = False
+    measured_prior: bool = False
 
     @staticmethod
     def summary_of(draws: Array) -> dict[str, Any]:
@@ -143,8 +143,8 @@ class FittedParameter:
     @property
     def moments(self) -> tuple[float, float] | None:
         """Mean and sd for people to read; None where they do not agree with the quantiles."""
-        told = moments_agree(self.mean, self.sd, self.q05, self.q95)
-        return (self.mean, self.sd) if told else None
+        agree = moments_agree(self.mean, self.sd, self.q05, self.q95)
+        return (self.mean, self.sd) if agree else None
 
     @property
     def words(self) -> str:
@@ -361,37 +361,37 @@ class Predictive:
 class FitResult(Result):
     """The result of one fit: the same type for friction and for a cut.
 
-    ``what`` is "friction" (of the opening), "friction-advance" (of the sledge) or "cut". ``rung``
-    names the chosen candidate model in words ("coulomb + viscous, asymmetric"); ``structure`` holds
-    the discrete choices that, with a draw, define the model (the package compiler reads them).
-    ``draws`` (draws, parameters) are in SI, columns in the order of ``parameters``; ``map_point``
-    has shape (parameters,). ``rungs`` lists the candidates that were compared, cheapest first, each
-    with ``name``, ``bic``, ``held_out_rms``, ``held_out_score``, ``loo``, ``loo_se``,
-    ``loo_k_hat``, ``chosen`` (it is the one used) and ``equivalent`` (not distinguishable from the
-    best); ``selection`` is the same in words. ``critic`` holds the terms that the critic proposes,
-    ``proposed`` (n,) what they add to the law at the points of ``series``, ``replay`` the
-    comparison with record-and-replay. ``prior_draws`` (k, parameters) are the
-    prior's, in SI. ``nuisance`` and ``nuisance_draws`` (draws, nuisance) are parameters that are
-    inferred and not reported, row by row with ``draws``. ``derived`` follow from parameters and the
-    recipe, with ``derived_draws`` (draws, derived) row by row; no model needs them. ``diagnostics``
-    are plain numbers and strings (k_hat, ess, evaluations, whiteness_p, ...). ``sources`` names the
-    recordings, and ``used`` has an array (k, 2) for each: first and one past the last sample of
-    each part that the fit uses. ``inputs_hash`` identifies recordings, recipe and settings: equal
-    hashes need no second fit.
+    ``what`` is "friction" (of the opening), "friction-advance" (of the carriage) or "cut".
+    ``candidate`` names the chosen candidate model in words ("coulomb + viscous, asymmetric");
+    ``structure`` holds the discrete choices that, with a draw, define the model (the package
+    compiler reads them). ``draws`` (draws, parameters) are in SI, columns in the order of
+    ``parameters``; ``map_point`` has shape (parameters,). ``candidates`` lists the laws that were
+    compared, cheapest first, each with ``name``, ``bic``, ``held_out_rms``, ``held_out_score``,
+    ``loo``, ``loo_se``, ``loo_k_hat``, ``chosen`` (it is the one used) and ``equivalent`` (not
+    distinguishable from the best); ``selection`` is the same in words. ``critic`` holds the terms
+    that the critic proposes, ``proposed`` (n,) what they add to the law at the points of
+    ``series``, ``replay`` the comparison with record-and-replay. ``prior_draws`` (k, parameters)
+    are the prior's, in SI. ``nuisance`` and ``nuisance_draws`` (draws, nuisance) are parameters
+    that are inferred and not reported, row by row with ``draws``. ``derived`` follow from
+    parameters and the recipe, with ``derived_draws`` (draws, derived) row by row; no model needs
+    them. ``diagnostics`` are plain numbers and strings (k_hat, ess, evaluations, whiteness_p, ...).
+    ``sources`` names the recordings, and ``used`` has an array (k, 2) for each: first and one past
+    the last sample of each part that the fit uses. ``inputs_hash`` identifies recordings, recipe
+    and settings: equal hashes need no second fit.
     """
 
     title = "friction or cut fit"
 
     what: Literal["friction", "friction-advance", "cut"]
     effort: Effort
-    rung: str
+    candidate: str
     structure: Mapping[str, Any]
     parameters: tuple[FittedParameter, ...]
     draws: Annotated[Array, by_name("/posterior", "parameters")]
     map_point: Annotated[Array, Stored((), "/optimum", columns="parameters")]
     series: FitSeries
     held_out: tuple[StrokeError, ...]
-    rungs: tuple[Mapping[str, Any], ...]
+    candidates: tuple[Mapping[str, Any], ...]
     diagnostics: Mapping[str, Any]
     verdicts: tuple[Verdict, ...]
     effort_unit: str

@@ -53,6 +53,13 @@ R = TypeVar("R", bound=Result)
 FORMAT = "scissorcal-result/1"
 EARLIER = ("scissorcal-fit/1", "scissorcal-fit/2")
 """Formats of earlier versions, which are refused: the fit is made again."""
+EARLIER_FIELDS = {
+    "rung": "candidate",
+    "rungs": "candidates",
+    "belief": "edge_posterior",
+    "believed": "measured_prior",
+}
+"""What fields are called now that files may have under an old name."""
 COMPRESSED_BYTES = 4096
 """Size from which an array is compressed."""
 FITS = ("friction", "friction-advance", "cut", "camera", "blade", "plate")
@@ -392,6 +399,7 @@ def _object_of(
     kind: Any, value: dict[str, Any], file: _Contents | None, stored: Stored | None
 ) -> Any:
     known = _fields(kind)
+    value = {EARLIER_FIELDS.get(name, name): item for name, item in value.items()}
     every = {one.name for one in fields(kind)} | set(getattr(kind, "also_written", ()))
     if unknown := value.keys() - every:
         raise ValueError(f"{kind.__name__} has the unknown {', '.join(sorted(unknown))}")

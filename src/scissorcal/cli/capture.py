@@ -98,7 +98,7 @@ def friction(
 ) -> Answer:
     """Record empty closing and opening at several speeds, then excited motion for the inertia.
 
-    Keep the space between the blades empty: the motors move them. --axis advance moves the sledge
+    Keep the space between the blades empty: the motors move them. --axis advance moves the carriage
     instead, forward and backward, the blades open. With --until-tolerance, friction
     ends where it takes half of the scene's tolerance, or, where the material is fitted already,
     where both together are within it.

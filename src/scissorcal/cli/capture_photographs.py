@@ -14,7 +14,7 @@ import typer
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import RIG, Folder, options_of
 from scissorcal.cli.output import Answer, command, note
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, warn_of_old_word
 
 if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
@@ -202,7 +202,7 @@ class PlatePhotographs(Photographs):
 @options_of({**_FILES, "source": _SOURCE, "views": typer.Option(min=1, help=_VIEWS_HELP)})
 def plate(
     photographs: PlatePhotographs,
-    stances: Annotated[
+    positions: Annotated[
         str | None,
         typer.Option(
             metavar="FILE|sim",
@@ -210,12 +210,13 @@ def plate(
             "where the rig stood in each: file,advance_mm,opening_deg. sim goes with --camera sim.",
         ),
     ] = None,
+    stances: Annotated[str | None, typer.Option(hidden=True)] = None,
     folder: Folder = None,
 ) -> Answer:
-    """Take in photographs of the plate's target, or of the rig's card at known stances.
+    """Take in photographs of the plate's target, or of the rig's card at known positions.
 
     Take five from one place, without touching camera or plate, and not squarely from the front.
-    With --stances, the photographs locate the camera in the rig's frame: photograph the card at
+    With --positions, the photographs locate the camera in the rig's frame: photograph the card at
     several advances and openings.
 
     \b
@@ -224,35 +225,38 @@ def plate(
       plate-01.jpg: 24 of 24 corners of the plate board, 62 px a side
       ...
     """
+    from scissorcal.vision.rig_positions import read_rig_positions
     from scissorcal.vision.sim.sim_camera import render_card_photographs, standing_plate
-    from scissorcal.vision.stances import read_stances
     from scissorcal.workday.runs.plate import capture_plate
 
     photographs.refuse_two_sources()
+    if stances:
+        warn_of_old_word("--stances", "--positions")
+        positions = positions or stances
     source = photographs.source
-    if source and stances and (source, stances) != ("sim", "sim"):
+    if source and positions and (source, positions) != ("sim", "sim"):
         raise InputError(
-            "The rig's stances are not known in pictures of a running camera: --stances goes with "
-            "--image, or --stances sim with --camera sim."
+            "The rig's positions are not known in pictures of a running camera: --positions goes "
+            "with --image, or --positions sim with --camera sim."
         )
-    known = read_stances(Path(stances)) if stances and not source else None
+    known = read_rig_positions(Path(positions)) if positions and not source else None
     workspace = open_workspace(folder)
 
     def made(scratch: Path) -> Iterable[Path]:
         nonlocal known
         recipe = workspace.recipe()
-        if not stances:
+        if not positions:
             return _plate_pictures(photographs, recipe, scratch)
         known = {
-            path.name: stance
-            for path, stance in render_card_photographs(
+            path.name: position
+            for path, position in render_card_photographs(
                 recipe, scratch, photographs.seed, standing_plate(recipe)
             ).items()
         }
         return [scratch / name for name in known]
 
     with _pictures(photographs, made) as pictures:
-        taken = capture_plate(workspace, pictures, note, stances=known)
+        taken = capture_plate(workspace, pictures, note, positions=known)
     board = taken.capture.index.board
     assert board is not None, "every photograph that is kept shows a target"
     name = board.name

@@ -71,14 +71,14 @@ def demo(
         "workspace": day.workspace,
         "specimen": day.specimen,
         "seed": seed,
-        "rungs": day.rungs,
+        "candidates": day.candidates,
         "panels": [panel],
         "share_inside": day.share_inside,
         "torque_error": day.torque_error,
         "rendering": day.rendering,
     }
     report = _shown(day.workspace / "report" / "report.html")
-    text = "\n".join([*day.rungs, "", panel_text(panel), "", f"report: {report}"])
+    text = "\n".join([*day.candidates, "", panel_text(panel), "", f"report: {report}"])
     return Answer(result, text, day.verdicts, day.files)
 
 

@@ -132,7 +132,7 @@ def friction(
 ) -> Answer:
     """Friction, to recordings of empty motion. See 'scissorcal fit --help'.
 
-    With --axis advance, mass and friction of the sledge, to captures with the same option. They
+    With --axis advance, mass and friction of the carriage, to captures with the same option. They
     rest on the commanded force: no sensor measures one along the cut.
 
     The critic searches what the law leaves for drift, ripple, hysteresis and other terms that recur

@@ -46,7 +46,7 @@ def _pair(seen: "SeenPair") -> str:
 
 def _head(fit: "BladeFit") -> str:
     count = len(fit.photographs)
-    length = fit.belief.edge.length_m
+    length = fit.edge_posterior.edge.length_m
     size = f"{1e3 * length:.2f} mm long" if fit.metric else "of unknown size"
     return f"{fit.name}: {fit.family}, {size}, {count} photograph{'s' if count > 1 else ''}"
 

@@ -37,9 +37,9 @@ def text(outcome: "FitOutcome") -> str:
     size = f"{camera.width} x {camera.height}"
     if fit.origin == "imported":
         return f"camera: {size}, {' '.join(fit.notes)}\n{camera_table(fit)}"
-    head = f"camera: {size}, {len(fit.views)} photographs of the {fit.board}, {fit.rung}"
+    head = f"camera: {size}, {len(fit.views)} photographs of the {fit.board}, {fit.candidate}"
     if outcome.cached:
-        head = f"camera: nothing changed since the last fit; {fit.rung} is as it was"
+        head = f"camera: nothing changed since the last fit; {fit.candidate} is as it was"
     lines = [head, camera_table(fit)]
     together = (
         f"those of one photograph go together: intervals are {fit.stretch:.1f} times as wide for it"
@@ -75,8 +75,8 @@ def facts(outcome: "FitOutcome") -> dict[str, object]:
         "origin": fit.origin,
         "cached": outcome.cached,
         "board": fit.board,
-        "rung": fit.rung,
-        "rungs": fit.rungs,
+        "candidate": fit.candidate,
+        "candidates": fit.candidates,
         "views": fit.views,
         "noise_px": fit.noise_px,
         "stretch": fit.stretch,

@@ -18,11 +18,11 @@ def facts(outcome: "FitOutcome") -> dict[str, object]:
         "what": outcome.what,
         "cached": outcome.cached,
         "state": outcome.state.state,
-        "rung": fitted.rung,
+        "candidate": fitted.candidate,
         "parameters": [parameter.name for parameter in fitted.parameters],
         "effort": fitted.effort,
         "calibration": not fitted.rejected,
-        "rungs": fitted.rungs,
+        "candidates": fitted.candidates,
         "selection": fitted.selection,
         "critic": fitted.critic,
         "replay": fitted.replay,
@@ -36,9 +36,11 @@ def facts(outcome: "FitOutcome") -> dict[str, object]:
 def text(outcome: "FitOutcome") -> str:
     """What people read of a fit of friction or of a cut."""
     fitted: FitResult = outcome.result
-    head = f"{outcome.what}: {fitted.rung} ({fitted.effort})"
+    head = f"{outcome.what}: {fitted.candidate} ({fitted.effort})"
     if outcome.cached:
-        head = f"{outcome.what}: nothing changed since the last fit; {fitted.rung} is as it was"
+        head = (
+            f"{outcome.what}: nothing changed since the last fit; {fitted.candidate} is as it was"
+        )
     if fitted.rejected:
         reasons = "\n".join(f"  {verdict.check}: {verdict.why}" for verdict in fitted.rejected)
         shown = _shown(outcome).replace("\n", "\n  ")

@@ -188,12 +188,12 @@ def _import_all(
             facts.append(answer.result)
             paths += answer.files
     if refused:
-        told = InputError(
+        refusal = InputError(
             f"{len(refused)} of {len(files)} logs were not imported; the other {len(paths)} were:"
             + "".join(f"\n  {sentence}" for sentence in refused)
         )
-        told.kept = tuple(paths)
-        raise told
+        refusal.kept = tuple(paths)
+        raise refusal
     lines.append(f"{len(paths)} logs imported; 'scissorcal recording list' shows them")
     return Answer({"imported": facts}, "\n".join(lines), files=paths)
 

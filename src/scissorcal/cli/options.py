@@ -62,7 +62,7 @@ Axis = Annotated[
     Literal["opening", "advance"],
     typer.Option(
         "--axis",
-        help="Whose friction: that of the blades' opening, or that of the sledge along the cut.",
+        help="Whose friction: that of the blades' opening, or that of the carriage along the cut.",
     ),
 ]
 

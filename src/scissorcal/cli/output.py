@@ -13,6 +13,7 @@ import shlex
 import sys
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -26,6 +27,7 @@ import typer
 from scissorcal.cli.failures import INTERRUPTED, UNEXPECTED, unexpected, user_error
 from scissorcal.cli.options import gathered, parameters_of
 from scissorcal.cli.terminal import drawn, echo, kept, printable, printable_json, style
+from scissorcal.errors import OldWordWarning
 from scissorcal.verdicts import Verdict, failed
 from scissorcal.workday.envelope import Envelope, plain
 
@@ -72,7 +74,8 @@ class _Running:
     def watched(self) -> Iterator[None]:
         """Run a command's function: afterwards its exit code and answer stand, of an error too."""
         try:
-            yield
+            with _old_words_noted():
+                yield
         except (typer.Abort, typer.Exit, typer.TyperException):
             raise
         except KeyboardInterrupt:
@@ -92,6 +95,23 @@ class _Running:
     def _refuse(self, sentence: str, code: int, kept: Sequence[Path] = ()) -> None:
         echo(f"{style('Error:', fg='red')} {sentence}", err=True)
         self.code, self.answer = code, Answer({"error": sentence, "exit_code": code}, files=kept)
+
+
+@contextmanager
+def _old_words_noted() -> Iterator[None]:
+    """Print warnings of old words as notes, each once."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", OldWordWarning)
+        others = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+            if issubclass(category, OldWordWarning):
+                note(f"note: {message}")
+            else:
+                others(message, category, *place, **more)
+
+        warnings.showwarning = show
+        yield
 
 
 _running: ContextVar[_Running | None] = ContextVar("running", default=None)

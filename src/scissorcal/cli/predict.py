@@ -56,7 +56,7 @@ def predict(options: PredictOptions, folder: Folder = None) -> Answer:
         prediction, band, fit = predict_workspace(open_workspace(folder), options, tell)
     result = {
         "what": options.what,
-        "rung": fit.rung,
+        "candidate": fit.candidate,
         "effort_unit": fit.effort_unit,
         "position_unit": fit.position_unit,
         "band": band,
@@ -66,7 +66,7 @@ def predict(options: PredictOptions, folder: Folder = None) -> Answer:
         "moving_s": _moving_s(prediction),
         "samples": len(prediction.time_s),
     }
-    head = f"{options.what}: {fit.rung}, over {_moving_s(prediction):.1f} s of motion"
+    head = f"{options.what}: {fit.candidate}, over {_moving_s(prediction):.1f} s of motion"
     files = [path for path in (options.table, options.plot) if path is not None]
     lines = [head, *_lines(prediction, band, fit.effort_unit), *map(str, files)]
     return Answer(result, "\n".join(lines), files=files)

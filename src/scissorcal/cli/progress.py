@@ -34,7 +34,7 @@ def progress(limit_s: float | None = None, grace_s: float = 0.0) -> Iterator[Pro
     """
     began_s = time.monotonic()
 
-    def told(show: Progress) -> Progress:
+    def reporting(show: Progress) -> Progress:
         def tell(done: float, sentence: str) -> None:
             elapsed_s = time.monotonic() - began_s
             if limit_s is not None and elapsed_s > limit_s + grace_s and done < 1.0:
@@ -49,9 +49,9 @@ def progress(limit_s: float | None = None, grace_s: float = 0.0) -> Iterator[Pro
 
     if sys.stderr.isatty():
         with _bar() as show:
-            yield told(show)
+            yield reporting(show)
     else:
-        yield told(_Lines())
+        yield reporting(_Lines())
 
 
 def pace(done: float, elapsed_s: float) -> str:

@@ -104,7 +104,7 @@ def verify(
     return Answer(
         {"checks": checked},
         "\n\n".join(
-            f"{check.what}: {check.rung} ({check.effort})\n\n"
+            f"{check.what}: {check.candidate} ({check.effort})\n\n"
             f"{panels_text(check_panels(check, check.what))}"
             for check in checked
         ),

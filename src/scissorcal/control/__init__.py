@@ -1,25 +1,5 @@
 """Pressing on a surface and moving along it: gains of the hybrid law from its sampled loop."""
 
-from scissorcal.control.contact_loop import (
-    ContactGains,
-    ContactLoop,
-    contact_decays,
-)
-from scissorcal.control.gains import (
-    HybridGains,
-    approach_speed,
-    choose_gains,
-    contact_gains,
-    friction_rates,
-)
+import lazy_loader
 
-__all__ = [
-    "ContactGains",
-    "ContactLoop",
-    "HybridGains",
-    "approach_speed",
-    "choose_gains",
-    "contact_decays",
-    "contact_gains",
-    "friction_rates",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -129,7 +129,7 @@ def control(
         gains=settings.gains,
         report=report,
         verdicts=control_verdicts(figures, wanted, settings.config, job.material.peak_N, report),
-        warnings=tuple(run.told.values()),
+        warnings=tuple(run.warnings.values()),
     )
 
 
@@ -151,7 +151,7 @@ class _Run:
         self._rows: list[NDArray[np.void]] = []
         self._clock = 0, 0
         self.share = 1.0
-        self.told: dict[str, str] = {}
+        self.warnings: dict[str, str] = {}
 
     def telemetry(self) -> NDArray[np.void]:
         """Samples of CONTROL so far."""
@@ -222,8 +222,8 @@ class _Run:
         return foot
 
     def _note(self, kind: str, sentence: str) -> None:
-        if kind not in self.told:
-            self.told[kind] = sentence
+        if kind not in self.warnings:
+            self.warnings[kind] = sentence
             if self._writer is not None:
                 self._writer.note(sentence)
 

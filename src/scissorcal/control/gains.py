@@ -255,7 +255,7 @@ def _refusal(loops: Sequence[ContactLoop], within_s: float, force_kp: float) -> 
         ]
         return _has_gains(changed, within_s, force_kp)
 
-    told = (
+    sentence = (
         f"No gains hold a force against {1e-3 * worst.stiffness_N_per_m:.3g} N/mm with "
         f"{worst.mass_kg:.2g} kg along the normal, stiffness and mass wrong by factors of "
         f"{worst.stiffness_factor:g} and {worst.mass_factor:g}: an effort acts "
@@ -277,10 +277,10 @@ def _refusal(loops: Sequence[ContactLoop], within_s: float, force_kp: float) -> 
         remedies.append("no force_kp")
     if not remedies:
         return (
-            f"{told} Neither softer material nor a shorter delay alone would do: answer sooner, "
-            "filter the rate less, or know stiffness and mass better."
+            f"{sentence} Neither softer material nor a shorter delay alone would do: answer "
+            "sooner, filter the rate less, or know stiffness and mass better."
         )
-    return f"{told} What would do: {' or '.join(remedies)}."
+    return f"{sentence} What would do: {' or '.join(remedies)}."
 
 
 def _figure(shares: Sequence[float], holds: Callable[[float], bool], whole: float) -> float | None:

@@ -71,8 +71,8 @@ def control_settings(
 ) -> Settings:
     """Configure CONTROL for a path; InputError, before anything moves, where it cannot be done.
 
-    Refused are places that the blades or the sledge do not reach, where a force has no lever on the
-    opening, forces beyond what the motors may give, and stiffness at which no gain is stable.
+    Refused are places that the blades or the carriage do not reach, where a force has no lever on
+    the opening, forces beyond what the motors may give, and stiffness at which no gain is stable.
     """
     contour = path.contour
     torque_limit = min(limits.torque_Nm, identity.torque_limit)
@@ -198,7 +198,7 @@ def _presliding(rig: RigMechanics, identity: Identity) -> float:
 
 
 def _reached(rig: RigMechanics, identity: Identity, foot: Foot, x: float) -> float:
-    """Opening at a foot; InputError where tip or sledge do not come there, above it and below."""
+    """Opening at a foot; InputError where tip or carriage do not come there, above it and below."""
     openings = []
     lifted, lower = LIFT_M + AWAY_M, -AWAY_M
     for doing, beyond in (
@@ -225,7 +225,7 @@ def _reached(rig: RigMechanics, identity: Identity, foot: Foot, x: float) -> flo
     low, high = identity.advance_min + ADVANCE_MARGIN_M, identity.advance_max - ADVANCE_MARGIN_M
     if not low <= advance <= high:
         raise InputError(
-            f"At x = {1e3 * x:.1f} mm the sledge would stand at {1e3 * advance:.1f} mm: it moves "
+            f"At x = {1e3 * x:.1f} mm the carriage would stand at {1e3 * advance:.1f} mm: it moves "
             f"from {1e3 * low:.1f} to {1e3 * high:.1f} mm. Move the plate, or shorten the path."
         )
     return openings[0]

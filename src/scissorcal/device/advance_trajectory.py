@@ -1,4 +1,4 @@
-"""The plan of a capture of the sledge's friction: sweeps and an excitation of the advance."""
+"""The plan of a capture of the carriage's friction: sweeps and an excitation of the advance."""
 
 from scissorcal.device.paths import PathBuilder, SwingLimits, multisine
 from scissorcal.device.trajectory import Plan, Segment, StrokeList, opening_range, refuse_linear
@@ -9,12 +9,12 @@ from scissorcal.recipe.schema import Recipe
 
 ADVANCE_MARGIN_M = 5e-3
 LEAST_TRAVEL_M = 10e-3
-"""Twice by how far a sledge may fall behind before it counts as standing."""
+"""Twice by how far a carriage may fall behind before it counts as standing."""
 
 HEAVIEST_KG = 1.6
-"""A sledge with a pair of scissors, its guide and belt weighs half of it; it may weigh double."""
+"""A carriage with a pair of scissors, its guide and belt weighs half of it; it may weigh double."""
 FORCE_SHARE = 0.4
-"""Share of the force limit that may accelerate the heaviest sledge: friction takes its part."""
+"""Share of the force limit that may accelerate the heaviest carriage: friction takes its part."""
 LEAST_ACCELERATION = 0.1
 
 SLIDE_BAND_HZ = (1.0, 8.0)
@@ -23,11 +23,11 @@ AMPLITUDE_SHARE = 0.45
 
 
 def advance_plan(recipe: Recipe, identity: Identity) -> Plan:
-    """Plan sweeps of the sledge at every speed, forward and backward, then an excitation.
+    """Plan sweeps of the carriage at every speed, forward and backward, then an excitation.
 
     The blades stand open, as wide as the scene has them. Every repeat has all speeds. Raises
-    InputError where the sledge has no room, or no force to be moved by; `refuse_without_motor` does
-    where it has no motor.
+    InputError where the carriage has no room, or no force to be moved by; `refuse_without_motor`
+    does where it has no motor.
     """
     refuse_linear(recipe)
     low, high = advance_range(recipe, identity)
@@ -51,7 +51,7 @@ def advance_plan(recipe: Recipe, identity: Identity) -> Plan:
     path.slide(way, strokes.add("excitation"))
     path.rest(DWELL_S)
     request = (
-        "Take everything out from between the blades and out of the sledge's way: it moves by "
+        "Take everything out from between the blades and out of the carriage's way: it moves by "
         f"{1e3 * (high - low):.0f} mm, the blades open."
     )
     segment = Segment(path.reference(), "nothing", -1, request)
@@ -64,7 +64,7 @@ def sliding_speeds(recipe: Recipe) -> tuple[float, ...]:
 
 
 def advance_range(recipe: Recipe, identity: Identity) -> tuple[float, float]:
-    """Advances (m) that the capture sweeps: its travel, in the middle of the sledge's stops.
+    """Advances (m) that the capture sweeps: its travel, in the middle of the carriage's stops.
 
     Raises InputError where less than 10 mm are left.
     """
@@ -79,14 +79,14 @@ def advance_range(recipe: Recipe, identity: Identity) -> tuple[float, float]:
             f"slide: set it to {1e3 * LEAST_TRAVEL_M:g} or more."
         )
     raise InputError(
-        f"The sledge's stops are {1e3 * (identity.advance_max - identity.advance_min):.3g} mm "
+        f"The carriage's stops are {1e3 * (identity.advance_max - identity.advance_min):.3g} mm "
         f"apart, and this capture needs {1e3 * (LEAST_TRAVEL_M + 2 * ADVANCE_MARGIN_M):g}: correct "
-        "advance_min and advance_max in the device's firmware if the sledge can move farther."
+        "advance_min and advance_max in the device's firmware if the carriage can move farther."
     )
 
 
 def largest_acceleration(recipe: Recipe, identity: Identity) -> float:
-    """Acceleration (m/s^2) that the force limit allows for a sledge of 1.6 kg.
+    """Acceleration (m/s^2) that the force limit allows for a carriage of 1.6 kg.
 
     Raises InputError where that is too little to tell the mass.
     """
@@ -96,17 +96,17 @@ def largest_acceleration(recipe: Recipe, identity: Identity) -> float:
         source = "limits.force_N" if recipe.limits.force_N <= force else "the device's force_limit"
         least = LEAST_ACCELERATION * HEAVIEST_KG / FORCE_SHARE
         raise InputError(
-            f"A force of {force:g} N ({source}) is too little to accelerate a sledge: this capture "
-            f"needs {least:.2g} N."
+            f"A force of {force:g} N ({source}) is too little to accelerate a carriage: this "
+            f"capture needs {least:.2g} N."
         )
     return found
 
 
 def refuse_without_motor(identity: Identity) -> None:
-    """Raise InputError for a rig that cannot push its sledge."""
+    """Raise InputError for a rig that cannot push its carriage."""
     if not identity.capabilities & Capability.ADVANCE_MOTOR or identity.force_limit <= 0.0:
         raise InputError(
             f"{identity.name} {identity.serial} has no advance motor (capability ADVANCE_MOTOR, "
-            "force_limit above 0), so nothing can push its sledge: leave out --axis advance. If it "
-            "has one, state it in the device's identity."
+            "force_limit above 0), so nothing can push its carriage: leave out --axis advance. If "
+            "it has one, state it in the device's identity."
         )

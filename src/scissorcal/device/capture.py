@@ -34,7 +34,7 @@ SUPERVISOR_S = 0.3
 FAULT_CLEARINGS = 20
 FAULT_CLEARINGS_PER_S = 1.0
 CLEAR_REQUEST = (
-    "Take everything out from between the blades and keep clear: they open, and the sledge "
+    "Take everything out from between the blades and keep clear: they open, and the carriage "
     "moves to its start."
 )
 
@@ -86,15 +86,15 @@ def capture(
 ) -> CaptureReport:
     """Drive empty sweeps and an excitation of one axis, or strokes through sheets; record them.
 
-    Friction is that of the blades, or of the sledge with the blades open. With ``hand`` (cuts only)
-    the motors are off while a hand moves the handles, and strokes are found from the motion; on a
-    simulator the virtual hand does it, and motors bring the rig back before each sheet. The person
-    is asked to clear the blades, unless the session is ``cleared`` (a hand's capture asks in any
-    case), and to load each sheet; a simulator does both itself. The gains follow from the session's
-    probe where there is one. What was recorded stays in the writer, whatever happens.
+    Friction is that of the blades, or of the carriage with the blades open. With ``hand`` (cuts
+    only) the motors are off while a hand moves the handles, and strokes are found from the motion;
+    on a simulator the virtual hand does it, and motors bring the rig back before each sheet. The
+    person is asked to clear the blades, unless the session is ``cleared`` (a hand's capture asks in
+    any case), and to load each sheet; a simulator does both itself. The gains follow from the
+    session's probe where there is one. What was recorded stays in the writer, whatever happens.
 
     Raises DeviceError where the rig fails (limits, faults that do not clear, an unplugged cable) or
-    no gains could follow the plan; InputError where the recipe does not fit the rig: a sledge
+    no gains could follow the plan; InputError where the recipe does not fit the rig: a carriage
     without an advance motor or without travel, too.
     """
     if kind == "friction-advance":

@@ -30,8 +30,9 @@ from scissorcal.recording import Joint, Recording, RecordingWriter, Stroke
 from scissorcal.recording.recording import UNLOADED_MARK
 
 NextPart = Callable[[Recording, float], Part | None]
-"""Chooses what comes next from what was recorded so far and where the sledge stands (m); None ends
-the capture. It runs in a second thread while the rig idles, in virtual time between two ticks."""
+"""Chooses what comes next from what was recorded so far and where the carriage stands (m); None
+ends the capture. It runs in a second thread while the rig idles, in virtual time between
+two ticks."""
 
 CHOOSING_S = 1.0
 """Least time with the motors off between two parts: the zeros of the sensors are measured anew. In
@@ -82,11 +83,11 @@ def capture_by_parts(
             )
 
         drive.idle()
-        told = chosen or (lambda: None)
+        notify = chosen or (lambda: None)
         with _chooser(session.link, motion, drive) as choose:
             while True:
                 part = choose(next_part, recorded())
-                told()
+                notify()
                 if part is None:
                     break
                 strokes += part.strokes

@@ -42,8 +42,8 @@ HELD_BACK = 3.0
 """Dry friction over the opening, and static friction, may hold three times what a probe found."""
 ADVANCE_MASS_KG, ADVANCE_VISCOUS_N_s_per_m, ADVANCE_COULOMB_N = 0.8, 4.0, 0.8
 ADVANCE_FACTOR = 2.0
-"""A sledge with a pair of scissors, its guide and belt: no probe moves it, so it may weigh half or
-double."""
+"""A carriage with a pair of scissors, its guide and belt: no probe moves it, so it may weigh half
+or double."""
 
 TYPICAL_INERTIA_kg_m2, TYPICAL_COULOMB_Nm = 2e-4, 0.015
 TYPICAL_INERTIA_SD_kg_m2 = TYPICAL_INERTIA_kg_m2 * math.log(2.0) / NORMAL_90
@@ -336,16 +336,16 @@ def _undelayed(probed: Probed) -> Verdict:
 def _sliding(stribeck: StribeckFall, stood: float, slowest: float) -> Verdict:
     """Whether the slowest planned sweep slides steadily, as far as it is known before."""
     steady = stribeck.steady_from(stood)
-    told = f"The loop stands friction that falls by up to {stood:.2g} N m s/rad"
+    limit = f"The loop stands friction that falls by up to {stood:.2g} N m s/rad"
     if stribeck.rate is None and steady > slowest:
         return STEADY_SWEEPS.not_evaluated(
-            f"{told}: sweeps are steady from {steady:.2g} rad/s on, whatever the friction. The "
+            f"{limit}: sweeps are steady from {steady:.2g} rad/s on, whatever the friction. The "
             "probe did not see how friction falls with speed, so slower ones are tried, and the "
             "fit tells whether the blades stuck."
         )
-    good = f"{told}, and sweeps at {slowest:.2g} rad/s are steady."
+    good = f"{limit}, and sweeps at {slowest:.2g} rad/s are steady."
     bad = (
-        f"{told}, and this rig's falls by {stribeck.steepest:.2g}: blades stick and slip below "
+        f"{limit}, and this rig's falls by {stribeck.steepest:.2g}: blades stick and slip below "
         f"{steady:.2g} rad/s. Slower sweeps need a shorter delay: shorten the adapter's latency "
         "timer, raise the baud rate, or take a faster tick."
     )

@@ -14,11 +14,11 @@ from typing import Any
 from scissorcal.device.counts import (
     AnyCell,
     AnyStrokes,
+    CarriageCellCount,
+    CarriageStrokeCount,
     CellCount,
     ExcitationCount,
     SheetCount,
-    SledgeCellCount,
-    SledgeStrokeCount,
     StrokeCount,
     SummaryRow,
     motion_of,
@@ -185,7 +185,7 @@ def _cells(pairs: _Pairs, kind: CaptureKind) -> tuple[AnyCell, ...]:
     first = pairs[0][0]
     same = [pair for pair in pairs if pair[0]["openings"] == first["openings"]]
     slides = kind == "friction-advance"
-    row = SledgeCellCount if slides else CellCount
+    row = CarriageCellCount if slides else CellCount
     return tuple(
         row(
             direction,
@@ -213,7 +213,7 @@ def _strokes(
     planned_strokes = Counter((way, speed) for way, speed in driven[0][0]["planned"])
     recorded = Counter((way, speed) for count, _ in driven for way, speed in count["recorded"])
     slides = kind == "friction-advance"
-    row = SledgeStrokeCount if slides else StrokeCount
+    row = CarriageStrokeCount if slides else StrokeCount
     return tuple(
         row(
             way,

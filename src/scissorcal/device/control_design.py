@@ -181,18 +181,18 @@ def _refusal(
             f"and the {name} would fall behind by up to {far:.2g} {unit}, beyond the "
             f"{demand.error_limit:.2g} {unit} at which a capture stops"
         )
-    told = (
+    sentence = (
         f"An effort acts {1e3 * axis.delay_s:.2g} ms after the measurement that it answers. That "
         f"is too late for this capture: gains with {PHASE_MARGIN_deg:.0f} degrees of phase margin "
         f"and a gain margin of {GAIN_MARGIN:g} are weak, {behind}."
     )
     if enough is not None:
         return (
-            f"{told} A delay of at most {1e3 * enough:.2g} ms would do: shorten the adapter's "
+            f"{sentence} A delay of at most {1e3 * enough:.2g} ms would do: shorten the adapter's "
             "latency timer, raise the baud rate, or plan slower strokes."
         )
     return (
-        f"{told} A shorter delay alone would not do: take a finer encoder or a faster tick, or "
+        f"{sentence} A shorter delay alone would not do: take a finer encoder or a faster tick, or "
         "plan slower strokes."
     )
 

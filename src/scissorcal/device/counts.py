@@ -34,8 +34,8 @@ class CellCount:
 
 
 @dataclass(frozen=True)
-class SledgeCellCount:
-    """As CellCount, of the sledge: "forward" or "backward", and a range of the advance."""
+class CarriageCellCount:
+    """As CellCount, of the carriage: "forward" or "backward", and a range of the advance."""
 
     rate_unit: ClassVar[str] = "mm/s"
     unit: ClassVar[str] = "mm"
@@ -73,8 +73,8 @@ class StrokeCount:
 
 
 @dataclass(frozen=True)
-class SledgeStrokeCount:
-    """As StrokeCount, of the sledge: ``kind`` is "forward" or "backward"."""
+class CarriageStrokeCount:
+    """As StrokeCount, of the carriage: ``kind`` is "forward" or "backward"."""
 
     rate_unit: ClassVar[str] = "mm/s"
     kind: str
@@ -88,8 +88,8 @@ class SledgeStrokeCount:
         return self.speed_mm_per_s
 
 
-AnyCell = CellCount | SledgeCellCount
-AnyStrokes = StrokeCount | SledgeStrokeCount
+AnyCell = CellCount | CarriageCellCount
+AnyStrokes = StrokeCount | CarriageStrokeCount
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class SummaryRow:
 def motion_of(row: AnyCell | AnyStrokes) -> str:
     """A direction and its speed in words; a hand has no planned speed.
 
-    >>> motion_of(SledgeStrokeCount("forward", speed_mm_per_s=5.0, planned=2, recorded=2))
+    >>> motion_of(CarriageStrokeCount("forward", speed_mm_per_s=5.0, planned=2, recorded=2))
     'forward at 5 mm/s'
     """
     way = row.direction if isinstance(row, AnyCell) else row.kind

@@ -213,7 +213,7 @@ def even_cells(opening: Range, count: int = ANGLE_CELLS) -> tuple[Range, ...]:
 def coverage_of(
     recipe: Recipe, identity: Identity, kind: CaptureKind, *, hand: bool = False
 ) -> CoverageGrid:
-    """Grid of a capture: its speeds over the openings of the scene, or the travel of the sledge.
+    """Grid of a capture: its speeds over the openings of the scene, or the travel of the carriage.
 
     Friction counts both directions, a cut closing alone. Planned presses have a cell for each place
     at which they press.

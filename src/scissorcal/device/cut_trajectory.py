@@ -131,12 +131,12 @@ def _through_sheets(recipe: Recipe, identity: Identity) -> Plan:
 
 
 def _cuts_of_a_sheet(recipe: Recipe, identity: Identity) -> tuple[_Cut, ...]:
-    """Place up to strokes_per_sheet strokes on a sheet, within it and the sledge's travel."""
+    """Place up to strokes_per_sheet strokes on a sheet, within it and the carriage's travel."""
     blade = Blade.of(recipe)
     openings = bottom, top = cut_openings(recipe, identity)
     inner, outer = float(blade.crossing(top)), float(blade.crossing(bottom))
     end = recipe.material.sheet_length_mm * 1e-3 - SHEET_MARGIN_M
-    first, last = _sledge_travel(identity)
+    first, last = _carriage_travel(identity)
     cuts: list[_Cut] = []
     crack = 0.0
     for number in range(recipe.capture.cut.strokes_per_sheet):
@@ -146,7 +146,7 @@ def _cuts_of_a_sheet(recipe: Recipe, identity: Identity) -> tuple[_Cut, ...]:
             break
         if advance < first:
             raise DeviceError(
-                f"Before a fresh sheet the sledge must stand at {1e3 * advance:.0f} mm, and the "
+                f"Before a fresh sheet the carriage must stand at {1e3 * advance:.0f} mm, and the "
                 f"device {identity.name} goes no further back than "
                 f"{1e3 * identity.advance_min:.0f} mm: raise the low end of scene.contact_mm no "
                 "further than the blades need, or mount the material further out."
@@ -212,7 +212,7 @@ def _press_places(recipe: Recipe, identity: Identity, count: int) -> tuple[_Cut,
     tip = TIP_SHARE * blade.length
     nearest = max(recipe.scene.contact_m[0], min(above, default=np.inf))
     farthest = min(recipe.scene.contact_m[1], max(below, default=-np.inf), tip)
-    first, last = _sledge_travel(identity)
+    first, last = _carriage_travel(identity)
     places = []
     for contact in np.linspace(nearest, farthest, count) if nearest < farthest else ():
         top = blade.opening_at(float(contact), openings, CLEARANCE_M)
@@ -224,7 +224,7 @@ def _press_places(recipe: Recipe, identity: Identity, count: int) -> tuple[_Cut,
     return tuple(places)
 
 
-def _sledge_travel(identity: Identity) -> tuple[float, float]:
+def _carriage_travel(identity: Identity) -> tuple[float, float]:
     return identity.advance_min + ADVANCE_MARGIN_M, identity.advance_max - ADVANCE_MARGIN_M
 
 

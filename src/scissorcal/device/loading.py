@@ -43,7 +43,7 @@ class Loader:
             self._ask(request)
 
     def retract(self) -> None:
-        """Before the sledge goes back: a simulator's used sheet is taken out, a real one stays."""
+        """Before the carriage returns: a simulator's used sheet is taken out, a real one stays."""
         if self.simulated:
             self._motion.configure(ConfigKey.MATERIAL, 0.0)
 

@@ -80,7 +80,7 @@ def friction_plan(recipe: Recipe, identity: Identity, advance: float = 0.0) -> P
     Every repeat has all speeds, so that an interrupted capture has them too. Every second sweep,
     and of each speed that of every second repeat, begins in the middle of the range and ends there.
     Ramps lie outside the scene's range of openings where the rig's stops leave room. ``advance``
-    (m) is the fixed position of the sledge.
+    (m) is the fixed position of the carriage.
     """
     refuse_linear(recipe)
     stops = usable_opening(identity)
@@ -153,7 +153,7 @@ def _sweep_from_middle(
 
 
 def approach(opening: float, advance: float, start: Reference, tick_s: float) -> Reference:
-    """Path from the rig's position to the start of a reference: blades first, then the sledge."""
+    """Path from the rig's position to the start of a reference: blades first, then the carriage."""
     path = PathBuilder(opening, advance, tick_s)
     path.open_to(float(start.opening[0]), APPROACH_SPEED, TURN_ACCELERATION)
     path.rest(DWELL_S)

@@ -26,7 +26,7 @@ RUNAWAY_RAD_PER_S = 1.0
 above what friction's reversal or the sheet's springing back adds within 8 ms."""
 
 RUNAWAY_M_PER_S = 0.1
-"""A little more than the speed at which captures move the sledge."""
+"""A little more than the speed at which captures move the carriage."""
 
 STILL_RAD = 0.02
 """Three times by how far a reference leads blades that stick before they move (6 mrad)."""

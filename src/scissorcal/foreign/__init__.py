@@ -6,30 +6,6 @@ Every room reads foreign files through this one. `open_foreign` and what is buil
 parser that is written in C in a child process with limits of memory and time.
 """
 
-from scissorcal.foreign.formats import Format
-from scissorcal.foreign.isolated import parse_isolated
-from scissorcal.foreign.reading import (
-    decode_text,
-    first_line,
-    open_foreign,
-    parse_json,
-    read_foreign,
-    read_foreign_text,
-    read_json,
-    reading,
-    refuse_unless_regular,
-)
+import lazy_loader
 
-__all__ = [
-    "Format",
-    "decode_text",
-    "first_line",
-    "open_foreign",
-    "parse_isolated",
-    "parse_json",
-    "read_foreign",
-    "read_foreign_text",
-    "read_json",
-    "reading",
-    "refuse_unless_regular",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

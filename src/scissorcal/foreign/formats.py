@@ -175,7 +175,9 @@ DRAWING = Format(
 PATH = Format("a path", 5 * _MB, "Write x_mm and what else is stated, one point a line.")
 """200,000 points of 25 characters."""
 
-STANCES = Format("a table of stances", _MB, "Write a line for each photograph of the rig.")
+RIG_POSITIONS = Format(
+    "a table of rig positions", _MB, "Write a line for each photograph of the rig."
+)
 """A line for each photograph, of 50 characters."""
 
 TRACK_LINES = Format(

@@ -1,36 +1,5 @@
 """Posteriors of any model: optima, curvature, autocorrelation, sampling by effort."""
 
-from scissorcal.inference.autocorrelation import ljung_box, robust_covariance_of_scores
-from scissorcal.inference.curvature import gradient, hessian
-from scissorcal.inference.importance import smooth_weights
-from scissorcal.inference.infer import infer
-from scissorcal.inference.noise import ArNoise, fit_ar, log_density, tails_of
-from scissorcal.inference.optimise import Cluster, Optimum, find_optimum
-from scissorcal.inference.posterior import Effort, InferOptions, Posterior
-from scissorcal.inference.problem import Counter, Problem, Stop
-from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus
+import lazy_loader
 
-__all__ = [
-    "ArNoise",
-    "Cluster",
-    "Counter",
-    "Effort",
-    "InferOptions",
-    "NotFiniteError",
-    "Optimum",
-    "Posterior",
-    "Problem",
-    "SamplingStatus",
-    "SearchStatus",
-    "Stop",
-    "find_optimum",
-    "fit_ar",
-    "gradient",
-    "hessian",
-    "infer",
-    "ljung_box",
-    "log_density",
-    "robust_covariance_of_scores",
-    "smooth_weights",
-    "tails_of",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

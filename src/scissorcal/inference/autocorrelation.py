@@ -272,9 +272,9 @@ def _excess(slopes: Array, pull: Array, blocks: Integers, noise: ArNoise) -> tup
     expected = np.stack([_quadratic(own[low:high], memory) for low, high in bounds])
     sums = np.stack([own[low:high].T @ pull[low:high] for low, high in bounds])
     values, vectors = np.linalg.eigh(expected.sum(axis=0))
-    told = values > WELL_ABOVE_ROUNDING * values[-1]
-    root = vectors[:, told] * np.sqrt(values[told])
-    white = vectors[:, told] / np.sqrt(values[told])
+    determined = values > WELL_ABOVE_ROUNDING * values[-1]
+    root = vectors[:, determined] * np.sqrt(values[determined])
+    white = vectors[:, determined] / np.sqrt(values[determined])
     factors, directions = np.linalg.eigh(white.T @ (sums.T @ sums) @ white)
     for factor, direction in zip(factors, directions.T, strict=True):
         along = white @ direction

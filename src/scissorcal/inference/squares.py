@@ -231,8 +231,8 @@ class _Search:
             curvature, slope = self.prior.shape(self.point)
             share = self.problem.share
             gradient_ = slope + share * ((z**2 - 1.0) @ by_size - z @ by_mean)
-            told = by_mean.T @ by_mean + 2.0 * by_size.T @ by_size
-            precision = share * told + curvature
+            information = by_mean.T @ by_mean + 2.0 * by_size.T @ by_size
+            precision = share * information + curvature
             if not (np.all(np.isfinite(precision)) and np.all(np.isfinite(gradient_))):
                 self.promised = np.inf
                 break

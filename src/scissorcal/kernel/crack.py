@@ -78,7 +78,7 @@ class CrackPath:
     """The result of a walk.
 
     ``torque`` and ``push`` (n - 1,) are means over each tick, ``place`` (n,) is the crack's.
-    ``torque`` (N m) opens the blades, ``push`` (N) acts on the sledge against the advance.
+    ``torque`` (N m) opens the blades, ``push`` (N) acts on the carriage against the advance.
     ``stored`` (J) is the elastic energy at the end, ``lost`` (J) what running cracks took,
     ``jumps`` how often one ran.
     """

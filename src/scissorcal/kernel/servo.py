@@ -39,7 +39,7 @@ OPENING_RATE_LIMIT = 30.0
 0.25 rad then stops the servo before the time since the last usable one makes it plausible
 (4.2 ms)."""
 ADVANCE_RATE_LIMIT = 5.0
-"""Chosen: 5 mm in a tick of 1 ms, far beyond any sledge."""
+"""Chosen: 5 mm in a tick of 1 ms, far beyond any carriage."""
 
 _ABOVE_ZERO = (
     "opening_error_limit",

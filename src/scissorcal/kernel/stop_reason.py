@@ -62,7 +62,7 @@ _STOP_SENTENCES = {
         "The device reports a fault of its encoder; check the encoder and its cable."
     ),
     StopReason.TRACKING_LOST: (
-        "Blades or sledge did not follow the commanded motion; check for an obstacle, a stuck "
+        "Blades or carriage did not follow the commanded motion; check for an obstacle, a stuck "
         "encoder or gains that are too weak."
     ),
     StopReason.HANGUP: "The port was closed or unplugged; plug the device in and start again.",
@@ -114,7 +114,7 @@ _STOP_SENTENCES = {
         "plate's pose; a softer touch needs a slower path."
     ),
     StopReason.PATH_LOST: (
-        "The tip fell behind its path. Check for an obstacle and a sledge that sticks, or take a "
+        "The tip fell behind its path. Check for an obstacle and a carriage that sticks, or take a "
         "slower path."
     ),
     StopReason.CONTROL_REFUSED: (
@@ -144,8 +144,9 @@ _STOP_SENTENCES = {
         "run 'scissorcal device probe'."
     ),
     StopReason.RUNAWAY_ADVANCE: (
-        "The sledge sped up against the force of its motor: motor or encoder has the wrong sense. "
-        "Positive force must advance it and the advance count up; swap two wires of one of the two."
+        "The carriage sped up against the force of its motor: motor or encoder has the wrong "
+        "sense. Positive force must advance it and the advance count up; "
+        "swap two wires of one of the two."
     ),
     StopReason.STOP_ELSEWHERE: (
         "The device reports that the blades are at an end stop, more than 0.1 rad from those of "
@@ -158,8 +159,8 @@ _STOP_SENTENCES = {
         "cable, that the motor is connected, and that nothing blocks the blades."
     ),
     StopReason.ADVANCE_STANDS: (
-        "The advance did not change at all while the sledge was driven. Check its encoder, its "
-        "motor and their cables, and that nothing blocks the sledge."
+        "The advance did not change at all while the carriage was driven. Check its encoder, its "
+        "motor and their cables, and that nothing blocks the carriage."
     ),
     StopReason.MEASURED_REVERSED: (
         "The measured motor torque has the opposite sign of the commanded one. motor_torque must "

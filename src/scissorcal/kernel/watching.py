@@ -25,15 +25,15 @@ class WatchConfig:
     rate is subtracted. ``swing_inertia`` (kg m^2) and ``swing_delay_ticks``, until a command acts,
     are the rig's: with inertia 0 all such swings count. Where a command was later than usual by
     ``held_up_ticks`` meanwhile, the stop is HELD_UP.
-    ``runaway_rate``, ``runaway_speed``: blades (rad/s) or sledge (m/s) speed up by so much against
-    their motor's effort. ``stop_margin``: the device says it is at a stop, so far (rad) from
-    ``stop_low`` and ``stop_high``. ``still_rad``, ``still_m``: the reference moves so far while the
-    measured place stays exactly the same, the opening under a torque of at least ``still_torque``
-    (N m). Without a reference: torques of motor and hand differ by ``rest_torque`` (N m) and by
-    ``rest_share`` of the smaller of the two, and the opening stays exactly the same for half a
-    second; it needs ``handle_radius`` (m), 0 without a force sensor, which shows ``handle_zero``
-    (N) without a hand. ``jitter_s``: the opening stays the same so long, of an encoder that
-    jitters.
+    ``runaway_rate``, ``runaway_speed``: blades (rad/s) or carriage (m/s) speed up by so much
+    against their motor's effort. ``stop_margin``: the device says it is at a stop, so far (rad)
+    from ``stop_low`` and ``stop_high``. ``still_rad``, ``still_m``: the reference moves so far
+    while the measured place stays exactly the same, the opening under a torque of at least
+    ``still_torque`` (N m). Without a reference: torques of motor and hand differ by ``rest_torque``
+    (N m) and by ``rest_share`` of the smaller of the two, and the opening stays exactly the same
+    for half a second; it needs ``handle_radius`` (m), 0 without a force sensor, which shows
+    ``handle_zero`` (N) without a hand. ``jitter_s``: the opening stays the same so long, of an
+    encoder that jitters.
     ``least_ratio``, ``most_ratio``: measured over commanded torque, where torques of at least
     ``ratio_torque`` (N m) act. ``clock_share``, ``host_clock_share``: device clock against its
     ticks, and against this computer. Raises ValueError for a number that is not finite or below 0,

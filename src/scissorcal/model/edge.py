@@ -149,17 +149,17 @@ _PARAMETERS = ("offset_m", "taper_rad", "curvature_per_m", "bend_per_m2")
 
 
 @dataclass(frozen=True)
-class EdgeBelief:
+class EdgeDistribution:
     """An edge with what is known of its parameters: normal, mean ``edge``, with ``covariance``.
 
     ``names`` (k,) are fields of the edge, or ``spline_m_<i>`` for a weight of its spline, in the
     order of ``covariance`` (k, k), in units of the fields. What is not named is held.
 
     >>> line = Edge("line", offset_m=-0.008, taper_rad=0.03, length_m=0.07)
-    >>> belief = EdgeBelief(line, ("offset_m", "taper_rad"), np.diag([1e-10, 1e-8]))
-    >>> belief.mean.tolist()
+    >>> distribution = EdgeDistribution(line, ("offset_m", "taper_rad"), np.diag([1e-10, 1e-8]))
+    >>> distribution.mean.tolist()
     [-0.008, 0.03]
-    >>> float(belief.with_values([-0.007, 0.02]).offset_m)
+    >>> float(distribution.with_values([-0.007, 0.02]).offset_m)
     -0.007
     """
 
@@ -202,7 +202,9 @@ class EdgeBelief:
         else:
             rows = np.asarray(values, dtype=np.float64)
             if rows.shape[-1:] != (len(self.names),):
-                raise ValueError(f"an edge belief over {self.names} needs {len(self.names)} values")
+                raise ValueError(
+                    f"an edge distribution over {self.names} needs {len(self.names)} values"
+                )
             columns = rows if rows.ndim == 1 else np.moveaxis(rows, -1, 0)[..., None]
             named = dict(zip(self.names, columns, strict=True))
         fields: dict[str, Any] = {n: _plain(v) for n, v in named.items() if not _is_weight(n)}
@@ -225,9 +227,9 @@ class EdgeBelief:
         return np.asarray(self.mean + rng.standard_normal((count, len(self.names))) @ root.T)
 
 
-def draw_edges(belief: EdgeBelief, rng: np.random.Generator, count: int) -> Edge:
-    """Draw ``count`` edges of a belief as one whose parameters have shape (count, 1)."""
-    return belief.with_values(belief.draws(rng, count))
+def draw_edges(distribution: EdgeDistribution, rng: np.random.Generator, count: int) -> Edge:
+    """Draw ``count`` edges of a distribution as one whose parameters have shape (count, 1)."""
+    return distribution.with_values(distribution.draws(rng, count))
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ _LAW = (
             (50.0, 100.0, "half of the usual Coulomb friction at 0.1 m/s"),
         ),
         covers=("rate",),
-        remedy='friction falls with the speed: compare laws with Stribeck friction (rung = "auto"),'
+        remedy='friction falls with the speed: compare laws with Stribeck friction (law = "auto"),'
         " check for a motor that compensates friction, and record faster sweeps",
     ),
     Term(

@@ -248,8 +248,8 @@ class AxisLaw:
     def effort(self, place: ArrayLike, rate: ArrayLike) -> Array:
         """F + offset, what the drive must give at an even rate; places and rates broadcast.
 
-        >>> sledge = AxisLaw(0.8, FrictionLaw({"coulomb": 0.8, "viscous": 4.0}), rest_rate=1e-3)
-        >>> sledge.effort(0.0, [-0.1, 0.0, 5e-4, 0.1])
+        >>> carriage = AxisLaw(0.8, FrictionLaw({"coulomb": 0.8, "viscous": 4.0}), rest_rate=1e-3)
+        >>> carriage.effort(0.0, [-0.1, 0.0, 5e-4, 0.1])
         array([-1.2  ,  0.   ,  0.402,  1.2  ])
         """
         speed = np.asarray(rate, dtype=np.float64)

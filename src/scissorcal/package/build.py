@@ -348,7 +348,7 @@ def _record(fit: FitResult) -> dict[str, Any]:
         for parameter, value in zip(fit.parameters, fit.map_point, strict=True)
     )
     return {
-        "rung": fit.rung,
+        "candidate": fit.candidate,
         "effort": fit.effort,
         "inputs_hash": fit.inputs_hash,
         "sources": fit.sources,

@@ -47,7 +47,7 @@ def friction_tables(law: FrictionLaw, recipe: Recipe) -> dict[str, dict[str, Any
             "The friction fit says that friction drives the motion at "
             f"{np.degrees(places[int(np.argmin(factors))]):.0f} degrees of "
             "opening, which no friction does: capture friction over the whole of "
-            "scene.opening_deg, or choose a law without angle in fit.friction.rung."
+            "scene.opening_deg, or choose a law without angle in fit.friction.law."
         )
     laws: dict[str, dict[str, Any]] = {}
     functions = friction_functions(law)

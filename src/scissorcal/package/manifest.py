@@ -6,7 +6,7 @@ import json
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, Strict, model_validator
+from pydantic import AliasChoices, Field, Strict, model_validator
 
 from scissorcal.identity import bytes_digest
 from scissorcal.package.layer_pieces import Pieces
@@ -24,7 +24,7 @@ from scissorcal.package.table_record import (
     Text,
 )
 from scissorcal.recipe.euler_angles import EulerAngles, Quaternion, angles_alone, one_rotation
-from scissorcal.recipe.schema import FrictionRung, FrictionTerm
+from scissorcal.recipe.schema import FrictionLawName, FrictionTerm
 
 FORMAT = "scissorcal-package/1"
 
@@ -168,7 +168,7 @@ class CutStructure(Section):
 class FrictionStructure(Section):
     """The discrete choices of a friction fit."""
 
-    law: FrictionRung
+    law: FrictionLawName
     symmetric: bool
     angle_center: Finite
     adopt: Annotated[tuple[FrictionTerm, ...], Strict(False)] = ()
@@ -194,7 +194,7 @@ class FitRecord(Section):
     verdicts, word for word, ``left_out`` the parts of its law that the tables do not render.
     """
 
-    rung: Text
+    candidate: Annotated[Text, Field(validation_alias=AliasChoices("candidate", "rung"))]
     effort: Literal["draft", "standard", "thorough"]
     inputs_hash: Annotated[str, Field(max_length=200)]
     sources: tuple[Text, ...]

@@ -272,7 +272,7 @@ class PrototypeServer:
 
     async def _close_sockets(self) -> None:
         """Close the pages once they know how what ran has ended."""
-        await asyncio.gather(*(watcher.told() for watcher in self._watchers))
+        await asyncio.gather(*(watcher.sent() for watcher in self._watchers))
         for socket in list(self._sockets):
             await socket.close(code=1001, message=b"the server ends", drain=False)
 
@@ -312,16 +312,16 @@ class _RefusedOnce(logging.Filter):
 
     def __init__(self) -> None:
         super().__init__()
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def filter(self, record: logging.LogRecord) -> bool:
         error = record.exc_info[1] if record.exc_info else None
         if not isinstance(error, HttpProcessingError):
             return True
         kind = type(error).__name__
-        if kind in self._told:
+        if kind in self._reported:
             return False
-        self._told.add(kind)
+        self._reported.add(kind)
         record.msg = (
             "A request that the page's server cannot read was refused (%s); further ones are not "
             "shown."

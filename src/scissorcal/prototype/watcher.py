@@ -65,7 +65,7 @@ class Watcher:
         self._counted_s = now_s
         return self._allowed >= 0.0
 
-    async def told(self) -> None:
+    async def sent(self) -> None:
         """Wait until the newest state was taken to send, not for long."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(LAST_WORDS_s):

@@ -84,7 +84,9 @@ def explain(
     wrong = {path[:depth] for path, _ in mistakes for depth in range(1, len(path) + 1)}
     alone = [detail for detail in unlikely if detail.path not in wrong]
     count = len(details) + len(alone)
-    mistakes = [*((detail.path, detail.told) for detail in alone), *mistakes][:MOST_MISTAKES]
+    mistakes = [*((detail.path, detail.full_sentence) for detail in alone), *mistakes][
+        :MOST_MISTAKES
+    ]
     lines = key_lines(text, [_given(document, path) for path, _ in mistakes])
     ordered = sorted(zip(lines, mistakes, strict=True), key=lambda pair: pair[0] or 0)
     return Mistakes(
@@ -99,7 +101,7 @@ def explain(
 def _mistake(
     item: Any, meant: Mapping[Path, str | None], model: type[BaseModel]
 ) -> tuple[Path, str]:
-    """Where one of pydantic's findings is told, and its sentence."""
+    """Where one of pydantic's findings is reported, and its sentence."""
     path = _path(item)
     if item["type"] == "missing":
         return path[:-1], _missing(path)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, Strict
+from pydantic import AliasChoices, Field, Strict
 
 from scissorcal.model.friction_terms import CANDIDATES, TERMS, law_names
 from scissorcal.recipe.fields import (
@@ -18,13 +18,16 @@ from scissorcal.recipe.fields import (
 )
 from scissorcal.recipe.priors import JointPriors, Section
 
-FrictionRung = Annotated[str, OneOf(*law_names())]
+FrictionLawName = Annotated[str, OneOf(*law_names())]
 FrictionTerm = Annotated[str, OneOf(*(term.name for term in TERMS.values() if term.adoptable))]
 
-ADVANCE_CANDIDATES = ("coulomb+viscous", "coulomb+viscous+presliding")
-"""Laws of a sledge that are compared where the recipe names none, cheapest first.
+OLD_LAW_KEY = "rung"
+"""What ``law`` was called: it is still read, and the identities of stored results have it."""
 
-Without viscous friction the mass would take its part. No load of a sledge is measured, and its
+ADVANCE_CANDIDATES = ("coulomb+viscous", "coulomb+viscous+presliding")
+"""Laws of a carriage that are compared where the recipe names none, cheapest first.
+
+Without viscous friction the mass would take its part. No load of a carriage is measured, and its
 short travel hardly shows how friction changes with the place. Commands have no noise, so that
 Stribeck friction would be taken for whatever else a law lacks, at a level that nothing determines:
 name it where slow sweeps show it."""
@@ -39,9 +42,9 @@ class CaptureFriction(Section):
 
 
 class CaptureFrictionAdvance(Section):
-    """Empty motion of the sledge, both ways at several speeds, then excited motion for its mass.
+    """Empty motion of the carriage, both ways at several speeds, then excited motion for its mass.
 
-    The blades stand open. Sweeps cover ``travel_mm`` in the middle of the sledge's stops.
+    The blades stand open. Sweeps cover ``travel_mm`` in the middle of the carriage's stops.
     """
 
     speeds_mm_per_s: SlidingSpeeds = (5.0, 12.0, 30.0, 80.0)
@@ -53,7 +56,11 @@ class CaptureFrictionAdvance(Section):
 class FrictionLaws(Section):
     """What the fits of friction of both axes may be told; see :class:`FitFriction`."""
 
-    rung: Annotated[str, OneOf("auto", *law_names())] = "auto"
+    law: Annotated[
+        str,
+        OneOf("auto", *law_names()),
+        Field(validation_alias=AliasChoices("law", OLD_LAW_KEY)),
+    ] = "auto"
     symmetry: Literal["auto", "symmetric", "asymmetric"] = "auto"
     adopt: Annotated[tuple[FrictionTerm, ...], Strict(False)] = ()
     cutoff_Hz: Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False)] = 75.0
@@ -67,7 +74,7 @@ class FrictionLaws(Section):
 
 
 class FitFriction(FrictionLaws):
-    """``rung = "auto"`` compares the candidate laws; ``symmetry = "auto"`` compares both.
+    """``law = "auto"`` compares the candidate laws; ``symmetry = "auto"`` compares both.
 
     ``adopt`` adds terms that the critic proposed, by name. ``cutoff_Hz`` is where the weights of
     the windows, over which data and law are averaged alike, pass half; they are longer where the
@@ -82,7 +89,7 @@ class FitFriction(FrictionLaws):
 
     @property
     def candidates(self) -> tuple[str, ...]:
-        """Laws that ``rung = "auto"`` compares, cheapest first."""
+        """Laws that ``law = "auto"`` compares, cheapest first."""
         return CANDIDATES
 
     @property
@@ -92,7 +99,7 @@ class FitFriction(FrictionLaws):
 
 
 class FitFrictionAdvance(FrictionLaws):
-    """As ``fit.friction``, of the sledge, with the priors of a linear joint there.
+    """As ``fit.friction``, of the carriage, with the priors of a linear joint there.
 
     Its drive is the commanded force, which has no noise, so the data would claim more than a motor
     keeps: ``lack_of_fit_percent`` is by how much mass and levels may be wrong (sd) without the data
@@ -109,16 +116,28 @@ class FitFrictionAdvance(FrictionLaws):
 
 
 class AdvanceSettings(FitFriction):
-    """Settings of the sledge's fit: the table of the recipe, and the priors."""
+    """Settings of the carriage's fit: the table of the recipe, and the priors."""
 
     lack_of_fit_percent: float
 
     @property
     def candidates(self) -> tuple[str, ...]:
-        """Laws that ``rung = "auto"`` compares, cheapest first."""
+        """Laws that ``law = "auto"`` compares, cheapest first."""
         return ADVANCE_CANDIDATES
 
     @property
     def lack_of_fit(self) -> float:
         """Share by which a law may be wrong without the data showing it."""
         return 0.01 * self.lack_of_fit_percent
+
+
+def as_first_named(settings: Any) -> Any:
+    """Settings, as JSON has them, under the keys that identities of stored results have."""
+    if isinstance(settings, list | tuple):
+        return [as_first_named(item) for item in settings]
+    if isinstance(settings, dict):
+        return {
+            OLD_LAW_KEY if key == "law" else key: as_first_named(item)
+            for key, item in settings.items()
+        }
+    return settings

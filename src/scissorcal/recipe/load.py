@@ -7,10 +7,11 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, warn_of_old_word
 from scissorcal.foreign import read_foreign_text
 from scissorcal.foreign.formats import RECIPE, Format
 from scissorcal.recipe.explain import Mistakes, broken_statement, explain
+from scissorcal.recipe.friction import OLD_LAW_KEY
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recipe.unlikely import Unlikely, unlikely_numbers
 
@@ -39,7 +40,13 @@ def parse_recipe(text: str, source: str = "recipe", *, judged: bool = True) -> R
     """
     document = _parse(text, source)
     unlikely = unlikely_numbers(document) if judged else []
-    return _checked(document, unlikely, text, Recipe, source)
+    recipe = _checked(document, unlikely, text, Recipe, source)
+    if judged:
+        for table in ("friction", "friction_advance"):
+            if OLD_LAW_KEY in document.get("fit", {}).get(table, {}):
+                key = f"fit.{table}"
+                warn_of_old_word(f"{key}.{OLD_LAW_KEY}", f"{key}.law", source)
+    return recipe
 
 
 def load_toml(path: Path, model: type[Model], kind: Format = RECIPE) -> Model:

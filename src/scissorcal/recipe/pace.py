@@ -179,7 +179,7 @@ def _slides_s(recipe: Recipe) -> float:
 
 
 def _strokes_s(recipe: Recipe) -> float:
-    """Every stroke over the whole range of openings, the sledge over the whole sheet after each."""
+    """Every stroke over the whole range of openings, the carriage over the sheet after each."""
     low, high = recipe.scene.opening_rad
     cut = recipe.capture.cut
     opening_speed = min(OPENING_SPEED, recipe.scene.opening_rate_rad_per_s[1])
@@ -192,7 +192,7 @@ def _strokes_s(recipe: Recipe) -> float:
     else:  # a press opens as slowly as it closes, after a way to its place
         pressing = 2.0 * cut.sheets * _in_turn(times, cut.strokes_per_sheet)
         moving = pressing + 2.0 * strokes * glide_time(high - low, OPENING_SPEED, turn)
-    # the ways of the sledge between a sheet's strokes add up to its length; then it returns
+    # the ways of the carriage between a sheet's strokes add up to its length; then it returns
     slides = cut.strokes_per_sheet * SETTLE_S + 2.0 * glide_time(
         moved, ADVANCE_SPEED, ADVANCE_ACCELERATION
     )

@@ -54,8 +54,8 @@ def requirements(recipe: Recipe) -> Requirements:
     what the motor measures while it cuts is cutting *and* friction, so the response of the material
     cannot be separated from the friction of the pivot unless that is known from an empty stroke.
     A scene that only presses needs neither toughness nor fracture. A linear joint carries no
-    blades: it has friction and inertia, and nothing is cut with it. Mass and friction of the sledge
-    are needed where a force along the cut is rendered with friction.
+    blades: it has friction and inertia, and nothing is cut with it. Mass and friction of the
+    carriage are needed where a force along the cut is rendered with friction.
 
     >>> from scissorcal.recipe.library import builtin_recipe
     >>> needs = requirements(builtin_recipe("press-only"))
@@ -121,11 +121,11 @@ def requirements(recipe: Recipe) -> Requirements:
 
 
 def _advance(recipe: Recipe) -> tuple[Requirement, ...]:
-    """Friction of the sledge, where a hand feels it beside a rendered force."""
+    """Friction of the carriage, where a hand feels it beside a rendered force."""
     scene = recipe.scene
     if "translation_force" not in scene.render or not scene.render_friction:
         return ()
-    why = "a force along the cut is rendered with friction, and the sledge's own comes on top"
+    why = "a force along the cut is rendered with friction, and the carriage's own comes on top"
     return (Requirement("friction-advance", why),)
 
 

@@ -31,7 +31,7 @@ from scissorcal.recipe.friction import (
 )
 from scissorcal.recipe.friction import CaptureFriction as CaptureFriction
 from scissorcal.recipe.friction import FitFriction as FitFriction
-from scissorcal.recipe.friction import FrictionRung as FrictionRung
+from scissorcal.recipe.friction import FrictionLawName as FrictionLawName
 from scissorcal.recipe.friction import FrictionTerm as FrictionTerm
 from scissorcal.recipe.plate_layers import Plate, refuse_impossible_layers
 from scissorcal.recipe.priors import (
@@ -297,7 +297,7 @@ class Fit(Section):
 
     @property
     def advance(self) -> AdvanceSettings:
-        """Settings of the sledge's fit, with the priors of friction."""
+        """Settings of the carriage's fit, with the priors of friction."""
         return self.friction_advance.with_priors(self.friction.priors)
 
 

@@ -83,8 +83,8 @@ EVERYDAY: Mapping[str, Everyday] = {
     "force_slew": Everyday(500.0, 5e4, "the limit of force within 5 to 10 ms"),
     "engagement_ramp": Everyday(0.05, 5.0, "a force that comes on as one expects it"),
     "held_at_limit": Everyday(0.2, 20.0, "longer than a stroke's peak"),
-    "sliding_speed": Everyday(0.01, 0.3, "a sledge moves by its travel in a second or more"),
-    "travel": Everyday(0.01, 0.3, "the stops of a sledge"),
+    "sliding_speed": Everyday(0.01, 0.3, "a carriage moves by its travel in a second or more"),
+    "travel": Everyday(0.01, 0.3, "the stops of a carriage"),
     "probe_angle": Everyday(0.0175, 0.26, "1 to 15 deg, so that nothing is hit"),
     "toughness_length": Everyday(3e-4, 0.01, "fibres and threads"),
     "inertia": Everyday(1e-5, 1e-3, "blades and handles about the pivot"),
@@ -180,7 +180,7 @@ class Unlikely:
     kept_by: str = ""
 
     @property
-    def told(self) -> str:
+    def full_sentence(self) -> str:
         """All of it."""
         return " ".join(part for part in (self.sentence, self.slip, self.kept_by) if part)
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 Kind = Literal["friction", "friction-advance", "cut", "render", "control", "track"]
-"""What was recorded: empty motion of the blades, of the sledge, cuts and presses, a rendering, a
+"""What was recorded: empty motion of the blades, of the carriage, cuts and presses, a rendering, a
 path along a surface, a plate's pose."""
 
 StrokeKind = Literal["closing", "opening", "excitation", "press", "forward", "backward"]
-"""What a stroke moves: the blades, or forward and backward the sledge."""
+"""What a stroke moves: the blades, or forward and backward the carriage."""
 
 
 FORMAT: Literal["scissorcal-recording/1"] = "scissorcal-recording/1"

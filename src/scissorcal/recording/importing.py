@@ -128,7 +128,7 @@ def import_table(
         table, wrapped = _clock_goes_on(table, quantities["time"].factor)
         sentences += wrapped
         _set_clock(samples, table, quantities["time"].factor, allow_gaps=options.allow_gaps)
-    sentences += _told_of_jumps(samples, table, joint)
+    sentences += _note_on_jumps(samples, table, joint)
     strokes, stroke_sentence, odd = _label(samples, joint, options.min_travel)
     sentences += [*odd, *_sizes(samples, quantities, joint)]
     digest = content_hash(path)
@@ -286,7 +286,7 @@ def _refuse_marks(counts: NDArray[np.float64], table: Table) -> None:
         )
 
 
-def _told_of_jumps(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
+def _note_on_jumps(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
     """Sentences on a position that jumps, and on forces and torques that pass a counter's end."""
     position = np.asarray(samples["opening"], dtype=np.float64)
     step_us = np.diff(samples["device_time_us"])

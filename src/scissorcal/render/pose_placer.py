@@ -76,8 +76,9 @@ def pose_placer(
             raise MissingError(
                 f'The scene of {manifest.name} has plate_pose = "estimated", and its package has '
                 "no pose of the plate in the rig's frame. Photograph the plate's target and the "
-                "rig card ('scissorcal capture plate --image ... --stances ...'), run 'scissorcal "
-                "fit plate' and 'scissorcal package build', or give the pose of a tracker."
+                "rig card ('scissorcal capture plate --image ... --positions ...'), run "
+                "'scissorcal fit plate' and 'scissorcal package build', or give the "
+                "pose of a tracker."
             )
         source = _fitted_pose(manifest.plate)
     scene = package.recipe.scene
@@ -174,7 +175,7 @@ class PosePlacer:
         self._time = -math.inf
         self._kind = "none yet"
         self._refused: Counter[str] = Counter()
-        self._told: dict[str, str] = {}
+        self._warnings: dict[str, str] = {}
         self._estimates = self._falls = 0
         self._widest = 0.0
 
@@ -216,7 +217,7 @@ class PosePlacer:
             seconds=seconds,
             out_s=out_s,
             widest=self._widest,
-            sentences=tuple(self._told.values()),
+            sentences=tuple(self._warnings.values()),
         )
 
     def __enter__(self) -> Self:
@@ -250,8 +251,8 @@ class PosePlacer:
         return _Judged(placed)
 
     def _uncertain(self, placed: PoseSection, covariance: Array, spread: TorqueSpread) -> str:
-        if "uncertain" in self._told:
-            return self._told["uncertain"]
+        if "uncertain" in self._warnings:
+            return self._warnings["uncertain"]
         worst = self._torque.largest_share(placed.section, covariance, *self._state)
         allowed = (self._confidence, self._tolerance)
         return sentences.uncertain(covariance, spread.half_width, worst, *allowed)
@@ -279,9 +280,9 @@ class PosePlacer:
         """Count a change of state; the sentence of each kind is kept once."""
         self._falls += bool(kind) and not self._kind
         self._kind = kind
-        if kind and kind not in self._told:
+        if kind and kind not in self._warnings:
             after = now - self._begun_s
-            self._told[kind] = f"After {after:.1f} s there was no force. {sentence}"
+            self._warnings[kind] = f"After {after:.1f} s there was no force. {sentence}"
 
 
 class PoseLog:

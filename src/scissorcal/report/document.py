@@ -326,7 +326,7 @@ def _parts(
     titles.update({kind: kind.capitalize() for kind in KINDS})
     for part, fit in fits.items():
         again = f" {part.rpartition('-')[2]}" if part != fit.what else ""
-        titles[part] = f"{fit.what.capitalize()} fit{again}: {fit.rung}, {fit.effort} effort"
+        titles[part] = f"{fit.what.capitalize()} fit{again}: {fit.candidate}, {fit.effort} effort"
     found = []
     for part in dict.fromkeys(p.part for p in panels if p.part != decision.PART):
         first = next(panel for panel in panels if panel.part == part)

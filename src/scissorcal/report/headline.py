@@ -13,10 +13,10 @@ from scissorcal.report.subjects.posterior import prior_only
 from scissorcal.report.subjects.torque import held_out_summary
 from scissorcal.verdicts import Verdict
 
-Stance = Literal["trust", "unverified", "care", "reject"]
-STANCES: tuple[Stance, ...] = ("reject", "care", "unverified", "trust")
+Assessment = Literal["trust", "unverified", "care", "reject"]
+ASSESSMENTS: tuple[Assessment, ...] = ("reject", "care", "unverified", "trust")
 """From the worst."""
-SAID: dict[Stance, str] = {
+SAID: dict[Assessment, str] = {
     "trust": "✓ trust",
     "unverified": "? not verified",
     "care": "! use with care",
@@ -30,7 +30,7 @@ class Headline:
     """What to think of one fit: a sentence, the same in brief, and the next steps in order."""
 
     fit: str
-    stance: Stance
+    assessment: Assessment
     sentence: str
     brief: str
     next_steps: tuple[str, ...]

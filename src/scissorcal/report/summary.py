@@ -150,18 +150,18 @@ def _on_plateau(plateau: Plateau | None) -> list[str]:
 def _sentence(shown: Shown) -> str:
     count = shown.log.mean.strokes
     ends = [_in_shown(shown, float(end)) for end in (shown.log.places[0], shown.log.places[-1])]
-    told = (
+    sentence = (
         f"{count} closing strokes from {ends[0]:.3g} to {ends[1]:.3g} {_place_unit(shown)}: "
         f"a mean of {_words(shown.log.mean, shown.unit)}"
     )
     if shown.apart is None:
-        return f"{told}."
+        return f"{sentence}."
     what = "more than the blank" if shown.against == "blank" else "more than the other log"
-    told += f"; {_words(shown.apart.mean, shown.unit)} {what}"
+    sentence += f"; {_words(shown.apart.mean, shown.unit)} {what}"
     if shown.apart.excludes_zero is None:
-        return f"{told} (fewer than 3 strokes: no interval)."
+        return f"{sentence} (fewer than 3 strokes: no interval)."
     leaves = "does not contain 0" if shown.apart.excludes_zero else "contains 0"
-    return f"{told}: the interval {leaves}."
+    return f"{sentence}: the interval {leaves}."
 
 
 def _per_length(shown: Shown, work: Interval) -> list[Row]:

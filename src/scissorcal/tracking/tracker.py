@@ -261,8 +261,8 @@ class PoseTracker:
         if isinstance(row, CameraPose):
             return update(state, *camera_row(state, row), self._settings.camera.gate)
         if isinstance(row, ForceDirection):
-            told = force_row(state, row, self._surface, self._settings.force)
-            return update(state, *told, self._settings.force.gate) if told else (math.nan, False)
+            force = force_row(state, row, self._surface, self._settings.force)
+            return update(state, *force, self._settings.force.gate) if force else (math.nan, False)
         errors = self._settings.contact
         found = contact_row(state, row, self._surface, errors)
         return update_by_one(state, *found, errors.gate)

@@ -1,1 +1,5 @@
 """From photographs to geometry: targets, detection, the camera, the blade, the plate."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from scissorcal.errors import InputError, OtherKindError
 from scissorcal.foreign.kinds import fit_name
 from scissorcal.identity import digest
+from scissorcal.recipe.friction import as_first_named
 from scissorcal.recipe.requirements import CaptureKind, Requirements, requirements
 from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.facts import UNFINISHED, rendering
@@ -125,7 +126,7 @@ class Engine:
         made_from = {
             "step": name,
             "version": step.version,
-            "settings": step.settings(self.recipe),
+            "settings": as_first_named(step.settings(self.recipe)),
             "effort": effort if step.by_effort else "",
             "inputs": {_plain(item): self._content(step, item) for item in step.inputs},
         }

@@ -329,12 +329,12 @@ def _kept_elsewhere(
             save(result, path)
         except OSError:
             continue
-        told = InputError(
+        error = InputError(
             f"{refusal} The fit is kept in {path}: {when}, put it in place with "
             f"'scissorcal fit restore {path}'."
         )
-        told.kept = (path,)
-        return told
+        error.kept = (path,)
+        return error
     return InputError(f"{refusal} The fit could not be kept in another folder either: it is lost.")
 
 

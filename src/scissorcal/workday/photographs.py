@@ -104,7 +104,7 @@ class Seen:
 
     words: str
     detection: "Detection | None" = None
-    stance: tuple[float, float] | None = None
+    position: tuple[float, float] | None = None
     drawn: Callable[[Path], object] | None = None
     board: CharucoBoard | MarkerBoard | Chessboard | None = None
 
@@ -153,7 +153,7 @@ def take_photographs(
                 refused.append(str(error))
                 tell(f"left out: {error}")
                 continue
-            stored = writer.add(path, photo, sighting.detection, sighting.stance)
+            stored = writer.add(path, photo, sighting.detection, sighting.position)
             if sighting.drawn is not None:
                 sighting.drawn(writer.part / f"{Path(stored.file).stem}{DRAWN_SUFFIX}")
             sightings.append(sighting)
@@ -189,11 +189,11 @@ class PhotoWriter:
         path: Path,
         photo: "Photo",
         detection: "Detection | None" = None,
-        stance: tuple[float, float] | None = None,
+        position: tuple[float, float] | None = None,
     ) -> Photograph:
         """Copy a photograph byte for byte and note what was found in it.
 
-        ``stance`` is where the rig stood: advance in mm, opening in deg.
+        ``position`` is where the rig stood: advance in mm, opening in deg.
         """
         name = f"{len(self.photographs) + 1:03d}-{path.name}"
         shutil.copyfile(path, self.part / name)
@@ -212,8 +212,8 @@ class PhotoWriter:
                 "width": photo.width,
                 "height": photo.height,
                 "orientation": photo.orientation,
-                "advance_mm": stance[0] if stance else None,
-                "opening_deg": stance[1] if stance else None,
+                "advance_mm": position[0] if position else None,
+                "opening_deg": position[1] if position else None,
                 **found,
             }
         )
@@ -251,7 +251,7 @@ def recover_photographs(folder: Path) -> tuple[str, ...]:
             continue
         part.rename(kept)
         kind = kept.name.split("-")[0]
-        words = "plate --stances FILE" if kind == "rig" else kind
+        words = "plate --positions FILE" if kind == "rig" else kind
         said.append(
             f"A capture of photographs was interrupted; those taken ({len(pictures)}) are kept in "
             f"{kept}. Give the photographs to 'scissorcal capture {words}' again."

@@ -293,11 +293,11 @@ def read_answer(answer: object, kind: Any) -> Any:
 
     if not isinstance(answer, str):
         raise ScissorcalError(f"The cluster sent no answer but {type(answer).__name__}. {REMEDY}")
-    told = parse_json(answer, "The cluster's answer", REMEDY)
-    if isinstance(told, dict) and "error" in told:
-        raise _error(str(told["error"]), str(told.get("sentence", "")))
+    message = parse_json(answer, "The cluster's answer", REMEDY)
+    if isinstance(message, dict) and "error" in message:
+        raise _error(str(message["error"]), str(message.get("sentence", "")))
     try:
-        return TypeAdapter(kind).validate_python(told["value"])
+        return TypeAdapter(kind).validate_python(message["value"])
     except (ValidationError, KeyError, TypeError) as error:
         raise ScissorcalError(
             f"The cluster's answer is not of the kind that was asked for. {REMEDY}"

@@ -105,11 +105,11 @@ def listed_captures(
     """What the captures that a recipe lists would tell of friction and of the cut; the seconds."""
     sweeps, strokes = friction_plan(recipe, identity), cut_plan(recipe, identity)
     none = Information.none(len(friction.knowledge.point))
-    of_friction = sum(_told_by_sweeps(recipe, identity, friction, sweeps).values(), none)
+    of_friction = sum(_information_of_sweeps(recipe, identity, friction, sweeps).values(), none)
     of_cut = Information.none(len(cut.knowledge.point))
     for segment in strokes.segments:
-        told = _told_by_strokes(recipe, identity, friction, cut, strokes, segment)
-        of_cut = sum(told.values(), of_cut)
+        by_stroke = _information_of_strokes(recipe, identity, friction, cut, strokes, segment)
+        of_cut = sum(by_stroke.values(), of_cut)
     seconds = sum(seconds_at_rig(recipe, plan) for plan in (sweeps, strokes))
     return (of_friction, of_cut), seconds
 
@@ -158,12 +158,12 @@ def _sweeps(
         update={"speeds_rad_per_s": speeds, "repeats": 1, "excitation_s": EXCITATION_S}
     )
     plan = friction_plan(with_capture(recipe, "friction", wanted), identity)
-    told = _told_by_sweeps(recipe, identity, friction, plan)
+    by_stroke = _information_of_sweeps(recipe, identity, friction, plan)
     none = Information.none(len(friction.knowledge.point))
     seconds = _seconds_by_stroke(plan.segments[0], plan)
 
     def offer(*strokes: int) -> Offer:
-        parts = [told.get(stroke, none) for stroke in strokes]
+        parts = [by_stroke.get(stroke, none) for stroke in strokes]
         return Offer(sum(parts, none), sum(seconds.get(stroke, 0.0) for stroke in strokes))
 
     sweeps = {
@@ -188,16 +188,16 @@ def _strokes(
         )
         plan = cut_plan(with_capture(recipe, "cut", wanted), identity)
         (segment,) = plan.segments
-        told = _told_by_strokes(recipe, identity, friction, cut, plan, segment)
+        by_stroke = _information_of_strokes(recipe, identity, friction, cut, plan, segment)
         seconds = _seconds_by_stroke(segment, plan)
         for place in range(len(plan.strokes) // 2):
             both = (2 * place, 2 * place + 1)
-            tells = sum((told.get(stroke, none) for stroke in both), none)
+            tells = sum((by_stroke.get(stroke, none) for stroke in both), none)
             found[speed, place] = Offer(tells, sum(seconds.get(stroke, 0.0) for stroke in both))
     return found
 
 
-def _told_by_sweeps(
+def _information_of_sweeps(
     recipe: Recipe, identity: Identity, friction: FrictionState, plan: Plan
 ) -> dict[int, Information]:
     (segment,) = plan.segments
@@ -213,7 +213,7 @@ def _told_by_sweeps(
     return friction_information(design, known.point, friction.noise, friction.stroke_sd)
 
 
-def _told_by_strokes(
+def _information_of_strokes(
     recipe: Recipe,
     identity: Identity,
     friction: FrictionState,

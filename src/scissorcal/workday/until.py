@@ -33,7 +33,7 @@ from scissorcal.device.capture_by_parts import CHOOSING_S
 from scissorcal.device.parts import ChosenStroke, Part, part_seconds, stroke_part, sweep_part
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
-from scissorcal.model import EdgeBelief
+from scissorcal.model import EdgeDistribution
 from scissorcal.package.scene_slopes import torque_knowledge
 from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.recipe.schema import Recipe
@@ -71,7 +71,7 @@ class Earlier:
     cut_recordings: tuple[Recording, ...] = ()
     friction: FitResult | None = None
     cut: CutState | None = None
-    edge: EdgeBelief | None = None
+    edge: EdgeDistribution | None = None
     last_law: str | None = None
 
 
@@ -120,7 +120,7 @@ class UntilTolerance:
         return self._recipe.model_copy(update={"capture": offered})
 
     def __call__(self, recorded: Recording, advance: float) -> Part | None:
-        """The part that comes next, where the sledge stands at ``advance`` (m); None at the end."""
+        """The next part, where the carriage stands at ``advance`` (m); None at the end."""
         if self._taken.strokes:
             self._bring_up_to_date(recorded)
         if self._kind == "friction" and not self._taken.strokes:
@@ -157,7 +157,7 @@ class UntilTolerance:
         Blades that stick and slip at a slow speed tell less there than a planned motion says.
         """
         sweeps = {
-            speed: replace(offer, told=offer.told.times(self._used.get(speed, 1.0)))
+            speed: replace(offer, information=offer.information.times(self._used.get(speed, 1.0)))
             for speed, offer in self._stock.sweeps.items()
         }
         return replace(self._stock, sweeps=sweeps)

@@ -20,7 +20,7 @@ from scissorcal.bench.extremes.states import QUANTITIES, State, blade_of_law, pa
 from scissorcal.kernel import Kernel
 from scissorcal.model import Edge, Response
 from scissorcal.package import open_package
-from scissorcal.report.extremes import WRONG_LOOK, extremes_panels, map_chart, refusals_panel
+from scissorcal.report import WRONG_LOOK, extremes_panels, map_chart, refusals_panel
 from tests.package.conftest import pad as pad
 from tests.package.conftest import paper as paper
 

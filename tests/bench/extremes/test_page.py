@@ -12,7 +12,7 @@ from benchmarks.extremes.states import everyday_state
 from benchmarks.extremes.study import try_state
 
 from scissorcal.bench.extremes.compare import PLACE_ROUNDINGS
-from scissorcal.report.numbers import short
+from scissorcal.report import short
 
 DRAWN = ("inference", "signals")
 """Parts whose cells fit: their answers are draws, and most take long."""

@@ -23,8 +23,8 @@ from scissorcal.bench.extremes import compare
 from scissorcal.bench.extremes.compare import Judgement, compare_kernel, compare_model
 from scissorcal.bench.extremes.states import State
 from scissorcal.errors import InputError
-from scissorcal.package.exact import ExactModel
-from scissorcal.report.extremes import WRONG_LOOK
+from scissorcal.package import ExactModel
+from scissorcal.report import WRONG_LOOK
 
 SMALL = Extent(values=3, repeats=1, grid=3, random=5, everyday=5, slow=False)
 

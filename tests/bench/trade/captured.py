@@ -6,10 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.device.capture import capture, open_writer
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import RigSession
-from scissorcal.device.sim.specimen import load_specimen
+from scissorcal.device import LockstepLink, RigSession, load_specimen, open_writer
+from scissorcal.device.capture import capture
 from scissorcal.recording import Recording, read_recording
 from tests.device.recipes import short
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.device.rig_record import identity_facts
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.recording import SAMPLE_DTYPE, Kind, Recording
+from scissorcal.device import identity_facts
+from scissorcal.recipe import Recipe
+from scissorcal.recording import SAMPLE_DTYPE, Kind, Recording
 from tests.device.conftest import IDENTITY
 from tests.package.fits import cut_fit, friction_fit, recipe
 

@@ -32,7 +32,7 @@ from scissorcal.bench.trade.models import (
 )
 from scissorcal.bench.trade.recommend import choices_of
 from scissorcal.bench.trade.torque import AVERAGE, WORST
-from scissorcal.package.simplest.candidates import fitted_candidate
+from scissorcal.package import fitted_candidate
 from tests.bench.trade.cases import case, linear, pressing
 from tests.package.fits import cut_fit, friction_fit, recipe
 
@@ -54,7 +54,7 @@ def test_the_recipe_of_a_refit_compares_nothing():
         "fit",
     )
     assert fixed.cut.load_share == "none"
-    assert (fixed.friction.rung, fixed.friction.symmetry) == ("stribeck+angle", "asymmetric")
+    assert (fixed.friction.law, fixed.friction.symmetry) == ("stribeck+angle", "asymmetric")
 
 
 @pytest.mark.parametrize("kind", CUT_KNOBS)
@@ -119,7 +119,7 @@ def test_a_scene_without_a_choice_says_why():
 
 def test_no_friction_is_fitted_but_not_rendered():
     chosen = Friction().recipe(as_fitted(case()), "none")
-    assert chosen.fit.friction.rung == "coulomb"
+    assert chosen.fit.friction.law == "coulomb"
     assert not chosen.scene.render_friction
 
 

@@ -119,8 +119,8 @@ def test_no_capture_is_simulated_without_a_fit_of_friction() -> None:
 
 def test_draft_is_measured_without_the_law_that_another_fit_chose(fitted: Case) -> None:
     assert fitted.cut_fit is not None
-    usual = fitted.cut_fit.rung
+    usual = fitted.cut_fit.candidate
     other = f"{usual}, load-dependent friction"
-    cut, _, _, _ = fit_case(replace(fitted, cut_fit=replace(fitted.cut_fit, rung=other)), 0)
+    cut, _, _, _ = fit_case(replace(fitted, cut_fit=replace(fitted.cut_fit, candidate=other)), 0)
     assert cut is not None
-    assert cut.rung == usual == "power response, rippled fracture"
+    assert cut.candidate == usual == "power response, rippled fracture"

@@ -21,9 +21,7 @@ from scissorcal.bench.trade.pictures import factors_of, fit_edge, locate_plate
 from scissorcal.bench.trade.point import Sample
 from scissorcal.bench.trade.torque import WORST
 from scissorcal.errors import InputError, MissingError
-from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.photo import Photo, read_photo
+from scissorcal.vision import Camera, Photo, Pose, read_photo
 from tests.bench.trade.cases import case
 from tests.package.fits import recipe
 
@@ -137,12 +135,8 @@ def test_a_coarser_photograph_averages_blocks_and_keeps_its_places(tmp_path):
 @pytest.mark.slow
 def test_rendered_photographs_give_the_edge_and_the_pose(tmp_path):
     """Fewer and coarser photographs of one rendered blade and plate, against all of them."""
-    from scissorcal.vision.sim.sim_camera import (
-        SIM_LENS,
-        render_blade_photographs,
-        render_plate_photographs,
-    )
-    from scissorcal.workday.demo.photographs import specimen_blade
+    from scissorcal.vision import SIM_LENS, render_blade_photographs, render_plate_photographs
+    from scissorcal.workday import specimen_blade
 
     chosen = recipe("paper-photographed")
     lens = SIM_LENS

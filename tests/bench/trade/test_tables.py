@@ -13,9 +13,8 @@ from scissorcal.bench.trade.models import BYTES, STEP, central, tables_of
 from scissorcal.bench.trade.point import Setting
 from scissorcal.bench.trade.torque import AVERAGE, WORST
 from scissorcal.errors import MissingError, ScissorcalError
-from scissorcal.package.compile import TOLERANCE, compile_model
+from scissorcal.package import TOLERANCE, compile_model, cost_and_error, table_bytes
 from scissorcal.package.stated_bound import stated_bound
-from scissorcal.package.table_cost import cost_and_error, table_bytes
 from tests.bench.trade.cases import case, linear, pressing
 
 

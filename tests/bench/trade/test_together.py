@@ -52,9 +52,9 @@ def test_the_choices_reach_the_fits_and_the_tables_and_errors_are_of_what_is_ren
 
 
 class Fitted:
-    """A fit of an edge, of which only the belief is used."""
+    """A fit of an edge, of which only the posterior is used."""
 
-    belief = "an edge"
+    edge_posterior = "an edge"
 
 
 def test_time_of_photographs_counts_and_their_edge_is_fitted_with(fitted, monkeypatch):
@@ -65,7 +65,7 @@ def test_time_of_photographs_counts_and_their_edge_is_fitted_with(fitted, monkey
     knob = Together((("photographs", "2 photographs"),))
     sample = knob.measure(one, knob.settings(one)[1], 0)
     assert sample.costs[PROCESSOR].value == 5.0
-    assert fitted[-1].edge == Fitted.belief
+    assert fitted[-1].edge == Fitted.edge_posterior
 
 
 def test_what_a_measurement_at_once_does_not_hold_says_so():

@@ -28,10 +28,7 @@ from scissorcal.calibration.camera.uncertainty import (
 from scissorcal.calibration.fit_pictures import left_over, residual_chart, uncertainty_chart
 from scissorcal.calibration.plate.checks import CAMERA
 from scissorcal.errors import MissingError, VerdictError
-from scissorcal.vision.geometry.camera import Camera, usual_camera
-from scissorcal.vision.sim import Lens, SimPose
-from scissorcal.vision.targets.boards import CAMERA_BOARD
-from scissorcal.vision.targets.detect import Detection
+from scissorcal.vision import CAMERA_BOARD, Camera, Detection, Lens, SimPose, usual_camera
 
 WIDTH, HEIGHT = 1280, 720
 TRUE = np.array([1150.0, 1150.0, 648.0, 354.0, -0.2, 0.05, 0.0008, -0.0005, 0.0, 0.0, 0.0])

@@ -15,13 +15,13 @@ from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.model import (
     Cutting,
     Edge,
-    EdgeBelief,
+    EdgeDistribution,
     FrictionLaw,
     Response,
     cut_torque_along,
+    torque_at,
 )
-from scissorcal.model.cutting import torque_at
-from scissorcal.recording.recording import Stroke
+from scissorcal.recording import Stroke
 from tests.calibration.cut.path.made import COULOMB, INERTIA, RATE_HZ, Made, record
 from tests.calibration.truth import Truth, sweep
 
@@ -29,7 +29,9 @@ TRUTH = Truth()
 EDGE = Edge("line", TRUTH.edge_offset, TRUTH.taper, 0.075)
 RESPONSE = Response("power", TRUTH.force, TRUTH.exponent, TRUTH.reference)
 LAW = Cutting(EDGE, RESPONSE, 2, TRUTH.upper_face, TRUTH.fracture_energy)
-GEOMETRY = Geometry(EdgeBelief(EDGE, (), np.zeros((0, 0))), TRUTH.upper_face, 2, TRUTH.reference)
+GEOMETRY = Geometry(
+    EdgeDistribution(EDGE, (), np.zeros((0, 0))), TRUTH.upper_face, 2, TRUTH.reference
+)
 GUESS = Guess(RESPONSE, TRUTH.fracture_energy, 1.0)
 FRICTION = FrictionLaw({"coulomb": COULOMB})
 NOISE = TorqueNoise(1e-4, 1e-4, 0.01)

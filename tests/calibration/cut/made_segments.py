@@ -49,7 +49,7 @@ def _pieces(rng, q):
         way = way if closing else way[::-1]
         depth.append(np.stack([way[:-1], way[1:]], axis=1))
     depth = np.concatenate(depth)
-    # A sledge may keep the depth: in the material, and off it.
+    # A carriage may keep the depth: in the material, and off it.
     depth[9], depth[-1] = depth[9].mean(), depth[-1].mean()
     n = len(depth)
     lever = rng.uniform(0.02, 0.05, n)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.calibration import FitResult, fit_friction
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from tests.calibration.truth import SPEEDS, Truth, friction_recording
 
 RECIPES = Path(__file__).resolve().parents[3] / "recipes"
@@ -15,7 +15,7 @@ RECIPES = Path(__file__).resolve().parents[3] / "recipes"
 def paper(**cut) -> Recipe:
     """Thin paper between two moving blades; the critic is left out."""
     facts = tomllib.loads((RECIPES / "paper-80gsm.toml").read_text(encoding="utf-8"))
-    facts["fit"]["friction"] = {"rung": "coulomb+viscous", "symmetry": "asymmetric"}
+    facts["fit"]["friction"] = {"law": "coulomb+viscous", "symmetry": "asymmetric"}
     facts["fit"]["cut"].update({"critic": False, "load_share": "none", **cut})
     return Recipe.model_validate(facts)
 

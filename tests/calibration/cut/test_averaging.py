@@ -15,9 +15,8 @@ from scissorcal.calibration.cut.widening import (
     log_evidence,
 )
 from scissorcal.calibration.parameters import Layout, Parameter
-from scissorcal.inference import find_optimum, infer
-from scissorcal.inference.problem import Problem
-from scissorcal.model.transforms import IDENTITY
+from scissorcal.inference import Problem, find_optimum, infer
+from scissorcal.model import IDENTITY
 
 DATA_SD = 0.3
 NO_LAYOUT = Layout(())

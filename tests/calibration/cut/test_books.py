@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.geometry import belief_geometry
+from scissorcal.calibration.cut.geometry import geometry_of_prior
 from scissorcal.calibration.cut.guess import Guess
 from scissorcal.calibration.cut.known import KnownFriction, MaterialData
 from scissorcal.calibration.cut.path_motion import path_motion
@@ -60,7 +60,7 @@ def compared(rig, seed: int) -> Compared:
     kappa, load = truth["kappa"], truth.get("load_share", 0.0)
     response = Response("power", truth["response_force"], truth["response_exponent"], reference_m)
     mean = truth["fracture_energy"] * (1.0 + kappa) / 2.0
-    geometry = belief_geometry(recipe, edge_of(recipe))
+    geometry = geometry_of_prior(recipe, edge_of(recipe))
     segments = cut_into_segments(
         MaterialData(motions, materials, known.noise, known.stroke_sd),
         geometry,

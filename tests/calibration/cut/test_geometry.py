@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.model import Edge, EdgeBelief, Response
-from scissorcal.model.edge_points import edge_through
+from scissorcal.model import Edge, EdgeDistribution, Response, edge_through
 from tests.calibration.truth import Truth
 
 TRUTH = Truth()
@@ -19,7 +18,9 @@ OPENING = np.linspace(0.25, 0.8, 7)
 
 def geometry(edge=LINE, closure="work", names=NAMES, moving=2) -> Geometry:
     covariance = np.diag([5e-5, 1e-3])[: len(names), : len(names)] ** 2
-    return Geometry(EdgeBelief(edge, names, covariance), TRUTH.upper_face, moving, 1.5e-4, closure)
+    return Geometry(
+        EdgeDistribution(edge, names, covariance), TRUTH.upper_face, moving, 1.5e-4, closure
+    )
 
 
 def test_indentation_and_lever_are_those_of_heights_by_bisection():
@@ -51,27 +52,27 @@ def test_a_place_has_the_indentation_that_was_asked_for(edge, moving):
 @pytest.mark.parametrize("edge", [LINE, ARC], ids=["line", "arc"])
 @pytest.mark.parametrize("moving", [1, 2])
 @pytest.mark.parametrize("exponent", [0.4, 0.8, 1.5, 2.5])
-@pytest.mark.parametrize("sledge", [-0.05, 0.0, 0.05], ids=["back", "still", "ahead"])
-def test_lever_and_mean_force_give_the_mean_torque(edge, moving, exponent, sledge):
-    """Against 20,001 points of a segment, whose sledge moves by ``sledge`` m for each rad.
+@pytest.mark.parametrize("carriage", [-0.05, 0.0, 0.05], ids=["back", "still", "ahead"])
+def test_lever_and_mean_force_give_the_mean_torque(edge, moving, exponent, carriage):
+    """Against 20,001 points of a segment, whose carriage moves by ``carriage`` m for each rad.
 
-    Exact where the sledge stands, in contact or with any part of the path in the air; where it
+    Exact where the carriage stands, in contact or with any part of the path in the air; where it
     moves, the levers of the path in the air are included in the mean.
     """
     shape = geometry(edge, moving=moving)
     response = Response("power", 5.0, exponent, shape.reference_m)
-    limit = 1.3e-2 if sledge else 3e-6
+    limit = 1.3e-2 if carriage else 3e-6
     for deepest in (2e-5, 6e-5, 4e-4):
         turned = 3e-3
         contact = float(shape.place(0.3, deepest))
         opening = np.array([[0.3, 0.3 + turned]])
-        ends = np.array([[contact, contact - sledge * turned]])
+        ends = np.array([[contact, contact - carriage * turned]])
         span = shape.spans(opening, np.array([0.5]), ends)
         stored = [float(response.energy_at(d)) if d > 0 else 0.0 for d in span.depth[0]]
         force = (stored[1] - stored[0]) / float(np.diff(span.depth[0])[0])
         way = np.linspace(0.0, 1.0, 20001)
         depth, lever = shape.depth_and_lever(
-            edge, 0.3 + turned * way, contact - sledge * turned * way
+            edge, 0.3 + turned * way, contact - carriage * turned * way
         )
         torque = np.where(depth > 0, response.force_at(np.maximum(depth, 1e-12)), 0.0) * lever
         assert force * span.lever[0] == pytest.approx(np.trapezoid(torque, way), rel=limit)
@@ -90,7 +91,7 @@ def test_segments_are_expanded_as_differences_say(edge):
     assert spans.depth + spans.depth_dx * moved == pytest.approx(other.depth, abs=3e-8)
     assert spans.lever + spans.lever_dx * moved == pytest.approx(other.lever, abs=1e-7)
     away = np.array([2e-5, 5e-4])
-    edge_off = shape.belief.with_values(shape.belief.mean + away)
+    edge_off = shape.edge_prior.with_values(shape.edge_prior.mean + away)
     other = geometry(edge_off).spans(opening, rate, contact)
     assert spans.depth + spans.depth_de @ away == pytest.approx(other.depth, abs=2e-8)
     assert spans.lever + spans.lever_de @ away == pytest.approx(other.lever, abs=1e-7)
@@ -119,7 +120,7 @@ def test_running_cracks_are_expanded_as_differences_say(edge):
     slope = shape.slope(OPENING, place)
     assert view.slope + view.slope_dd * deeper == pytest.approx(slope, abs=1e-6)
     away = np.array([2e-5, 5e-4])
-    other = shape.belief.with_values(shape.belief.mean + away)
+    other = shape.edge_prior.with_values(shape.edge_prior.mean + away)
     place = shape.place(OPENING, shape.reference_m, other)
     assert view.place + view.place_de @ away == pytest.approx(place, abs=2e-6)
     _, lever = shape.depth_and_lever(other, OPENING, place)

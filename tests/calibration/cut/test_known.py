@@ -8,7 +8,7 @@ import pytest
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path_motion import path_motion
 from scissorcal.model import friction_torque
-from scissorcal.recipe.priors import CutPriors
+from scissorcal.recipe import CutPriors
 from tests.calibration.cut.path.made import record
 from tests.calibration.truth import sweep
 from tests.package.fits import friction_fit

@@ -10,7 +10,7 @@ from scissorcal.calibration.cut.known import MaterialData
 from scissorcal.calibration.cut.usage import FREE, STARTING, usage_of_segments, usage_sentence
 from scissorcal.calibration.cut.widening import NOT_KNOWN
 from scissorcal.calibration.signals.usage import INVALID
-from scissorcal.recording.recording import Stroke
+from scissorcal.recording import Stroke
 from tests.calibration.cut.made_cuts import GEOMETRY, GUESS, HIGH, LOW, NOISE, cut, way
 from tests.calibration.cut.recipes import friction_of, paper
 from tests.calibration.truth import Truth, make_recording, sweep

@@ -11,7 +11,7 @@ import pytest
 from scissorcal.calibration import FitResult, cut_experiment, cutting_from, fit_cut
 from scissorcal.calibration.fit_model import CutRun
 from scissorcal.calibration.store import load_fit, save
-from scissorcal.model import Edge, EdgeBelief
+from scissorcal.model import Edge, EdgeDistribution
 from tests.calibration.cut.recipes import friction_of, paper, pressing
 from tests.calibration.truth import (
     Truth,
@@ -93,7 +93,7 @@ def test_damping_is_separated_from_none(friction, damping):
 def test_an_uncertain_edge_is_among_the_draws(friction):
     rng = np.random.default_rng(23)
     cuts = cut_recording(SMOOTH, rng, sheets=1)
-    edge = EdgeBelief(LINE, ("offset_m", "taper_rad"), np.diag([5e-5, 1e-3]) ** 2)
+    edge = EdgeDistribution(LINE, ("offset_m", "taper_rad"), np.diag([5e-5, 1e-3]) ** 2)
     wanted = paper(fracture="smooth")
     fit = fit_cut((cuts,), wanted, friction, effort="draft", rng=rng, run=CutRun(edge=edge))
     recovers(fit, SMOOTH, "response_force", "response_exponent", "fracture_energy")

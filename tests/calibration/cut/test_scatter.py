@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.cut.checks import scatter_verdict
-from scissorcal.recipe.priors import CutPriors
+from scissorcal.recipe import CutPriors
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from scissorcal.calibration import fit_cut
 from scissorcal.calibration.cut.checks import SheetStrokes, count_empty, stale_verdict
 from scissorcal.calibration.cut.path_motion import path_motion
 from scissorcal.calibration.cut.path_work import material_of
-from scissorcal.recording.recording import Stroke
+from scissorcal.recording import Stroke
 from tests.calibration.cut.made_cuts import FRICTION, HIGH, LOW, cut, way
 from tests.calibration.cut.path.made import INERTIA
 from tests.calibration.cut.recipes import friction_of, paper

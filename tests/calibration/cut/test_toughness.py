@@ -8,7 +8,7 @@ import pytest
 
 from scissorcal.calibration.cut.unknowns import with_toughness
 from scissorcal.calibration.store import load_fit, save
-from scissorcal.recipe.schema import Recipe
+from scissorcal.recipe import Recipe
 from tests.package.fits import cut_fit, recipe
 
 

@@ -130,8 +130,8 @@ def test_a_fitted_load_share_leaves_no_error_while_closing():
     assert "0.05 (sd 0.01)" in verdict.why
     auto = paper(load_share="auto")
     laws = ("power response", "power response, load-dependent friction")
-    both = replace(cut_fit(auto), rungs=tuple({"name": law} for law in laws))
+    both = replace(cut_fit(auto), candidates=tuple({"name": law} for law in laws))
     compared = checks(auto, both)[0]["friction by load"]
     assert (compared.status, compared.value) == ("pass", 0.0)
-    one = replace(both, rungs=both.rungs[:1])
+    one = replace(both, candidates=both.candidates[:1])
     assert checks(auto, one)[0]["friction by load"].value == pytest.approx(0.1)

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from scissorcal.calibration.cut.laws import allowed_laws, usual_law
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 
 
 @pytest.mark.parametrize(

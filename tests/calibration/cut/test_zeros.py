@@ -7,8 +7,8 @@ import pytest
 
 from scissorcal.calibration import fit_cut, fit_friction
 from scissorcal.calibration.result import FitResult
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.recording import Recording
+from scissorcal.recipe import Recipe
+from scissorcal.recording import Recording
 from tests.second_rig import capture_cut, capture_friction, draw_truth, fine, recipe_for
 
 SEED = 9301
@@ -19,7 +19,7 @@ def recipe_of(rig: object) -> Recipe:
     recipe = recipe_for(rig, sheets=1)
     cut = recipe.fit.cut.model_copy(update={"critic": False, "load_share": "none"})
     friction = recipe.fit.friction.model_copy(
-        update={"critic": False, "rung": "stribeck+angle", "symmetry": "asymmetric"}
+        update={"critic": False, "law": "stribeck+angle", "symmetry": "asymmetric"}
     )
     fit = recipe.fit.model_copy(update={"cut": cut, "friction": friction})
     return recipe.model_copy(update={"fit": fit})

@@ -20,8 +20,8 @@ from scissorcal.calibration.design import (
 )
 from scissorcal.calibration.design.choice import SPARE, _shorter
 from scissorcal.calibration.parameters import Layout, Parameter
-from scissorcal.model.transforms import IDENTITY
-from scissorcal.recipe.fields import MOST_SPEEDS
+from scissorcal.model import IDENTITY
+from scissorcal.recipe import MOST_SPEEDS
 
 TORQUE = np.array([0.1, 0.1, 0.1])
 
@@ -152,7 +152,10 @@ def test_a_tolerance_that_no_stroke_reaches_is_said_so() -> None:
     start = known(tolerance=0.01)
     offers = stock()
     wrong = {
-        key: replace(offer, told=replace(offer.told, errors={"run": offer.told.curvature[0]}))
+        key: replace(
+            offer,
+            information=replace(offer.information, errors={"run": offer.information.curvature[0]}),
+        )
         for key, offer in offers.strokes.items()
     }
     start = replace(start, cut=replace(start.cut, error_shares={"run": 0.1}))

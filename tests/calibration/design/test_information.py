@@ -25,12 +25,11 @@ from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
-from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.trajectory import Plan, friction_plan
-from scissorcal.inference.curvature import likelihood_information
-from scissorcal.model.transforms import IDENTITY, LOG
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.workday.stock import nominal_identity
+from scissorcal.device import Plan, cut_plan, friction_plan
+from scissorcal.inference import likelihood_information
+from scissorcal.model import IDENTITY, LOG
+from scissorcal.recipe import builtin_recipe
+from scissorcal.workday import nominal_identity
 
 RECIPE = builtin_recipe("paper-80gsm")
 IDENTITY_OF_RIG = nominal_identity(RECIPE)

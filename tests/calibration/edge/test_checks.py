@@ -14,7 +14,7 @@ from tests.calibration.edge.test_fit import LENGTH, cells, measurement
 
 
 def verdict(fit, check="residual against claimed sd"):
-    chosen = next(row for row in fit.rungs if row.chosen)
+    chosen = next(row for row in fit.candidates if row.chosen)
     found = blade_verdicts(fit, chosen, SamplingStatus.WEIGHED, "Drawn.", "draft")
     return next(one for one in found if one.check == check)
 

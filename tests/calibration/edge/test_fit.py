@@ -23,11 +23,8 @@ from scissorcal.calibration.edge.model import (
 from scissorcal.calibration.edge.result import BladeResult, FoundNick
 from scissorcal.errors import InputError
 from scissorcal.inference import SamplingStatus
-from scissorcal.recipe.library import recipe_path
-from scissorcal.recipe.load import load_recipe
-from scissorcal.vision.blade.borders import BorderPoints
-from scissorcal.vision.blade.measure import BladeMeasurement
-from scissorcal.vision.blade.silhouette import BladeParts
+from scissorcal.recipe import load_recipe, recipe_path
+from scissorcal.vision import BladeMeasurement, BladeParts, BorderPoints
 
 LENGTH = 0.075
 
@@ -95,11 +92,13 @@ def test_the_family_is_found_and_the_edge_within_its_intervals(family):
     assert order.index(best.family) >= order.index(family)
     assert (best.family == "spline") == (family == "spline")
     s = np.linspace(0.15, 0.95, 9) * LENGTH
-    draws = compared.belief.with_values(compared.draws).offset_at(s)
+    draws = compared.edge_posterior.with_values(compared.draws).offset_at(s)
     z = (draws.mean(axis=0) - shape(family, s)) / draws.std(axis=0)
     assert np.abs(z).max() < 3.5
-    # the belief is what the draws are
-    np.testing.assert_allclose(compared.belief.edge.offset_at(s), draws.mean(axis=0), atol=1e-8)
+    # the posterior is what the draws are
+    np.testing.assert_allclose(
+        compared.edge_posterior.edge.offset_at(s), draws.mean(axis=0), atol=1e-8
+    )
 
 
 def test_simpler_families_that_the_evidence_rejects_are_not_chosen():
@@ -177,7 +176,7 @@ def test_intervals_hold_what_they_say_over_many_blades():
         compared = compare_edges(
             CellData((cells("arc", rng),), LENGTH), "draft", rng, ("arc", "cubic")
         )
-        edges = compared.belief.with_values(compared.draws)
+        edges = compared.edge_posterior.with_values(compared.draws)
         s = 0.6 * LENGTH
         low, high = np.quantile(edges.offset_at(s), [0.05, 0.95])
         slopes = np.quantile(edges.slope_at(s), [0.05, 0.95])
@@ -196,7 +195,7 @@ def test_several_photographs_share_what_is_shared_and_average_what_is_not():
             for k in range(count)
         )
         compared = compare_edges(CellData(every, LENGTH), "draft", rng, ("line",))
-        draws = compared.belief.with_values(compared.draws)
+        draws = compared.edge_posterior.with_values(compared.draws)
         return float(draws.offset_at(0.5 * LENGTH).std())
 
     one, four = sd_of(1), sd_of(4)
@@ -281,10 +280,10 @@ def test_without_a_scale_the_edge_is_in_blade_lengths_until_a_length_is_given(tm
     flat = measurement(rng, metric=False)
     free = fit_blade([flat], None, effort="draft", rng=rng)
     assert not free.metric
-    assert free.belief.edge.length_m == pytest.approx(1.0)
+    assert free.edge_posterior.edge.length_m == pytest.approx(1.0)
     assert any("--length-mm" in note for note in free.notes)
     with pytest.raises(InputError, match="no scale"):
-        _ = BladeResult((free,), (), "x", ()).belief
+        _ = BladeResult((free,), (), "x", ()).edge_posterior
     known = fit_blade([flat], None, effort="draft", rng=rng, blade=Blade(length_m=LENGTH))
     assert known.metric
     assert np.abs(known.offset.mean - shape("line", known.station)).max() < 3e-5

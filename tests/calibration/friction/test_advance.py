@@ -1,10 +1,10 @@
-"""Mass and friction of sledges on two virtual rigs of other construction, and what is refused."""
+"""Mass and friction of carriages on two virtual rigs of other construction, and what is refused."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.sledge import RIGS
+from benchmarks.carriage import RIGS
 
 from scissorcal.calibration.friction.advance import (
     actuation_of,
@@ -15,20 +15,17 @@ from scissorcal.calibration.friction.advance import (
 from scissorcal.calibration.friction.fit import fit_friction, friction_experiment
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.simulator import friction_simulator
-from scissorcal.device.capture import capture, open_writer
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import RigSession
-from scissorcal.device.sim.specimen import load_specimen
+from scissorcal.device import LockstepLink, RigSession, load_specimen, open_writer
+from scissorcal.device.capture import capture
 from scissorcal.errors import InputError
-from scissorcal.recipe.friction import AdvanceSettings, FitFrictionAdvance
-from scissorcal.recipe.priors import JointPriors
+from scissorcal.recipe import AdvanceSettings, FitFrictionAdvance, JointPriors
 from scissorcal.recording import Recording, read_recording
 from tests.device.recipes import changed
 from tests.second_rig import capture_friction_advance, coarse, fine, recipe_for
 
 TRUTH = load_specimen("office-paper").mechanism.advance
 SHORT = {"speeds_mm_per_s": (12.0, 30.0, 80.0), "repeats": 1, "excitation_s": 4.0}
-SIMPLE = FitFrictionAdvance(rung="coulomb+viscous", symmetry="symmetric", critic=False).with_priors(
+SIMPLE = FitFrictionAdvance(law="coulomb+viscous", symmetry="symmetric", critic=False).with_priors(
     JointPriors()
 )
 
@@ -59,7 +56,7 @@ def fit(recording: Recording) -> FitResult:
     return fitted(recording)
 
 
-def test_mass_and_friction_of_the_virtual_rigs_sledge_are_found(fit):
+def test_mass_and_friction_of_the_virtual_rigs_carriage_are_found(fit):
     for name, truth in (
         ("inertia", TRUTH.mass_kg),
         ("coulomb", TRUTH.coulomb_N),
@@ -137,7 +134,7 @@ def test_a_trust_check_simulates_and_refits_the_fits_own_motion(recording, fit):
         (coarse, 5e-5, "coulomb+viscous+presliding"),
     ],
 )
-def test_a_sledge_of_another_rig_is_found(make, presliding_m, law):
+def test_a_carriage_of_another_rig_is_found(make, presliding_m, law):
     """Another integrator, servo, delay and encoder; dry friction by Dahl's law."""
     rig = make()
     mechanism = replace(rig.mechanism, sledge_presliding_m=presliding_m)
@@ -147,7 +144,7 @@ def test_a_sledge_of_another_rig_is_found(make, presliding_m, law):
         update={"rig": plain.rig}
     )
     recording, _ = capture_friction_advance(rig, recipe, np.random.default_rng(8))
-    fit = fitted(recording, SIMPLE.model_copy(update={"rung": law}), "draft")
+    fit = fitted(recording, SIMPLE.model_copy(update={"law": law}), "draft")
     late = rig.motor.delay_ticks + rig.motor.lag_ticks
     assert actuation_of(fit).late_ticks == pytest.approx(late, abs=0.15)
     for name, truth in (
@@ -162,8 +159,8 @@ def test_a_sledge_of_another_rig_is_found(make, presliding_m, law):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rig", ["first", "second"])
-def test_intervals_hold_mass_and_friction_of_drawn_sledges(rig):
-    """Four sledges of a rig: of 12 intervals of 90 % at least 8 hold (fewer by chance in 0.4 % of
+def test_intervals_hold_mass_and_friction_of_drawn_carriages(rig):
+    """Four carriages of a rig: of 12 intervals of 90 % at least 8 hold (fewer by chance in 0.4 % of
     such tests, were they exact), and no estimate is off by more than 1 %."""
     held, errors = [], []
     for seed in range(700, 704):
@@ -184,14 +181,14 @@ def test_a_recording_whose_motors_were_never_on_is_refused(recording):
         fitted(replace(recording, samples=samples))
 
 
-def test_a_sledge_that_hardly_moved_is_refused(recording):
+def test_a_carriage_that_hardly_moved_is_refused(recording):
     samples = recording.samples.copy()
     samples["advance"] = 0.1
     with pytest.raises(InputError, match="hardly any motion"):
         fitted(replace(recording, samples=samples))
 
 
-def test_errors_name_the_keys_of_the_sledge(recording):
+def test_errors_name_the_keys_of_the_carriage(recording):
     wrong = SIMPLE.model_copy(update={"adopt": ("sign",)})
     with pytest.raises(InputError, match=r"fit\.friction_advance\.adopt"):
         fitted(recording, wrong)

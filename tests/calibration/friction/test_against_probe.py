@@ -10,10 +10,8 @@ import pytest
 from scissorcal.calibration import FitResult, fit_friction
 from scissorcal.calibration.caveats import LONG_WINDOWS, caveats_of
 from scissorcal.calibration.friction.probed import inertia_verdict
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.header import Joint
-from scissorcal.recording.probe import PROBE_KEY, Estimate, ProbeResult
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import PROBE_KEY, SAMPLE_DTYPE, Estimate, Joint, ProbeResult, Recording
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
 PUSHED, SD = 4e-4, 0.04
@@ -90,7 +88,7 @@ def swept_day(step_rad: float | None, probe: bool) -> FitResult:
     if step_rad is not None:
         samples["opening"] = np.round(samples["opening"] / step_rad) * step_rad
     device = recording(NOW).device if probe else {}
-    settings = FitFriction(rung="coulomb+viscous", critic=False)
+    settings = FitFriction(law="coulomb+viscous", critic=False)
     day = (replace(made, samples=samples, device=device),)
     return fit_friction(day, settings, effort="draft", rng=np.random.default_rng(0))
 
@@ -102,7 +100,7 @@ def test_behind_coarse_steps_a_fit_takes_the_pushes_inertia() -> None:
     assert own.mean == pytest.approx(2e-4, rel=0.1)
     assert stated.mean == pytest.approx(PUSHED, rel=0.01)
     assert stated.sd == pytest.approx(SD * PUSHED, rel=0.1)
-    assert stated.believed
+    assert stated.measured_prior
     place = [one.name for one in found.parameters].index("inertia")
     assert found.map_point[place] == pytest.approx(PUSHED)
     others = np.arange(len(found.parameters)) != place

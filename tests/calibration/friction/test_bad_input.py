@@ -12,13 +12,11 @@ import pytest
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.layout import empty_samples
-from scissorcal.recording.recording import Joint, Recording
-from scissorcal.recording.strokes import label_strokes
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Joint, Recording, empty_samples, label_strokes
 
 COULOMB, VISCOUS = 0.05, 0.02
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
 
 
 def log(

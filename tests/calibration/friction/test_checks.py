@@ -9,9 +9,9 @@ from scipy.ndimage import uniform_filter1d
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.checks import bandwidth_verdict
 from scissorcal.calibration.parameters import Layout, Parameter
-from scissorcal.model.transforms import LOG
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.model import LOG
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
 
@@ -23,8 +23,8 @@ def with_friction(recording: Recording, term) -> Recording:
     return dataclasses.replace(recording, samples=samples)
 
 
-def verdicts(recording: Recording, rung: str, symmetry: str = "asymmetric"):
-    settings = FitFriction(rung=rung, symmetry=symmetry)
+def verdicts(recording: Recording, law: str, symmetry: str = "asymmetric"):
+    settings = FitFriction(law=law, symmetry=symmetry)
     fit = fit_friction((recording,), settings, effort="draft", rng=np.random.default_rng(0))
     return {verdict.check: verdict for verdict in fit.verdicts}
 
@@ -32,11 +32,11 @@ def verdicts(recording: Recording, rung: str, symmetry: str = "asymmetric"):
 @pytest.mark.parametrize(
     "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))]
 )
-@pytest.mark.parametrize("rung", ["coulomb+viscous", "stribeck"])
-def test_a_joint_as_joints_are_passes(seed, rung):
+@pytest.mark.parametrize("law", ["coulomb+viscous", "stribeck"])
+def test_a_joint_as_joints_are_passes(seed, law):
     """Three standard deviations on at most six levels: false alarm below 1 % a fit."""
     truth = Truth(viscous=0.002)
-    found = verdicts(friction_recording(truth, np.random.default_rng(seed), QUICK), rung)
+    found = verdicts(friction_recording(truth, np.random.default_rng(seed), QUICK), law)
     assert found["physical"].status == "pass"
     assert found["start"].status == "pass"
 
@@ -117,7 +117,7 @@ def test_windows_too_short_for_the_encoder_are_lengthened():
     rough.samples["opening"] = np.round(rough.samples["opening"] / 1e-4) * 1e-4
     for cutoff_Hz in (75.0, 180.0):
         settings = FitFriction(
-            rung="coulomb+viscous", symmetry="asymmetric", cutoff_Hz=cutoff_Hz, critic=False
+            law="coulomb+viscous", symmetry="asymmetric", cutoff_Hz=cutoff_Hz, critic=False
         )
         fit = fit_friction((rough,), settings, effort="standard", rng=np.random.default_rng(7))
         inertia = fit.parameter("inertia")

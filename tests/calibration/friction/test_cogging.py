@@ -11,12 +11,11 @@ from scissorcal.calibration.friction.model import design
 from scissorcal.calibration.friction.noise import FALSE_ALARM, find_cogging
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.model import FrictionLaw
-from scissorcal.recipe.priors import JointPriors
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.recipe import FitFriction, JointPriors
+from scissorcal.recording import Recording
 from tests.calibration.truth import Truth, friction_recording
 
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
 PERIODS, SIZE = 137.0, 6e-4
 
 

@@ -13,7 +13,7 @@ from scissorcal.calibration.friction.advance import (
     force_samples,
     two_tick_means,
 )
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording, Stroke
+from scissorcal.recording import SAMPLE_DTYPE, Recording, Stroke
 
 FINE = 2000
 
@@ -62,7 +62,7 @@ def test_a_command_that_stands_is_the_force(level, delay, lag):
 
 
 def moved(delay, lag, mass=0.7, coulomb=0.5, seconds=6.0):
-    """A recording of a sledge under a wandering command: exact within each small step."""
+    """A recording of a carriage under a wandering command: exact within each small step."""
     rng = np.random.default_rng(3)
     count, small = round(1e3 * seconds), 20
     tones = 2.0 * np.pi * rng.uniform(1.0, 8.0, 12)

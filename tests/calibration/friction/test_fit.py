@@ -9,14 +9,14 @@ import pytest
 from scissorcal.calibration import fit_friction, load_fit, save
 from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.errors import InputError
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
 SHARED = Path(__file__).resolve().parents[4] / "shared" / "data"
 EMPS = SHARED / "emps" / "DATA_EMPS.mat"
 
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
 
 
 @pytest.fixture(scope="module")
@@ -55,21 +55,21 @@ def ladder(recording):
 
 
 def test_the_ladder_does_not_climb_higher_than_the_data(ladder):
-    assert ladder.rung.startswith("coulomb + viscous")
-    assert [row["name"] for row in ladder.rungs if row["chosen"]] == [ladder.rung]
-    assert len(ladder.rungs) == 8
+    assert ladder.candidate.startswith("coulomb + viscous")
+    assert [row["name"] for row in ladder.candidates if row["chosen"]] == [ladder.candidate]
+    assert len(ladder.candidates) == 8
     assert ladder.diagnostics["evaluations"] > 8 * 50
 
 
 def test_laws_with_build_up_are_not_searched_where_reversals_show_none(ladder):
     (note,) = (note for note in ladder.notes if note.startswith("Not fitted: "))
     assert "stribeck + angle + presliding, asymmetric" in note
-    assert not any("presliding" in row["name"] for row in ladder.rungs)
+    assert not any("presliding" in row["name"] for row in ladder.candidates)
 
 
 def test_a_fit_names_equivalent_candidates_and_what_would_distinguish_them(ladder):
-    alike = [row["name"] for row in ladder.rungs if row["equivalent"]]
-    assert ladder.rung in alike
+    alike = [row["name"] for row in ladder.candidates if row["equivalent"]]
+    assert ladder.candidate in alike
     assert len(alike) > 1
     for name in alike:
         assert name in ladder.selection
@@ -86,7 +86,7 @@ def test_draft_fits_the_law_that_was_chosen_last(recording):
         rng=np.random.default_rng(3),
         run=FrictionRun(last_chosen="coulomb + viscous, asymmetric"),
     )
-    assert [row["name"] for row in found.rungs] == ["coulomb + viscous, asymmetric"]
+    assert [row["name"] for row in found.candidates] == ["coulomb + viscous, asymmetric"]
     assert any("Draft effort fitted one law of 10" in note for note in found.notes)
 
 
@@ -200,7 +200,7 @@ def test_emps_agrees_with_its_published_values(symmetry):
     The published fit has the turns in and this one leaves them out, so the two do not see the same
     samples.
     """
-    settings = FitFriction(rung="coulomb+viscous", symmetry=symmetry)
+    settings = FitFriction(law="coulomb+viscous", symmetry=symmetry)
     found = fit_friction((emps(),), settings, effort="standard", rng=np.random.default_rng(0))
     for name, (value, _) in PUBLISHED[symmetry].items():
         own = found.parameter(name)
@@ -215,8 +215,8 @@ def test_emps_prefers_an_asymmetric_law():
     found = fit_friction(
         (emps(),), FitFriction(critic=False), effort="standard", rng=np.random.default_rng(0)
     )
-    assert found.rung == "stribeck + angle + presliding, asymmetric"
-    behind = {row["name"]: row["behind"] for row in found.rungs}
+    assert found.candidate == "stribeck + angle + presliding, asymmetric"
+    behind = {row["name"]: row["behind"] for row in found.candidates}
     assert behind["coulomb + viscous, asymmetric"] > 100.0
     assert behind["coulomb + viscous, symmetric"] > behind["coulomb + viscous, asymmetric"] + 100.0
     assert found.parameter("inertia").mean == pytest.approx(95.1, rel=0.01)
@@ -232,7 +232,7 @@ def test_an_adopted_term_is_fitted_recovered_and_kept(tmp_path):
     bent = dataclasses.replace(recording, samples=samples)
     settings = SIMPLE.model_copy(update={"adopt": ("rate^2",), "critic": False})
     found = fit_friction((bent,), settings, effort="standard", rng=np.random.default_rng(22))
-    assert found.rung == "coulomb + viscous + rate^2, asymmetric"
+    assert found.candidate == "coulomb + viscous + rate^2, asymmetric"
     assert found.structure["adopt"] == ["rate^2"]
     term = found.parameter("rate^2")
     assert abs(term.mean - 8e-4) < 4 * term.sd
@@ -275,11 +275,11 @@ def test_presliding_is_recovered_from_turns():
     samples["motor_torque"] = drive + 3e-4 * rng.standard_normal(len(time))
     samples["stroke"] = -1
     recording = Recording("friction", samples, source="turns")
-    settings = FitFriction(rung="coulomb+presliding", symmetry="symmetric", critic=False)
+    settings = FitFriction(law="coulomb+presliding", symmetry="symmetric", critic=False)
     found = fit_friction((recording,), settings, effort="standard", rng=rng)
     for name, value in (("presliding_share", 0.6), ("presliding_length", 0.03), ("coulomb", 0.02)):
         parameter = found.parameter(name)
         assert abs(parameter.mean - value) < 4 * parameter.sd + 0.01 * value, name
         assert parameter.sd < 0.1 * value, name
     every = FitFriction(symmetry="symmetric", critic=False)
-    assert "presliding" in fit_friction((recording,), every, effort="standard", rng=rng).rung
+    assert "presliding" in fit_friction((recording,), every, effort="standard", rng=rng).candidate

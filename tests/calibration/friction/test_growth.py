@@ -8,8 +8,8 @@ import pytest
 
 from scissorcal.calibration import between, fit_friction
 from scissorcal.calibration.friction import columns
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording
 from tests.calibration.truth import SPEEDS, Truth, friction_recording
 
 LONG = 3
@@ -47,7 +47,7 @@ def long(short: Recording) -> Recording:
 
 
 def fit(recording: Recording, **settings) -> None:
-    one = FitFriction(rung="stribeck+angle", symmetry="asymmetric", **settings)
+    one = FitFriction(law="stribeck+angle", symmetry="asymmetric", **settings)
     fit_friction((recording,), one, effort="draft", rng=np.random.default_rng(2))
 
 

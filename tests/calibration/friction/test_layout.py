@@ -8,10 +8,9 @@ import pytest
 from scissorcal.calibration.friction.layout import LawChoice, friction_layout, friction_precision
 from scissorcal.calibration.friction.model import design
 from scissorcal.calibration.signals.weak_form import weigh
-from scissorcal.model.friction_terms import law_names
-from scissorcal.model.transforms import LOG, LOGIT
-from scissorcal.recipe.priors import JointPriors, LogNormalPrior
-from scissorcal.recording.recording import Joint
+from scissorcal.model import LOG, LOGIT, law_names
+from scissorcal.recipe import JointPriors, LogNormalPrior
+from scissorcal.recording import Joint
 from tests.calibration.truth import Truth, friction_recording
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from scissorcal.calibration import fit_friction, friction_experiment
 from scissorcal.inference import find_optimum, fit_ar
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.recipe import FitFriction
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
-SETTINGS = FitFriction(rung="stribeck", symmetry="asymmetric")
+SETTINGS = FitFriction(law="stribeck", symmetry="asymmetric")
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def fitted():
 def test_the_fit_again_from_its_design_is_the_fit(fitted):
     fit, experiment = fitted
     candidate = pickle.loads(pickle.dumps(experiment)).candidate(experiment.observed)
-    assert candidate.name == fit.rung
+    assert candidate.name == fit.candidate
     optimum = candidate.optimum(experiment.series)
     wanted = [i for i, n in enumerate(candidate.layout.names) if n not in experiment.nuisance]
     natural = candidate.layout.columns(optimum.point)[wanted]

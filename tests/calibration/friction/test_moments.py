@@ -9,10 +9,9 @@ from scissorcal.calibration.friction.layout import LawChoice
 from scissorcal.calibration.friction.model import design
 from scissorcal.calibration.friction.search import search
 from scissorcal.calibration.signals.weak_form import weigh
-from scissorcal.inference.curvature import gradient
-from scissorcal.recipe.priors import JointPriors
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.inference import gradient
+from scissorcal.recipe import FitFriction, JointPriors
+from scissorcal.recording import SAMPLE_DTYPE, Recording
 from tests.calibration.truth import Truth, friction_recording
 
 LAWS = (

@@ -18,13 +18,13 @@ from scissorcal.calibration.friction.predict import (
     predict_far_load,
 )
 from scissorcal.errors import InputError
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import Recording
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import Recording
 from tests.calibration.friction.test_fit import emps
 from tests.calibration.friction.test_transmission import CUTOFF_HZ, each_split, split_of
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
-SETTINGS = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+SETTINGS = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
 
 
 def predicted(
@@ -147,7 +147,7 @@ def test_real_loads_lie_within_where_the_parameters_band_held_few(split: str) ->
     """Fitted to files, or their first halves; predicted on what was not seen."""
     made = split_of(split)
     settings = FitFriction(
-        rung="coulomb+viscous+load+presliding",
+        law="coulomb+viscous+load+presliding",
         symmetry="symmetric",
         cutoff_Hz=CUTOFF_HZ,
         critic=False,

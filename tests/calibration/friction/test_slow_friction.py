@@ -15,11 +15,8 @@ from scissorcal.calibration.friction.probed import (
     opened,
     with_probed,
 )
-from scissorcal.recipe.priors import JointPriors, LogNormalPrior
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.header import Joint
-from scissorcal.recording.probe import PROBE_KEY, Posterior, ProbeResult
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recipe import FitFriction, JointPriors, LogNormalPrior
+from scissorcal.recording import PROBE_KEY, SAMPLE_DTYPE, Joint, Posterior, ProbeResult, Recording
 from tests.calibration.cut.test_known import bent
 
 SETTINGS = FitFriction()
@@ -126,7 +123,7 @@ def test_friction_at_the_slowest_sweep_changes_by_what_the_law_lacks() -> None:
     assert (after.draws[:, 1] - after.draws[:, 0]).std() > 0.4
 
 
-def test_sweeps_that_show_the_rise_are_believed() -> None:
+def test_sweeps_that_show_the_rise_decide() -> None:
     before, after = opened_from(slowest=RATE, lacking=1e-4)
     assert after is before
 

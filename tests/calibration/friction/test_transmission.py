@@ -11,9 +11,8 @@ import pytest
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.transmission import LoadSolver, two_ended
 from scissorcal.errors import InputError
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording import ImportOptions, import_table
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import SAMPLE_DTYPE, ImportOptions, Recording, import_table
 
 TOOL = Path(__file__).resolve().parents[4] / "shared" / "data" / "mis_tool_friction"
 TORQUE = 3.9811e-5
@@ -73,9 +72,9 @@ class Split:
     test: tuple[Recording, ...]
     unseen_from_s: float = 0.0
 
-    def error(self, rung: str, adopt: tuple[str, ...] = ()) -> tuple[float, float]:
+    def error(self, law: str, adopt: tuple[str, ...] = ()) -> tuple[float, float]:
         """Rms error on unseen times: all of them, and those of sure motion."""
-        settings = FitFriction(rung=rung, symmetry="symmetric", adopt=adopt, cutoff_Hz=CUTOFF_HZ)
+        settings = FitFriction(law=law, symmetry="symmetric", adopt=adopt, cutoff_Hz=CUTOFF_HZ)
         fit = fit_friction(self.train, settings, effort="draft", rng=np.random.default_rng(0))
         found = Predicted.of(fit, self.test, CUTOFF_HZ)
         unseen = found.time_s >= self.unseen_from_s
@@ -117,8 +116,8 @@ def test_real_load_is_predicted_from_the_other_end_to_six_millinewtonmetres(spli
 
 @each_split
 def test_place_and_spring_bring_it_below_five(split: str):
-    rung = "coulomb+viscous+angle+load+presliding"
-    everywhere, moving = split_of(split).error(rung, ("opening", "opening^2"))
+    law = "coulomb+viscous+angle+load+presliding"
+    everywhere, moving = split_of(split).error(law, ("opening", "opening^2"))
     assert everywhere < 5e-3
     if split == "00 and 03 on 40" and moving >= 3.2e-3:
         pytest.xfail(f"{1e3 * moving:.2g} mN m in motion, 3.2 wanted: {LEANS_ON_ITS_PRIOR}")
@@ -152,7 +151,7 @@ def driven_tool(rng: np.random.Generator, share: float = 0.2, gain: float = 0.1)
 def test_share_and_gain_of_a_known_load_are_recovered_and_the_load_with_them():
     """Four standard deviations each: false alarm 1e-4 for two parameters."""
     recording = driven_tool(np.random.default_rng(1))
-    settings = FitFriction(rung="coulomb+load", symmetry="symmetric", critic=False)
+    settings = FitFriction(law="coulomb+load", symmetry="symmetric", critic=False)
     fit = fit_friction((recording,), settings, effort="standard", rng=np.random.default_rng(2))
     for name, value in (("load_share", 0.2), ("load_gain", 0.1), ("coulomb", 0.03)):
         parameter = fit.parameter(name)
@@ -167,16 +166,16 @@ def test_a_ladder_with_a_load_finds_it_by_itself():
     recording = driven_tool(np.random.default_rng(3))
     settings = FitFriction(symmetry="symmetric")
     fit = fit_friction((recording,), settings, effort="standard", rng=np.random.default_rng(4))
-    assert "load" in fit.rung
+    assert "load" in fit.candidate
 
 
 def test_laws_and_recordings_without_a_load_are_refused():
     recording = driven_tool(np.random.default_rng(5))
-    settings = FitFriction(rung="coulomb", symmetry="symmetric")
+    settings = FitFriction(law="coulomb", symmetry="symmetric")
     plain = fit_friction((recording,), settings, effort="draft", rng=np.random.default_rng(6))
     with pytest.raises(InputError, match="has no load"):
         two_ended(plain, (recording,), 75.0)
     alone = dataclasses.replace(recording, handle_radius_m=math.nan)
-    wanted = FitFriction(rung="coulomb+load", symmetry="symmetric")
+    wanted = FitFriction(law="coulomb+load", symmetry="symmetric")
     with pytest.raises(InputError, match="needs the load that the joint bears"):
         fit_friction((alone,), wanted, effort="draft", rng=np.random.default_rng(7))

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from scissorcal.calibration.friction.choice import usual_law
-from scissorcal.model.friction_terms import CANDIDATES
-from scissorcal.recording.recording import Joint
+from scissorcal.model import CANDIDATES
+from scissorcal.recording import Joint
 
 
 @dataclass(frozen=True)

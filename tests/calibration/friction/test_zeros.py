@@ -9,11 +9,11 @@ from scissorcal.calibration import fit_friction
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.zeros import DriveZero
-from scissorcal.recording.recording import Recording
+from scissorcal.recording import Recording
 from tests.second_rig import capture_friction, draw_truth, fine, recipe_for, true_parameters
 
 SETTINGS = recipe_for(fine()).fit.friction.model_copy(
-    update={"critic": False, "rung": "stribeck+angle", "symmetry": "asymmetric"}
+    update={"critic": False, "law": "stribeck+angle", "symmetry": "asymmetric"}
 )
 LEVELS = ("coulomb_pos", "coulomb_neg")
 

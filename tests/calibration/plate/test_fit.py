@@ -9,21 +9,28 @@ import pytest
 from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.errors import InputError, MissingError, VerdictError
-from scissorcal.vision.camera_files import read_camera_file
-from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose, difference
-from scissorcal.vision.geometry.rig_frame import locate_rig
-from scissorcal.vision.photo import read_photo
-from scissorcal.vision.sim import Lens, Looks, SimPose, render, target_layers
-from scissorcal.vision.targets.boards import (
+from scissorcal.vision import (
     BLADE_MAT,
     PLATE_BOARD,
     PLATE_STRIP,
+    Camera,
     CharucoBoard,
+    Detection,
+    Lens,
+    Looks,
     MarkedBoard,
     MarkerBoard,
+    Pose,
+    SimPose,
+    difference,
+    find_board,
+    find_markers,
+    locate_rig,
+    read_camera_file,
+    read_photo,
+    render,
+    target_layers,
 )
-from scissorcal.vision.targets.detect import Detection, find_board, find_markers
 from tests.vision.geometry.test_pose import CAMERA as CARD_CAMERA
 from tests.vision.geometry.test_pose import MIDDLE, card_views
 from tests.vision.scenes import lens, photo_of, pose_before
@@ -211,7 +218,7 @@ def test_every_real_marker_is_found() -> None:
         find_board(photo, PLATE_BOARD)
 
 
-def test_stances_that_do_not_fit_the_card_fail(still: tuple[SimPose, list[PosePhoto]]) -> None:
+def test_positions_that_do_not_fit_the_card_fail(still: tuple[SimPose, list[PosePhoto]]) -> None:
     """The blade turned by half of what was said."""
     _, seen = card_views(
         [(a, b) for a in (0.0, 0.03) for b in (0.1, 0.3)], np.random.default_rng(1)

@@ -9,9 +9,7 @@ import pytest
 from scissorcal.calibration.signals.segments import bridge
 from scissorcal.calibration.signals.usage import GAP, SLOW, usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, weigh
-from scissorcal.recording.layout import empty_samples
-from scissorcal.recording.recording import Recording
-from scissorcal.recording.summarising import gap_cost
+from scissorcal.recording import Recording, empty_samples, gap_cost
 
 INERTIA, COULOMB, VISCOUS = 2e-4, 0.05, 0.02
 

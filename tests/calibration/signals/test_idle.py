@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.signals.zeros import idle_noise, idle_periods, idle_zero
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recording import SAMPLE_DTYPE, Recording
 
 ZERO, NOISE = 4e-4, 1e-3
 

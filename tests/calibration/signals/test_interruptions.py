@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.signals.soundness import interruptions
-from scissorcal.recording.recording import Recording
+from scissorcal.recording import Recording
 from tests.calibration.truth import Stroke, Truth, make_recording, sweep
 
 SPEEDS = (0.3, 0.3, 0.8, 0.8)

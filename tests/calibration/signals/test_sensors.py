@@ -8,12 +8,11 @@ import pytest
 from scissorcal.calibration import fit_friction
 from scissorcal.calibration.signals.filtering import low_pass
 from scissorcal.calibration.signals.sensors import channels_of, inspect_sensors
-from scissorcal.recipe.schema import FitFriction
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
-from scissorcal.recording.resolution import resolution_of
+from scissorcal.recipe import FitFriction
+from scissorcal.recording import SAMPLE_DTYPE, Recording, resolution_of
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
-SIMPLE = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+SIMPLE = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from scissorcal.calibration.signals.steadiness import STUCK, Steadiness, steadiness
 from scissorcal.calibration.signals.weak_form import weigh
-from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
+from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
 
 TRAVEL = 0.5
 COUNTS = (4096, 20_000, 131_072, 1_000_000, 4_000_000)

@@ -7,8 +7,8 @@ from scissorcal.calibration import fit_friction
 from scissorcal.calibration.friction.noise import stroke_offsets
 from scissorcal.calibration.signals.torque_noise import TorqueNoise, torque_noise
 from scissorcal.calibration.signals.weak_form import weigh
-from scissorcal.inference.noise import ArNoise
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.inference import ArNoise
+from scissorcal.recipe import FitFriction
 from tests.calibration.truth import QUICK, Truth, friction_recording
 
 TICK_S = 1e-3
@@ -96,7 +96,7 @@ def test_differing_strokes_are_detected_and_equal_ones_are_not():
 
 
 def test_a_friction_fit_stores_its_noise():
-    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric", critic=False)
+    settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
     recording = friction_recording(Truth(), np.random.default_rng(1), QUICK)
     fit = fit_friction((recording,), settings, effort="draft", rng=np.random.default_rng(2))
     truth = Truth()

@@ -8,7 +8,7 @@ import pytest
 from scissorcal.calibration.signals.sensors import inspect_sensors
 from scissorcal.calibration.signals.usage import EDGE, GAP, INVALID, SLOW, usage_of_windows
 from scissorcal.calibration.signals.weak_form import weigh
-from scissorcal.recording.recording import Recording
+from scissorcal.recording import Recording
 from tests.calibration.truth import Truth, friction_recording
 
 

@@ -10,10 +10,15 @@ from hypothesis import strategies as st
 from scissorcal.calibration.friction.columns import FrictionBasis
 from scissorcal.calibration.signals.weak_form import next_cutoff, weigh
 from scissorcal.errors import InputError
-from scissorcal.model import FrictionLaw, friction_torque, presliding_state
-from scissorcal.model.friction import angle_factor
-from scissorcal.model.friction_terms import law_names, terms_of
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.model import (
+    FrictionLaw,
+    angle_factor,
+    friction_torque,
+    law_names,
+    presliding_state,
+    terms_of,
+)
+from scissorcal.recording import SAMPLE_DTYPE, Recording
 
 
 def recording(opening, drive, *, rate_Hz=1000.0, hand=None, commands=None) -> Recording:

@@ -13,7 +13,7 @@ from scissorcal.calibration.signals.window_length import (
     second_derivative,
     spline,
 )
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recording import SAMPLE_DTYPE, Recording
 
 INERTIA, RATE_HZ = 2e-4, 1000.0
 

@@ -12,8 +12,7 @@ from scissorcal.calibration.signals.zeros import (
     without_zeros,
     zero_verdicts,
 )
-from scissorcal.recording.probe import PROBE_KEY, Estimate, ProbeResult
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording
+from scissorcal.recording import PROBE_KEY, SAMPLE_DTYPE, Estimate, ProbeResult, Recording
 
 UNMEASURED, NOISE, RADIUS = 3e-3, 1e-3, 0.06
 IDLE, MOVING = 1500, 4000

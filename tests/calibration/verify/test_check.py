@@ -118,7 +118,7 @@ class Refusing(LinearSimulator):
         fit = super().refit(data, *given)
         kept = [p for p in fit.parameters if p.name != "slope"]
         draws = np.delete(fit.draws, 1, axis=1)
-        other = {**fit.__dict__, "parameters": kept, "draws": draws, "rung": "flat"}
+        other = {**fit.__dict__, "parameters": kept, "draws": draws, "candidate": "flat"}
         other["column"] = lambda name: draws[:, [p.name for p in kept].index(name)]
         return cast(FitResult, StandIn(**other))
 

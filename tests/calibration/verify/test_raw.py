@@ -16,8 +16,8 @@ from scissorcal.calibration.verify.simulated_recordings import CutTruth, Unevenn
 from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
 from scissorcal.calibration.verify.study import Study, run
 from scissorcal.model import Cutting, Response
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.recording import Recording
+from scissorcal.recipe import Recipe
+from scissorcal.recording import Recording
 from tests.second_rig import capture_cut, capture_friction, draw_truth, fine, paper, recipe_for
 
 pytestmark = pytest.mark.slow

@@ -8,7 +8,7 @@ from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
 from scissorcal.calibration.verify.simulator import friction_simulator
 from scissorcal.calibration.verify.study import run
-from scissorcal.recipe.schema import FitFriction
+from scissorcal.recipe import FitFriction
 from tests.calibration.friction.test_fit import emps
 
 
@@ -16,7 +16,7 @@ from tests.calibration.friction.test_fit import emps
 def test_emps_is_calibrated_and_its_halves_agree():
     """30 fits, 1 % of false alarms. What the law lacks repeats: halves differ less than claimed."""
     recording = emps()
-    settings = FitFriction(rung="coulomb+viscous", symmetry="asymmetric")
+    settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric")
     fit = fit_friction((recording,), settings, effort="standard", rng=np.random.default_rng(0))
     design = friction_experiment((recording,), settings, fit)
     simulator = friction_simulator((recording,), settings, fit, design.layout)

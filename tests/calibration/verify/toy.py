@@ -12,7 +12,7 @@ from scissorcal.calibration.fit_candidate import Candidate, Likelihood
 from scissorcal.calibration.parameters import Layout, Parameter, StatedPrior
 from scissorcal.calibration.result import Effort, FitResult, StrokeError
 from scissorcal.inference import ArNoise, Posterior, Problem, infer
-from scissorcal.model.transforms import IDENTITY, LOG
+from scissorcal.model import IDENTITY, LOG
 
 BINS = 600
 STROKES = 12
@@ -122,7 +122,7 @@ def as_fit(experiment: Linear, posterior: Posterior) -> FitResult:
         "what": "friction",
         "words": "friction",
         "effort": "standard",
-        "rung": "linear",
+        "candidate": "linear",
         "structure": {},
         "verdicts": (),
         "parameters": fitted[:3],

@@ -10,8 +10,8 @@ from scissorcal.device.probe.talk import StalledError, Talk
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, ConfigKey, decode
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recording.probe import Estimate
+from scissorcal.recipe import builtin_recipe
+from scissorcal.recording import Estimate
 from scissorcal.verdicts import Verdict
 from tests.strange_device import Faults, Person, StrangeDevice, VirtualPort, wire
 

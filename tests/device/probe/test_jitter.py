@@ -6,7 +6,7 @@ import pytest
 from scissorcal.device.probe.idle import largest_correlation
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.session import Operator, RigSession
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from tests.strange_device import Faults, Person, StrangeDevice, VirtualPort
 
 TIME_S = np.arange(1000) * 1e-3

@@ -8,7 +8,7 @@ import pytest
 from scissorcal.device.link import open_link
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.session import Operator, RigSession
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from tests.strange_device import FAULTS, Person, StrangeDevice, serve_on_pty
 
 pytestmark = pytest.mark.realtime

@@ -11,8 +11,8 @@ from scissorcal.device.probe.probe import probe
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.device.sim.truth import varied
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recording.probe import Estimate, ProbeResult, probe_from_dict
+from scissorcal.recipe import builtin_recipe
+from scissorcal.recording import Estimate, ProbeResult, probe_from_dict
 from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 
 RECIPE = builtin_recipe("paper-80gsm")
@@ -34,7 +34,7 @@ def holds(estimate: Estimate | None, truth: float, widths: float = 2.0) -> bool:
 def test_zeros_lie_in_their_intervals(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(41)
     inside = []
-    for stage in ("_push", "_push_sledge"):  # the idle second is over then
+    for stage in ("_push", "_push_carriage"):  # the idle second is over then
         monkeypatch.setattr(f"scissorcal.device.probe.probe.{stage}", lambda *_, **__: None)
     for seed in range(8):
         torque, force = rng.normal(0.0, 0.01), rng.normal(0.0, 0.3)

@@ -7,9 +7,8 @@ import pytest
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.probe import ProbeResult
+from scissorcal.recipe import Recipe, builtin_recipe
+from scissorcal.recording import ProbeResult
 from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 
 RECIPE = builtin_recipe("paper-80gsm")
@@ -41,8 +40,8 @@ MOVED = {
     "measured torque reversed": "motor_torque has the opposite sign of the command",
     "measured torque half": "its scale or the motor's torque constant is wrong",
     "measured torque frozen": "motor_torque does not follow the command",
-    "sledge motor reversed": "Positive force retracts the sledge",
-    "sledge encoder reversed": "Positive force retracts the sledge",
+    "carriage motor reversed": "Positive force retracts the carriage",
+    "carriage encoder reversed": "Positive force retracts the carriage",
 }
 
 PUSHING_S = 4.5
@@ -102,7 +101,7 @@ def test_a_sequence_that_leaps_is_no_deaf_watchdog() -> None:
     assert device.largest_torque == 0.0
 
 
-OF_ONE_PATH = {"measured torque half", "measured torque frozen", "sledge encoder reversed"}
+OF_ONE_PATH = {"measured torque half", "measured torque frozen", "carriage encoder reversed"}
 """Faults that the same stage finds as another one of the list."""
 
 

@@ -9,7 +9,7 @@ from scissorcal.device.probe.probe import probe
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, decode
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from tests.strange_device import Faults, Person, StrangeDevice, VirtualPort, serve_on_pty, wire
 
 RECIPE = builtin_recipe("paper-80gsm")

@@ -6,7 +6,7 @@ from scissorcal.device.probe.hand_pass import CLOSE, OPEN
 from scissorcal.device.probe.probe import probe, request_of
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.kernel import Capability
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from tests.strange_device import Person, StrangeDevice, VirtualPort
 
 RECIPE = builtin_recipe("paper-80gsm")
@@ -17,11 +17,11 @@ PUSHED = (
 
 
 @pytest.mark.parametrize(
-    ("sledge", "told"), [(False, "."), (True, ", and the sledge by up to 2 mm each push.")]
+    ("carriage", "told"), [(False, "."), (True, ", and the carriage by up to 2 mm each push.")]
 )
-def test_every_motion_is_told(sledge: bool, told: str) -> None:
+def test_every_motion_is_told(carriage: bool, told: str) -> None:
     identity = VirtualPort(StrangeDevice()).identity
-    if not sledge:
+    if not carriage:
         without = identity.capabilities & ~int(Capability.ADVANCE_MOTOR)
         identity = identity._replace(capabilities=without)
     assert request_of(RECIPE, identity) == PUSHED + told
@@ -36,7 +36,7 @@ def test_what_is_told_is_asked_before_anything_moves_and_holds() -> None:
         assert device.largest_torque == device.largest_force == 0.0
 
     link = VirtualPort(device)
-    sledge = device.sledge.place
+    carriage = device.carriage.place
     probe(RigSession(link, RECIPE, Operator(confirm)))
     assert person.heard == [CLOSE, OPEN, request_of(RECIPE, link.identity)]
-    assert abs(device.sledge.place - sledge) < 4e-3  # pushes, both ways
+    assert abs(device.carriage.place - carriage) < 4e-3  # pushes, both ways

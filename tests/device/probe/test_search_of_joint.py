@@ -8,7 +8,7 @@ from scissorcal.device.probe.probe import probe
 from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.device.sim.truth import varied
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 
 
 @pytest.mark.slow

@@ -6,9 +6,8 @@ import pytest
 
 from scissorcal.device.probe.probe import ProbeRefusedError, probe
 from scissorcal.device.session import Operator, RigSession
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.probe import ProbeResult
+from scissorcal.recipe import Recipe, builtin_recipe
+from scissorcal.recording import ProbeResult
 from tests.strange_device import FAULTS, Faults, Person, StrangeDevice, VirtualPort
 
 RECIPE = builtin_recipe("paper-80gsm")
@@ -24,7 +23,7 @@ def probed(faults: Faults, recipe: Recipe = RECIPE) -> ProbeResult:
     device = StrangeDevice(faults, 1)
     with (
         patch("scissorcal.device.probe.probe._push"),
-        patch("scissorcal.device.probe.probe._push_sledge"),
+        patch("scissorcal.device.probe.probe._push_carriage"),
     ):
         return probe(RigSession(VirtualPort(device), recipe, Operator(Person(device))))
 

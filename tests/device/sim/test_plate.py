@@ -147,7 +147,7 @@ def test_the_energies_balance_on_a_plate(plate: dict) -> None:
     mechanism = {"torque_offset_Nm": 3e-4, "advance": {"viscous_N_s_per_m": 60.0}}
     truth = specimen(plate={**LEVEL, **wide, **plate}, mechanism=mechanism)
     rig = VirtualRig(truth, np.random.default_rng(3))
-    rig.joint.place, rig.sledge.place = math.radians(45.0), -0.04
+    rig.joint.place, rig.carriage.place = math.radians(45.0), -0.04
     assert rig.load_plate()
     touched, deepest = 0, 0.0
     for tick in range(3_000):
@@ -201,9 +201,9 @@ def test_a_plate_is_refused_where_there_is_none_or_the_tip_blocks_it() -> None:
     without = VirtualRig(specimen(), np.random.default_rng(1))
     assert not without.load_plate()
     rig = VirtualRig(specimen(plate=LEVEL), np.random.default_rng(1))
-    rig.joint.place, rig.sledge.place = math.radians(9.0), 0.0
+    rig.joint.place, rig.carriage.place = math.radians(9.0), 0.0
     assert not rig.load_plate()
-    rig.joint.place, rig.sledge.place = math.radians(50.0), -0.02
+    rig.joint.place, rig.carriage.place = math.radians(50.0), -0.02
     assert rig.load_sheet()
     assert rig.load_plate()
     assert rig.cut is None

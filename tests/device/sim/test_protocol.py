@@ -143,13 +143,13 @@ def test_a_fresh_sheet_starts_uncut(host: Host) -> None:
     assert host.rig.crack > 0.02
     assert host.set(ConfigKey.MATERIAL, 0.0).status == ConfigStatus.OK
     assert math.isnan(host.rig.crack)
-    host.rig.sledge.place = -0.06
+    host.rig.carriage.place = -0.06
     assert host.set(ConfigKey.MATERIAL, 1.0).status == ConfigStatus.OK
     assert host.rig.crack == 0.0
 
 
 def test_material_is_refused_while_the_blades_block_it(host: Host) -> None:
-    host.rig.joint.place, host.rig.sledge.place = 0.2, 0.0
+    host.rig.joint.place, host.rig.carriage.place = 0.2, 0.0
     echo = host.set(ConfigKey.MATERIAL, 1.0)
     assert echo.status == ConfigStatus.VALUE_REFUSED
     assert echo.value == 0.0
@@ -162,7 +162,7 @@ def test_a_plate_is_put_in_where_the_specimen_has_one() -> None:
     assert host.set(ConfigKey.MATERIAL, 2.0).status == ConfigStatus.OK
     assert host.rig.plate is not None
     assert host.set(ConfigKey.MATERIAL, 3.0).status == ConfigStatus.VALUE_REFUSED
-    host.rig.joint.place, host.rig.sledge.place = 0.15, -0.04
+    host.rig.joint.place, host.rig.carriage.place = 0.15, -0.04
     assert host.set(ConfigKey.MATERIAL, 2.0).status == ConfigStatus.VALUE_REFUSED
     assert host.set(ConfigKey.MATERIAL, 0.0).status == ConfigStatus.OK
     assert host.rig.plate is None

@@ -56,7 +56,7 @@ def test_an_elastic_pad_returns_its_energy(blade: dict[str, Any]) -> None:
         material={"toughness_J_per_m2": None, "response": "exponential"},
     )
     rig = rig_of(truth)
-    rig.joint.place, rig.sledge.place = 0.75, -0.03
+    rig.joint.place, rig.carriage.place = 0.75, -0.03
     assert rig.load_sheet()
     rig.joint.rate = -3.0
     before = rig.kinetic_energy
@@ -72,7 +72,7 @@ def test_an_elastic_pad_returns_its_energy(blade: dict[str, Any]) -> None:
 def test_opening_and_closing_again_over_a_cut_costs_friction_alone() -> None:
     oiled = {"viscous_opening_Nm_s_per_rad": 0.05, "viscous_closing_Nm_s_per_rad": 0.05}
     rig = rig_of(specimen(mechanism={"friction": oiled}))
-    rig.joint.place, rig.sledge.place = math.radians(50.0), -0.02
+    rig.joint.place, rig.carriage.place = math.radians(50.0), -0.02
     assert rig.load_sheet()
 
     def close_and_open(torque: float) -> float:
@@ -242,7 +242,7 @@ def test_each_run_of_the_crack_ends_exactly_at_its_arrest(kappa: float) -> None:
 
 def test_a_sheet_is_refused_while_the_blades_block_it() -> None:
     rig = rig_of(specimen())
-    rig.joint.place, rig.sledge.place = math.radians(12.0), -0.02
+    rig.joint.place, rig.carriage.place = math.radians(12.0), -0.02
     assert not rig.load_sheet()
     assert math.isnan(rig.crack)
     rig.joint.place = math.radians(50.0)
@@ -252,7 +252,7 @@ def test_a_sheet_is_refused_while_the_blades_block_it() -> None:
 
 def test_a_sheet_cut_to_its_end_gives_no_force() -> None:
     rig = rig_of(specimen(material={"sheet_length_mm": 20.0}))
-    rig.joint.place, rig.sledge.place = math.radians(50.0), -0.02
+    rig.joint.place, rig.carriage.place = math.radians(50.0), -0.02
     assert rig.load_sheet()
     for _ in range(1_500):
         rig.tick(-0.2, 0.0)

@@ -6,7 +6,7 @@ import pytest
 
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe, recipe_names, specimens_dir
+from scissorcal.recipe import builtin_recipe, recipe_names, specimens_dir
 from tests.device.sim.build import specimen
 
 
@@ -78,6 +78,6 @@ def test_a_specimen_cannot_be_changed() -> None:
 
 
 def load_text(name: str) -> str:
-    from scissorcal.recipe.library import specimen_path
+    from scissorcal.recipe import specimen_path
 
     return specimen_path(name).read_text()

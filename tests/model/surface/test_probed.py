@@ -11,7 +11,7 @@ import pytest
 from scissorcal.errors import InputError
 from scissorcal.model.surface import curvatures, fit_height_field
 from scissorcal.model.surface.probed_checks import SMALLEST_RADIUS_M
-from scissorcal.recipe.plate_surface import SMALLEST_RADIUS_MM
+from scissorcal.recipe import SMALLEST_RADIUS_MM
 
 NOISE_M = 2e-5
 

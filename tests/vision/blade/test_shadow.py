@@ -9,7 +9,7 @@ from benchmarks.photographs import CastShadow, Lamp, centreline_turn
 from benchmarks.scissors import ALIKE, judged, photographed, true_edge
 
 from scissorcal.errors import InputError
-from scissorcal.recipe.priors import BladePriors
+from scissorcal.recipe import BladePriors
 from scissorcal.vision.blade.photo import by_blade, photograph_scissors
 from scissorcal.vision.blade.profile import outermost_sharp, steepest
 from scissorcal.vision.blade.view import PlainView

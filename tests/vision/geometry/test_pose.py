@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from scissorcal.recipe.priors import PlatePriors
+from scissorcal.recipe import PlatePriors
 from scissorcal.vision.geometry.board_pose import Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, between, difference, left_jacobian
@@ -175,7 +175,7 @@ def test_too_few_or_aligned_corners_are_refused():
 MIDDLE = np.array([RIG_MARKERS.width_m / 2, RIG_MARKERS.height_m / 2, 0.0])
 
 
-def card_views(stances, rng, noise: float = 0.1) -> tuple[Pose, tuple[CardView, ...]]:
+def card_views(positions, rng, noise: float = 0.1) -> tuple[Pose, tuple[CardView, ...]]:
     around = [180 + rng.uniform(-40, 40), rng.uniform(-40, 40), rng.uniform(-180, 180)]
     turn = Rotation.from_euler("xyz", around, degrees=True).as_matrix()
     rig = Pose.from_matrix(turn, [0.02, -0.02, 0.45])
@@ -183,7 +183,7 @@ def card_views(stances, rng, noise: float = 0.1) -> tuple[Pose, tuple[CardView, 
     place = np.array([0.05, 0.01, 0.0]) - turned.apply([MIDDLE])[0]
     card = Pose(turned.quaternion, tuple(place))
     views = []
-    for advance, angle in stances:
+    for advance, angle in positions:
         motion = Pose.from_rotation_vector([0.0, 0.0, angle], [advance, 0.0, 0.0])
         seen = CAMERA.project(rig.after(motion).after(card).apply(RIG_MARKERS.points))
         pixels = seen + noise * rng.standard_normal(seen.shape)
@@ -194,11 +194,11 @@ def card_views(stances, rng, noise: float = 0.1) -> tuple[Pose, tuple[CardView, 
 
 
 def test_the_rig_is_located_from_advances_and_turns():
-    stances = [(a, b) for a in (0.0, 0.03, 0.06) for b in (0.1, 0.3, 0.5)]
+    positions = [(a, b) for a in (0.0, 0.03, 0.06) for b in (0.1, 0.3, 0.5)]
     for seed in range(2):
-        truth, views = card_views(stances, np.random.default_rng(seed))
+        truth, views = card_views(positions, np.random.default_rng(seed))
         found = locate_rig(views, CAMERA, MIDDLE)
-        assert found.untold == ()
+        assert found.undetermined == ()
         away = difference(found.camera_rig, truth) / np.sqrt(np.diag(found.camera_rig.covariance))
         assert np.abs(away).max() < 4.5
         assert np.degrees(np.linalg.norm(difference(found.camera_rig, truth)[:3])) < 1.0
@@ -206,8 +206,8 @@ def test_the_rig_is_located_from_advances_and_turns():
 
 def test_corners_that_other_pictures_contradict_are_left_out_of_the_rigs_frame():
     """A blade's edge is taken for a marker's corner; alone, twelve corners bend after it."""
-    stances = [(a, b) for a in (0.0, 0.03, 0.06) for b in (0.1, 0.3, 0.5)]
-    truth, views = card_views(stances, np.random.default_rng(4), noise=0.02)
+    positions = [(a, b) for a in (0.0, 0.03, 0.06) for b in (0.1, 0.3, 0.5)]
+    truth, views = card_views(positions, np.random.default_rng(4), noise=0.02)
     few = views[6].corners.where(np.arange(len(views[6].corners.pixels)) < 12)
     few.pixels[3] += [3.0, 9.0]
     found = locate_rig((*views[:6], CardView(few, 0.06, 0.1), *views[7:]), CAMERA, MIDDLE)
@@ -216,10 +216,10 @@ def test_corners_that_other_pictures_contradict_are_left_out_of_the_rigs_frame()
     assert np.abs(away).max() < 4.5
 
 
-def test_a_picture_with_another_stance_than_stated_is_not_left_out():
+def test_a_picture_with_another_position_than_stated_is_not_left_out():
     """One advance of twelve is off by a millimetre: its corners are no outliers, and show it."""
-    stances = [(a, b) for a in (0.0, 0.02, 0.04, 0.06) for b in (0.1, 0.3, 0.5)]
-    _, views = card_views(stances, np.random.default_rng(5), noise=0.02)
+    positions = [(a, b) for a in (0.0, 0.02, 0.04, 0.06) for b in (0.1, 0.3, 0.5)]
+    _, views = card_views(positions, np.random.default_rng(5), noise=0.02)
     wrong = CardView(views[4].corners, views[4].advance_m + 1e-3, views[4].blade_angle_rad)
     found = locate_rig((*views[:4], wrong, *views[5:]), CAMERA, MIDDLE)
     assert found.rms_px > 0.4
@@ -227,7 +227,7 @@ def test_a_picture_with_another_stance_than_stated_is_not_left_out():
 
 def test_motion_that_determines_part_of_the_frame_names_the_rest():
     _, shifted = card_views([(a, 0.2) for a in (0.0, 0.03, 0.06)], np.random.default_rng(9))
-    assert locate_rig(shifted, CAMERA, MIDDLE).untold
+    assert locate_rig(shifted, CAMERA, MIDDLE).undetermined
     _, still = card_views([(0.0, 0.2)], np.random.default_rng(9))
-    with pytest.raises(ValueError, match="same stance in all pictures"):
+    with pytest.raises(ValueError, match="same position in all pictures"):
         locate_rig(still, CAMERA, MIDDLE)

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera
+from scissorcal.calibration import CameraPhoto, fit_camera
 from scissorcal.vision.camera_files import read_camera_file
 from scissorcal.vision.photo import read_photo
 from scissorcal.vision.targets.boards import CharucoBoard, Chessboard

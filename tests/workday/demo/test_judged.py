@@ -28,7 +28,7 @@ def test_the_panel_counts_intervals_and_marks_what_lies_outside() -> None:
         specimen="office-paper",
         judged=(WITHIN, BESIDE, UNKNOWN),
         torque_error=0.0123,
-        rungs=(),
+        candidates=(),
         rendering=rendering,  # type: ignore[arg-type]
         verified=(),
         verdicts=(),

@@ -6,7 +6,7 @@ import pytest
 
 from scissorcal.device.sim import specimen as specimens
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe
+from scissorcal.recipe import builtin_recipe
 from scissorcal.workday.demo import photographs
 from scissorcal.workday.demo.photographs import specimen_blade
 from tests.device.sim.build import specimen

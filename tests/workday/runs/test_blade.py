@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 from benchmarks.scissors import photographed
 
-from scissorcal.calibration.edge.result import BladeResult
-from scissorcal.calibration.store import load
+from scissorcal.calibration import BladeResult, load
 from scissorcal.errors import InputError, MissingError
-from scissorcal.vision.sim.sim_camera import render_blade_photographs
+from scissorcal.vision import render_blade_photographs
 from scissorcal.workday.demo.photographs import specimen_blade
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import FitOptions
@@ -55,15 +54,15 @@ def test_the_virtual_blade_is_captured_and_fitted(workspace, photographs):
     assert not outcome.cached
     assert all(path.read_bytes()[:4] == b"\x89PNG" for path in outcome.pictures)
     assert len(outcome.pictures) == 2
-    belief = load(Engine.of(workspace).file("fit blade"), BladeResult).belief
+    edge_posterior = load(Engine.of(workspace).file("fit blade"), BladeResult).edge_posterior
     edge = workspace.recipe().rig.edge
     middle = 0.5e-3 * edge.length_mm
-    found = float(belief.edge.offset_at(middle))
+    found = float(edge_posterior.edge.offset_at(middle))
     stated = 1e-3 * edge.offset_mm + middle * 0.0349208
     assert found == pytest.approx(stated, abs=6e-5)
     (again,) = fit_workspace(workspace, ["blade"], FitOptions(effort="draft"))
     assert again.cached
-    assert again.result.belief.edge == belief.edge
+    assert again.result.edge_posterior.edge == edge_posterior.edge
     assert again.pictures == outcome.pictures
 
 

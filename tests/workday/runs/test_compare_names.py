@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.workday.runs.report import told_path
+from scissorcal.workday.runs.report import shown_path
 
 
 @pytest.mark.parametrize(
@@ -21,8 +21,8 @@ def test_a_side_is_named_from_its_workspace_on(tmp_path: Path, path: str, told: 
     (tmp_path / "paper-a" / "recipe.toml").touch()
     if Path(path).suffix:
         (tmp_path / path).touch()
-    assert told_path(tmp_path / path) == told
+    assert shown_path(tmp_path / path) == told
 
 
 def test_a_relative_name_stays_as_it_was_given() -> None:
-    assert told_path(Path("../other/report/report.json")) == "../other/report/report.json"
+    assert shown_path(Path("../other/report/report.json")) == "../other/report/report.json"

@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scissorcal.control.plate_request import REQUEST_FIRST
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.session import Operator, RigSession
+from scissorcal.control import REQUEST_FIRST
+from scissorcal.device import LockstepLink, Operator, RigSession
 from scissorcal.errors import DeviceError, InputError, MissingError
 from scissorcal.kernel import Capability
-from scissorcal.recording import read_attachments, read_recording, read_telemetry
-from scissorcal.recording.telemetry import CONTROL
+from scissorcal.recording import CONTROL, read_attachments, read_recording, read_telemetry
 from scissorcal.verdicts import failed
 from scissorcal.workday.options import (
     SIM_RIG,
@@ -49,12 +47,12 @@ repeats = 1
 excitation_s = 3.0
 
 [fit.friction]
-rung = "coulomb+viscous"
+law = "coulomb+viscous"
 symmetry = "symmetric"
 critic = false
 
 [fit.friction_advance]
-rung = "coulomb+viscous"
+law = "coulomb+viscous"
 symmetry = "symmetric"
 critic = false
 """
@@ -114,7 +112,7 @@ def test_without_a_pose_it_says_what_to_do(fitted: Workspace) -> None:
         control_workspace(fitted, SIM_RIG, ControlOptions(path_of(fitted)))
 
 
-def test_without_friction_of_the_sledge_it_says_what_to_run(
+def test_without_friction_of_the_carriage_it_says_what_to_run(
     fitted: Workspace, tmp_path: Path
 ) -> None:
     import shutil

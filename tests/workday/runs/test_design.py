@@ -8,8 +8,7 @@ import pytest
 from scissorcal.cli.root import run
 from scissorcal.device.completeness import completeness
 from scissorcal.errors import InputError
-from scissorcal.recording import Recording, read_recording
-from scissorcal.recording.layout import empty_samples
+from scissorcal.recording import Recording, empty_samples, read_recording
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.runs import design
@@ -94,7 +93,7 @@ def test_a_designed_capture_is_whole_by_its_own_list(
     assert 'plan = "designed"' in recording.recipe_toml
     assert len(recording.strokes) == 8
 
-    from scissorcal.device.counting import count_recorded
+    from scissorcal.device import count_recorded
 
     recipe = workspace.recipe()
     counts = count_recorded(recording, recipe, "friction")

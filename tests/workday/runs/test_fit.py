@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD
+from scissorcal.calibration import NEXT_RECORDING, ON_RECORD
 from scissorcal.cli.fit_law import text
 from scissorcal.errors import InputError, MissingError
 from scissorcal.workday.engine import Engine
@@ -108,7 +108,7 @@ def test_no_scatter_is_taken_from_a_fit_of_another_version_of_the_step(copied: W
 
 
 def test_a_changed_setting_of_the_fit_makes_it_stale(copied: Workspace) -> None:
-    edit(copied, 'rung = "coulomb+viscous"', 'rung = "coulomb"')
+    edit(copied, 'law = "coulomb+viscous"', 'law = "coulomb"')
     assert states(make_plan(copied))["fit friction"] == "stale"
 
 

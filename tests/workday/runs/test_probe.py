@@ -10,12 +10,9 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.probe.probe import ProbeRefusedError
-from scissorcal.device.session import Operator, RigSession
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import read_recording
-from scissorcal.recording.probe import probe_of
+from scissorcal.device import LockstepLink, Operator, ProbeRefusedError, RigSession
+from scissorcal.recipe import Recipe
+from scissorcal.recording import probe_of, read_recording
 from scissorcal.workday.options import SIM_RIG, RigOptions
 from scissorcal.workday.runs.capture import capture_into
 from scissorcal.workday.runs.probe import _store, ensure_probed, last_probe, probe_into, probe_state

@@ -7,12 +7,10 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from scissorcal.device.counting import count_recorded
-from scissorcal.device.session import Operator
+from scissorcal.device import Operator, count_recorded
 from scissorcal.errors import InputError
-from scissorcal.recipe.library import builtin_recipe
-from scissorcal.recording import read_recording
-from scissorcal.recording.probe import Estimate, ProbeResult
+from scissorcal.recipe import builtin_recipe
+from scissorcal.recording import Estimate, ProbeResult, read_recording
 from scissorcal.workday.options import SIM_RIG
 from scissorcal.workday.runs.capture import capture_into
 from scissorcal.workday.runs.sweep_speeds import with_usable_sweeps

@@ -16,11 +16,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from scissorcal.calibration.store import load, save
-from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.calibration import VerifyResult, load, save
 from scissorcal.errors import InputError, MissingError
-from scissorcal.foreign.formats import RECORDS
-from scissorcal.recipe.library import schemas_dir
+from scissorcal.foreign import RECORDS
+from scissorcal.recipe import schemas_dir
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import Processes, VerifySettings
 from scissorcal.workday.plan import make_plan

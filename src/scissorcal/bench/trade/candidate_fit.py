@@ -41,7 +41,7 @@ def as_fitted(case: Case) -> Recipe:
     if case.friction_fit is not None:
         chosen = case.friction_fit.structure
         symmetry = "symmetric" if chosen["symmetric"] else "asymmetric"
-        recipe = with_friction(recipe, rung=str(chosen["law"]), symmetry=symmetry)
+        recipe = with_friction(recipe, law=str(chosen["law"]), symmetry=symmetry)
     return recipe
 
 
@@ -93,7 +93,7 @@ def holdout_rms(fit: FitResult) -> float:
 
     NaN where the fit does not state it.
     """
-    chosen = next((row for row in fit.rungs if row.get("chosen")), {})
+    chosen = next((row for row in fit.candidates if row.get("chosen")), {})
     return float(chosen.get("held_out_rms", float("nan")))
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Literal
 
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.model import EdgeBelief
+from scissorcal.model import EdgeDistribution
 from scissorcal.package.simplest.law import Law
 from scissorcal.package.tables import NumberFormat
 from scissorcal.recipe.schema import Recipe
@@ -48,7 +48,7 @@ class Case:
     recipe: Recipe
     friction: tuple[Recording, ...]
     cut: tuple[Recording, ...]
-    edge: EdgeBelief | None
+    edge: EdgeDistribution | None
     edge_verdicts: tuple[Verdict, ...]
     friction_fit: FitResult | None
     cut_fit: FitResult | None

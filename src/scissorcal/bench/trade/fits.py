@@ -94,7 +94,7 @@ def fits_outcome(case: Case, cut: FitResult | None, friction: FitResult | None) 
     }
     return {
         "parameters": parameters,
-        "laws": [f"{fit.what}: {fit.rung}" for fit in fits],
+        "laws": [f"{fit.what}: {fit.candidate}" for fit in fits],
         **fitted_torque(case, cut, friction).plain(),
     }
 

@@ -275,8 +275,8 @@ def _passed(judge: _Judge, able: Sequence[Point], chosen: Point) -> str:
     reasons: dict[str, list[str]] = {}
     for point in cheaper:
         reasons.setdefault(judge.why_not(point), []).append(point.setting.label)
-    told = [f"{', '.join(labels)}: {why}" for why, labels in reasons.items()]
-    return f"Cheaper, but passed over: {'; '.join(told)}." if told else ""
+    parts = [f"{', '.join(labels)}: {why}" for why, labels in reasons.items()]
+    return f"Cheaper, but passed over: {'; '.join(parts)}." if parts else ""
 
 
 def _undetermined(judge: _Judge, able: Sequence[Point], chosen: Point) -> str:

@@ -100,7 +100,7 @@ class Together:
         resolution = own.value["count"], own.value["factor"]
         rng = np.random.default_rng([case.seed, repeat])
         edge, seconds = fit_edge(case, resolution, rng)
-        return replace(chosen, edge=edge.belief), seconds
+        return replace(chosen, edge=edge.edge_posterior), seconds
 
     def errors(self, case: Case, sample: Sample, reference: Sample | None) -> Mapping[str, Error]:
         """Of parameters, of the tables' torque, and of the fits' band."""

@@ -93,14 +93,14 @@ class CrossValidation:
 class CameraFit(Result):
     """A camera and its uncertainty.
 
-    ``origin`` is "fitted" or "imported". ``rung`` names the chosen distortion model and
-    ``rungs`` lists those compared, simplest first, each with ``name``, ``free``, ``unseen_px`` (rms
-    on photographs left out), ``score`` (log density of these), ``behind`` and ``behind_se`` (how
-    much lower than the best one's), ``equivalent`` and ``chosen``. ``draws`` (draws, 9) are of the
-    posterior, columns as in `scissorcal.vision.geometry.camera.PARAMETERS`. ``bulge_mm`` is how far
-    the board's middle stands out along its width and its height, ``noise_px`` the scale of corner
-    errors, ``stretch`` the factor by which standard errors were widened because errors within a
-    photograph are correlated. ``region`` (k, 2) outlines where corners were seen.
+    ``origin`` is "fitted" or "imported". ``candidate`` names the chosen distortion model and
+    ``candidates`` lists those compared, simplest first, each with ``name``, ``free``, ``unseen_px``
+    (rms on photographs left out), ``score`` (log density of these), ``behind`` and ``behind_se``
+    (how much lower than the best one's), ``equivalent`` and ``chosen``. ``draws`` (draws, 9) are of
+    the posterior, columns as in `scissorcal.vision.geometry.camera.PARAMETERS`. ``bulge_mm`` is how
+    far the board's middle stands out along its width and its height, ``noise_px`` the scale of
+    corner errors, ``stretch`` the factor by which standard errors were widened because errors
+    within a photograph are correlated. ``region`` (k, 2) outlines where corners were seen.
     """
 
     title = "camera fit"
@@ -112,8 +112,8 @@ class CameraFit(Result):
     camera: Camera
     origin: Literal["fitted", "imported"]
     board: str
-    rung: str
-    rungs: tuple[Mapping[str, Any], ...]
+    candidate: str
+    candidates: tuple[Mapping[str, Any], ...]
     draws: Annotated[Array, by_name("/posterior", "names")]
     views: tuple[ViewError, ...]
     bulge_mm: tuple[float, float]

@@ -81,9 +81,11 @@ def response_curve(fit: FitResult) -> ResponseCurve:
     force = drawn.response.force_at(x[None, :])
     band = np.quantile(force, [0.05, 0.95], axis=0)
     others = tuple(
-        OtherResponse(str(rung["name"]), bool(rung.get("equivalent")), _force_of(rung, fit, x))
-        for rung in fit.rungs
-        if not rung.get("chosen")
+        OtherResponse(
+            str(candidate["name"]), bool(candidate.get("equivalent")), _force_of(candidate, fit, x)
+        )
+        for candidate in fit.candidates
+        if not candidate.get("chosen")
     )
     return ResponseCurve(
         float(low), float(high), x, force.mean(axis=0), band[0], band[1], indentation, measured,

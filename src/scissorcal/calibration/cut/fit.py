@@ -53,7 +53,7 @@ from scissorcal.calibration.signals.soundness import (
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros
 from scissorcal.errors import InputError
 from scissorcal.inference import InferOptions, infer
-from scissorcal.model import EdgeBelief
+from scissorcal.model import EdgeDistribution
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import Verdict
@@ -81,7 +81,7 @@ class _Data:
         recordings: tuple[Recording, ...],
         recipe: Recipe,
         friction: FitResult,
-        edge: EdgeBelief | None,
+        edge: EdgeDistribution | None,
         prior: StatedPrior | None = None,
     ) -> "_Data":
         known = replace(KnownFriction.of(friction, recipe.fit.cut.priors), prior=prior)
@@ -188,7 +188,7 @@ def cut_experiment(
     recipe: Recipe,
     friction: FitResult,
     fit: FitResult,
-    edge: EdgeBelief | None = None,
+    edge: EdgeDistribution | None = None,
 ) -> CutExperiment:
     """Give the design of a finished fit: its law and priors over its segments.
 
@@ -205,7 +205,7 @@ def cut_optimum(
     recordings: tuple[Recording, ...],
     recipe: Recipe,
     friction: FitResult,
-    edge: EdgeBelief | None = None,
+    edge: EdgeDistribution | None = None,
     last_chosen: str | None = None,
 ) -> tuple[CutExperiment, Array]:
     """Design and MAP point (p,) of the law that draft effort fits, without a posterior.

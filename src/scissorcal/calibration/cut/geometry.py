@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scissorcal.aliases import Array
-from scissorcal.model import Edge, EdgeBelief, edge_height
+from scissorcal.model import Edge, EdgeDistribution, edge_height
 from scissorcal.recipe.schema import Recipe
 
 NEWTON_STEPS = 12
@@ -60,7 +60,7 @@ class Geometry:
     ``upper_face_m`` is y_top, ``reference_m`` the indentation that places are expanded about.
     """
 
-    belief: EdgeBelief
+    edge_prior: EdgeDistribution
     upper_face_m: float
     moving_blades: int
     reference_m: float
@@ -69,7 +69,7 @@ class Geometry:
     @property
     def edge(self) -> Edge:
         """The most probable edge."""
-        return self.belief.edge
+        return self.edge_prior.edge
 
     def at(self, values: Mapping[str, float]) -> "Geometry":
         """The geometry with the edge that parameters by name give, those that are missing as here.
@@ -77,10 +77,14 @@ class Geometry:
         Cracks are placed by it: where the blades have nearly closed, an edge off by 30 um moves a
         crack by 0.3 mm, and loading would seem to end where the crack runs already.
         """
-        edge = self.belief.with_values(
-            {name: values[f"edge_{name}"] for name in self.belief.names if f"edge_{name}" in values}
+        edge = self.edge_prior.with_values(
+            {
+                name: values[f"edge_{name}"]
+                for name in self.edge_prior.names
+                if f"edge_{name}" in values
+            }
         )
-        return replace(self, belief=replace(self.belief, edge=edge))
+        return replace(self, edge_prior=replace(self.edge_prior, edge=edge))
 
     def depth_and_lever(self, edge: Edge, opening: Array, contact: Array) -> tuple[Array, Array]:
         """Indentation (m) at a contact, and the lever (m) by which force becomes torque."""
@@ -169,9 +173,9 @@ class Geometry:
 
     def edge_off(self, index: int, sign: int) -> Edge:
         """The edge with one parameter off by ``EDGE_STEP_SDS`` standard deviations."""
-        values = self.belief.mean.copy()
+        values = self.edge_prior.mean.copy()
         values[index] += sign * self._edge_steps[index]
-        return self.belief.with_values(values)
+        return self.edge_prior.with_values(values)
 
     def _depths_and_lever(self, edge: Edge, opening: Array, contact: Array) -> tuple[Array, Array]:
         """Depths (k, 2) at the ends of segments, and the lever (k,) of each.
@@ -189,11 +193,11 @@ class Geometry:
 
     @property
     def _uncertain(self) -> range:
-        return range(len(self.belief.names))
+        return range(len(self.edge_prior.names))
 
     @cached_property
     def _edge_steps(self) -> Array:
-        return np.asarray(EDGE_STEP_SDS * np.sqrt(np.diag(self.belief.covariance)))
+        return np.asarray(EDGE_STEP_SDS * np.sqrt(np.diag(self.edge_prior.covariance)))
 
     def _by_edge(self, differences: list[Array]) -> Array:
         if not differences:
@@ -207,10 +211,10 @@ class Geometry:
         return place, lever, view.slope
 
 
-def belief_geometry(recipe: Recipe, belief: EdgeBelief) -> Geometry:
+def geometry_of_prior(recipe: Recipe, edge_prior: EdgeDistribution) -> Geometry:
     """The geometry of a recipe and an edge with its uncertainty."""
     return Geometry(
-        belief,
+        edge_prior,
         recipe.upper_face_m,
         recipe.rig.moving_blades,
         recipe.fit.cut.reference_indentation_mm * 1e-3,

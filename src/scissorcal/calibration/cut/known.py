@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.cut.geometry import Geometry, belief_geometry
+from scissorcal.calibration.cut.geometry import Geometry, geometry_of_prior
 from scissorcal.calibration.cut.path_motion import PathMotion
 from scissorcal.calibration.cut.path_work import (
     FrictionDraws,
@@ -19,7 +19,7 @@ from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.zeros import DriveZero
-from scissorcal.model import EdgeBelief, FrictionLaw
+from scissorcal.model import EdgeDistribution, FrictionLaw
 from scissorcal.recipe.priors import CutPriors
 from scissorcal.recipe.schema import Recipe
 
@@ -134,10 +134,10 @@ class CutBasis:
 
     @classmethod
     def of(
-        cls, recipe: Recipe, friction: KnownFriction, edge: EdgeBelief | None = None
+        cls, recipe: Recipe, friction: KnownFriction, edge: EdgeDistribution | None = None
     ) -> "CutBasis":
         """That of a recipe; ``edge`` takes the place of the edge that it states."""
-        return cls(recipe, belief_geometry(recipe, edge or edge_of(recipe)), friction)
+        return cls(recipe, geometry_of_prior(recipe, edge or edge_of(recipe)), friction)
 
     def data(self, motions: tuple[PathMotion, ...]) -> "MaterialData":
         """What the material did along motions, friction taken off."""

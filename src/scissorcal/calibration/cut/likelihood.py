@@ -105,7 +105,7 @@ class CutLikelihood:
         return {
             "moving_blades": float(self.geometry.moving_blades),
             "reference_depth": self.geometry.reference_m,
-            "edge_count": len(self.geometry.belief.names),
+            "edge_count": len(self.geometry.edge_prior.names),
             "known_sd": max(motion.advance_sd for motion in self.segments.motions),
         }
 
@@ -213,10 +213,10 @@ class CutLikelihood:
         )
 
     def _parameters(self, values: Mapping[str, Array], response: Response) -> CutFitParameters:
-        belief, reference = self.geometry.belief, self.geometry.reference_m
+        edge_prior, reference = self.geometry.edge_prior, self.geometry.reference_m
         log_depth, log_force, slope, log_energy = response_table(response, reference)
-        edge = np.zeros((len(log_force), len(belief.names)))
-        for column, (name, mean) in enumerate(zip(belief.names, belief.mean, strict=True)):
+        edge = np.zeros((len(log_force), len(edge_prior.names)))
+        for column, (name, mean) in enumerate(zip(edge_prior.names, edge_prior.mean, strict=True)):
             edge[:, column] = values.get(f"edge_{name}", mean) - mean
         return CutFitParameters(
             first=float(log_depth[0]),

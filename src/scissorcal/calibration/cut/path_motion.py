@@ -25,7 +25,7 @@ WALKS = 9
 FINEST_STEP = 1e-7
 """Encoder step in rad (m) that is assumed where positions show none."""
 LEAST_PLACE_SD_M = 1e-6
-"""Error of a place along the cut where the sledge's encoder shows no coarser steps."""
+"""Error of a place along the cut where the carriage's encoder shows no coarser steps."""
 STILL_S, STILL_STEPS, STILL_RAD_PER_S = 0.02, 4.0, 0.01
 """Blades rest while they turn, over this time, by fewer encoder steps or more slowly than these, a
 tenth of the slowest stroke's rate. Slower than four steps in 20 ms they may

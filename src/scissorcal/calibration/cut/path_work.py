@@ -202,8 +202,8 @@ def mean_advance(motion: PathMotion, ends: Integers) -> Array:
 def advance_line(motion: PathMotion, ends: Integers) -> Array:
     """Advance (k, 2) in m at both ends of the path between samples ``ends`` (k + 1,).
 
-    By the regression line over the opening along the path, within the sledge's range: single
-    samples carry the steps of the encoder. Motion of the sledge while the blades rest does not
+    By the regression line over the opening along the path, within the carriage's range: single
+    samples carry the steps of the encoder. Motion of the carriage while the blades rest does not
     count.
     """
     low, high = int(ends[0]), int(ends[-1])

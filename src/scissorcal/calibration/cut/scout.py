@@ -116,7 +116,9 @@ def _known_point(basis: CutBasis, fracture: str) -> tuple[dict[str, float], Gues
     law = CutLaw("power", fracture)
     layout = known.prior.layout(cut_layout(recipe, law, (known.closing_sd, known.opening_sd)))
     values = {name: float(value) for name, value in layout.natural(layout.mean).items()}
-    return values, guess_at({**law.key, **geometry_of(recipe, basis.geometry.belief.edge)}, values)
+    return values, guess_at(
+        {**law.key, **geometry_of(recipe, basis.geometry.edge_prior.edge)}, values
+    )
 
 
 def refuse_coarse(segments: Segments) -> None:
@@ -137,14 +139,14 @@ def refuse_coarse(segments: Segments) -> None:
 
 def cut_prior(basis: CutBasis, law: CutLaw) -> tuple[Layout, Array]:
     """The parameters of a law and of the edge, and the precision (p, p) of their prior."""
-    known, belief = basis.friction, basis.geometry.belief
+    known, edge_prior = basis.friction, basis.geometry.edge_prior
     layout = cut_layout(basis.recipe, law, (known.closing_sd, known.opening_sd))
-    edge = edge_layout(belief)
+    edge = edge_layout(edge_prior)
     whole = type(layout)((*layout.parameters, *edge.parameters))
     precision = np.diag(1.0 / whole.sd**2)
     count = len(edge.parameters)
     if count:
-        precision[-count:, -count:] = np.linalg.inv(belief.covariance)
+        precision[-count:, -count:] = np.linalg.inv(edge_prior.covariance)
     if known.prior is not None:
         stated = known.prior.of_response(law.response)
         precision, whole = stated.precision(whole, precision), stated.layout(whole)
@@ -166,7 +168,7 @@ def make_experiment(
             segments, geometry, law.fracture, line if law.fracture == "rippled" else None
         ),
         law=law,
-        key={**law.key, **geometry_of(recipe, geometry.belief.edge)},
+        key={**law.key, **geometry_of(recipe, geometry.edge_prior.edge)},
         layout=whole,
         prior_precision=precision,
         start=starting_point(whole, values),

@@ -75,7 +75,7 @@ class Piece:
 class Stretch:
     """Segments between the samples ``ends`` (k + 1,) of a motion over which the crack runs.
 
-    ``torque`` (k,) is the mean over the path that the sledge's motion leaves, ``path`` (k,) that
+    ``torque`` (k,) is the mean over the path that the carriage's motion leaves, ``path`` (k,) that
     path in rad; ``noise`` (k,) is the variance of the drive's noise in the mean torque.
     ``tooth_sd`` (J) is what a tooth that the segment's end cuts off leaves of its work.
     ``resolved`` is false where the blades may swing back unseen (:func:`swings_unseen`); ``noise``
@@ -314,14 +314,14 @@ def _parts(ends: Integers, invalid: Integers) -> list[Integers]:
 def free_path(
     motion: PathMotion, material: Material, geometry: Geometry, ends: Integers
 ) -> tuple[Array, Array]:
-    """Path (k,) in rad between samples ``ends`` with the sledge's share, and the work over it.
+    """Path (k,) in rad between samples ``ends`` with the carriage's share, and the work over it.
 
     A tooth loads by d(delta) = -(lever d(theta) - m t d(advance)) / m, whether blades close or the
-    sledge moves on, so the path of a running crack is d(eta) = d(theta) - (m t / lever) d(advance).
-    The torque times the sledge's part of that path is not part of the opening's work.
+    carriage moves on, so the path of a running crack is d(eta) = d(theta) - (m t / lever)
+    d(advance). The torque times the carriage's part of that path is not part of the opening's work.
     """
     low, high = int(ends[0]), int(ends[-1])
-    share = sledge_share(motion, geometry, low, high)
+    share = carriage_share(motion, geometry, low, high)
     moved = np.diff(motion.advance[low : high + 1]) * share
     path = np.concatenate([[0.0], np.cumsum(np.diff(motion.opening[low : high + 1]) - moved)])
     torque = material.torque[low : high + 1]
@@ -346,7 +346,7 @@ def mean_direction(
     return np.clip(signed / sums_between(step, ends - low), -1.0, 1.0)
 
 
-def sledge_share(motion: PathMotion, geometry: Geometry, low: int, high: int) -> Array:
+def carriage_share(motion: PathMotion, geometry: Geometry, low: int, high: int) -> Array:
     """Opening (rad) that loads a running crack as one metre of advance does, (high - low,)."""
     knots = np.unique(np.linspace(low, high, max(2, (high - low) // 50 + 2)).astype(np.int64))
     view = geometry.running(motion.opening[knots])

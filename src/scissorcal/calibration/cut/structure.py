@@ -8,7 +8,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import FitResult
-from scissorcal.model import Cutting, Edge, EdgeBelief, Response
+from scissorcal.model import Cutting, Edge, EdgeDistribution, Response
 from scissorcal.model.checks import LARGEST, SMALLEST
 from scissorcal.model.transforms import IDENTITY
 from scissorcal.recipe.edge import stated_curve
@@ -53,14 +53,14 @@ def edge_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Edge
     named = {name.removeprefix("edge_"): v for name, v in values.items() if _of_edge(name)}
     if not named:
         return edge
-    belief = EdgeBelief(edge, tuple(named), np.zeros((len(named), len(named))))
-    return belief.with_values(named)
+    edge_prior = EdgeDistribution(edge, tuple(named), np.zeros((len(named), len(named))))
+    return edge_prior.with_values(named)
 
 
-def edge_layout(belief: EdgeBelief) -> Layout:
+def edge_layout(edge_prior: EdgeDistribution) -> Layout:
     """Parameters of an edge that was measured, with that estimate as their prior."""
     units = {"offset_m": "m", "taper_rad": "rad", "curvature_per_m": "1/m", "bend_per_m2": "1/m^2"}
-    sds = np.sqrt(np.diag(belief.covariance))
+    sds = np.sqrt(np.diag(edge_prior.covariance))
     return Layout(
         tuple(
             Parameter(
@@ -70,9 +70,9 @@ def edge_layout(belief: EdgeBelief) -> Layout:
                 float(mean),
                 float(sd),
                 "the blade's edge, as photographs or the recipe tell it",
-                believed=True,
+                measured_prior=True,
             )
-            for name, mean, sd in zip(belief.names, belief.mean, sds, strict=True)
+            for name, mean, sd in zip(edge_prior.names, edge_prior.mean, sds, strict=True)
         )
     )
 
@@ -103,7 +103,7 @@ def geometry_of(recipe: Recipe, edge: Edge) -> dict[str, Any]:
     }
 
 
-def edge_of(recipe: Recipe) -> EdgeBelief:
+def edge_of(recipe: Recipe) -> EdgeDistribution:
     """The edge that a recipe states, with what it says of its uncertainty."""
     edge = recipe.rig.edge
     sds = {
@@ -111,7 +111,7 @@ def edge_of(recipe: Recipe) -> EdgeBelief:
         "taper_rad": float(np.radians(edge.taper_sd_deg)),
     }
     open_ones = {name: sd for name, sd in sds.items() if sd > 0.0}
-    return EdgeBelief(
+    return EdgeDistribution(
         stated_curve(edge).edge,
         tuple(open_ones),
         np.diag(np.square(list(open_ones.values()))).reshape(len(open_ones), len(open_ones)),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.path_work import Material
-from scissorcal.calibration.cut.segments import Segments, Stretch, sledge_share
+from scissorcal.calibration.cut.segments import Segments, Stretch, carriage_share
 
 Complex = NDArray[np.complex128]
 
@@ -129,7 +129,7 @@ def phase_signals(
         middles = 0.5 * (stretch.ends[1:] + stretch.ends[:-1])
         at = np.interp(np.arange(low, high), middles, period)
         moved = np.diff(motion.advance[low : high + 1])
-        moved = moved * sledge_share(motion, geometry, low, high)
+        moved = moved * carriage_share(motion, geometry, low, high)
         path = np.diff(motion.opening[low : high + 1]) - moved
         phase = np.concatenate([[0.0], np.cumsum(-path / at)])
         torque = motion.torque[low : high + 1]

@@ -243,7 +243,7 @@ def _load(
         return 0.0, said, ""
     if any(parameter.name == "load_share" for parameter in friction.parameters):
         return 0.0, "loaded sweeps were recorded, and the friction fit includes it.", ""
-    if any(LOADED in str(row["name"]) for row in fit.rungs):
+    if any(LOADED in str(row["name"]) for row in fit.candidates):
         return 0.0, "candidates with and without it were compared; the strokes show none.", ""
     usual = recipe.fit.cut.priors.load_share.sd
     said = f"jaw tools lose up to {usual:.0%} of the load to friction, and none was fitted."

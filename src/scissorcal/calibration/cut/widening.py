@@ -158,14 +158,14 @@ def compare_cuts(
     for all recordings.
     """
     design = replace(design, likelihood=replace(design.likelihood, line=None), _last={})
-    rung = replace(design.candidate(design.observed), starts=point[None, :])
+    candidate = replace(design.candidate(design.observed), starts=point[None, :])
 
     def own(here: Mask) -> Posterior:
-        problem = rung.problem(design.series, here)
+        problem = candidate.problem(design.series, here)
         return infer(problem, "draft", rng, optimum=find_optimum(problem))
 
     def others(here: Mask) -> Array:
-        return find_optimum(rung.problem(design.series, ~here)).point
+        return find_optimum(candidate.problem(design.series, ~here)).point
 
     return gather_recordings(design, point, recordings, FitsApart(own, others), usual, rng)
 

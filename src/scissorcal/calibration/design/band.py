@@ -102,8 +102,8 @@ class TorqueKnowledge:
         """Knowledge after strokes of friction and of a cut that tell so much."""
         more = self
         if friction is not None:
-            told = self.friction.plus(friction, new_recording=new_recording)
-            more = replace(more, friction=told)
+            combined = self.friction.plus(friction, new_recording=new_recording)
+            more = replace(more, friction=combined)
         if cut is not None:
             more = replace(more, cut=self.cut.plus(cut, new_recording=new_recording))
         return more

@@ -33,7 +33,7 @@ Capture = Literal["friction", "cut"]
 class Offer:
     """What one stroke tells, and the seconds it takes."""
 
-    told: Information
+    information: Information
     seconds: float
 
 
@@ -83,16 +83,18 @@ class CaptureList:
         strokes = sum(len(piece) for piece in self.pieces)
         return len(self.speeds) <= MOST_SPEEDS and strokes <= MOST_SPEEDS
 
-    def told(self, stock: Stock, parameters: tuple[int, int]) -> tuple[Information, Information]:
+    def information(
+        self, stock: Stock, parameters: tuple[int, int]
+    ) -> tuple[Information, Information]:
         """What friction's and the cut's strokes of the list tell together."""
         friction, cut = (Information.none(count) for count in parameters)
         for speed in self.speeds:
-            friction = friction + stock.sweeps[speed].told
+            friction = friction + stock.sweeps[speed].information
         if self.speeds:
-            friction = friction + stock.excitation.told
+            friction = friction + stock.excitation.information
         for piece in self.pieces:
             for place, speed in enumerate(piece):
-                cut = cut + stock.strokes[speed, place].told
+                cut = cut + stock.strokes[speed, place].information
         return friction, cut
 
     def seconds(self, stock: Stock) -> float:
@@ -209,7 +211,7 @@ def first_captures(stock: Stock) -> CaptureList:
 def knowledge_after(known: TorqueKnowledge, stock: Stock, captures: CaptureList) -> TorqueKnowledge:
     """What will be known after a list; each kind of its strokes is a new recording."""
     sizes = len(known.friction.point), len(known.cut.point)
-    friction, cut = captures.told(stock, sizes)
+    friction, cut = captures.information(stock, sizes)
     return known.plus(
         friction if captures.speeds else None,
         cut if captures.pieces else None,

@@ -103,9 +103,9 @@ def _at_least(scores: Array, curvature: Array, share: float | None) -> Array:
         return scores
     size = np.sqrt(np.maximum(np.diag(curvature), TINY))
     values, vectors = np.linalg.eigh(curvature / np.outer(size, size))
-    told = values > SILENT * values[-1]
-    root = size[:, None] * vectors[:, told] * np.sqrt(values[told])
-    white = vectors[:, told] / np.sqrt(values[told]) / size[:, None]
+    determined = values > SILENT * values[-1]
+    root = size[:, None] * vectors[:, determined] * np.sqrt(values[determined])
+    white = vectors[:, determined] / np.sqrt(values[determined]) / size[:, None]
     factors, directions = np.linalg.eigh(white.T @ scores @ white)
     away = root @ directions
     return np.asarray((away * np.maximum(factors, 1.0 / share)) @ away.T)
@@ -204,11 +204,11 @@ class Knowledge:
     between: Array | None = None
     usual_scatter: float = 0.01 * BETWEEN_percent
 
-    def plus(self, told: Information, *, new_recording: bool = False) -> "Knowledge":
+    def plus(self, information: Information, *, new_recording: bool = False) -> "Knowledge":
         """Knowledge after strokes that tell so much, in the last recording or in a new one."""
         if new_recording or not self.recordings:
-            return replace(self, recordings=(*self.recordings, told))
-        return replace(self, recordings=(*self.recordings[:-1], self.recordings[-1] + told))
+            return replace(self, recordings=(*self.recordings, information))
+        return replace(self, recordings=(*self.recordings[:-1], self.recordings[-1] + information))
 
     @property
     def covariance(self) -> Array:
@@ -253,11 +253,11 @@ class Knowledge:
     def _common(self) -> Information:
         return self.common or Information.none(len(self.point))
 
-    def _worth(self, told: Information) -> Array:
+    def _worth(self, information: Information) -> Array:
         """What information is worth under correlated noise: H J^-1 H (p, p)."""
         unit = self.layout.sd
-        curvature = told.curvature * np.outer(unit, unit)
-        scores = told.scores * np.outer(unit, unit)
+        curvature = information.curvature * np.outer(unit, unit)
+        scores = information.scores * np.outer(unit, unit)
         least = NO_SCORE * max(float(np.trace(scores)), 1.0)
         worth = curvature @ np.linalg.solve(scores + least * np.eye(len(unit)), curvature)
         return np.asarray(worth / np.outer(unit, unit))
@@ -266,7 +266,7 @@ class Knowledge:
         """Covariance of the mean over recordings that scatter by ``tau`` (p,)."""
         broad = BROAD * self.prior
         precision = self.prior.copy()
-        for told in self.recordings:
-            spread = np.linalg.inv(self._worth(told) + broad) + np.diag(tau**2)
+        for information in self.recordings:
+            spread = np.linalg.inv(self._worth(information) + broad) + np.diag(tau**2)
             precision = precision + np.linalg.inv(spread)
         return np.asarray(np.linalg.inv(precision))

@@ -172,13 +172,13 @@ def _offers(stock: Stock, capture: Capture, taken: Taken) -> Iterator[_Offer]:
     """Speed, place, information and seconds of each stroke that could come next."""
     if capture == "friction":
         for speed, offer in stock.sweeps.items():
-            yield speed, 0, offer.told, offer.seconds
+            yield speed, 0, offer.information, offer.seconds
         return
     if stock.rotates:
         free = [key for key in stock.strokes if key not in taken.strokes]
         for speed, place in free or stock.strokes:
             offer = stock.strokes[speed, place]
-            yield speed, place, offer.told, offer.seconds
+            yield speed, place, offer.information, offer.seconds
         return
     here = taken.next_place
     wanted = min(FEWEST_STROKES, stock.places)
@@ -189,17 +189,19 @@ def _offers(stock: Stock, capture: Capture, taken: Taken) -> Iterator[_Offer]:
     for speed in stock.cut_speeds:
         if 0 < here < stock.places and not enough and not (other and speed == last):
             offer = stock.strokes[speed, here]
-            yield speed, here, offer.told, offer.seconds
+            yield speed, here, offer.information, offer.seconds
         if not begins:
             offer = stock.strokes[speed, 0]
-            yield speed, 0, offer.told, offer.seconds + stock.piece_s
+            yield speed, 0, offer.information, offer.seconds + stock.piece_s
 
 
 def _judged(
     known: TorqueKnowledge, band: Band, capture: Capture, offer: _Offer, judge: Judge
 ) -> NextStroke:
-    speed, place, told, seconds = offer
-    after = known.plus(friction=told) if capture == "friction" else known.plus(cut=told)
+    speed, place, information, seconds = offer
+    after = (
+        known.plus(friction=information) if capture == "friction" else known.plus(cut=information)
+    )
     found = judge(after)
     gain = 60.0 * (band.excess - found.excess) / seconds
     return NextStroke(speed, place, seconds, gain, after, found)

@@ -30,7 +30,7 @@ from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.inference.curvature import gradient
-from scissorcal.model import EdgeBelief, FrictionLaw, friction_torque
+from scissorcal.model import EdgeDistribution, FrictionLaw, friction_torque
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Joint, Recording
 
@@ -76,14 +76,14 @@ def fitted_friction(
     point = design.layout.unconstrained(fit.best)
     noise = torque_noise_of(fit.diagnostics)
     stroke_sd = _number(fit.diagnostics.get("stroke_offset_sd_Nm"))
-    told = friction_information(design, point, noise, stroke_sd)
+    information = friction_information(design, point, noise, stroke_sd)
     owners = {int(s): int(r) for s, r in zip(design.strokes, design.bins.recording, strict=True)}
-    zeros = [p.sd for p in design.layout.parameters if p.name == "offset" and p.believed]
+    zeros = [p.sd for p in design.layout.parameters if p.name == "offset" and p.measured_prior]
     knowledge = Knowledge(
         design.layout,
         point,
         design.prior_precision,
-        _by_recording(told, owners, len(point)),
+        _by_recording(information, owners, len(point)),
         between=_between(design.layout, fit),
         usual_scatter=recipe.fit.friction.between_recordings,
     )
@@ -97,7 +97,7 @@ def fitted_cut(
     recipe: Recipe,
     friction: FitResult,
     fit: FitResult,
-    edge: EdgeBelief | None = None,
+    edge: EdgeDistribution | None = None,
 ) -> CutState:
     """What a finished fit of a cut knows by its own recordings."""
     design = cut_experiment(recordings, recipe, friction, fit, edge)
@@ -109,7 +109,7 @@ def latest_cut(
     recordings: tuple[Recording, ...],
     recipe: Recipe,
     friction: FitResult,
-    edge: EdgeBelief | None = None,
+    edge: EdgeDistribution | None = None,
     last_chosen: str | None = None,
 ) -> CutState:
     """What the strokes so far tell, by the optimum of draft effort's law and its information.
@@ -127,7 +127,7 @@ def expected_friction(recipe: Recipe) -> FrictionState:
     The noise is that of the prior, half of it lasting :data:`EXPECTED_SLOW_S`.
     """
     settings = recipe.fit.friction
-    law = EXPECTED_LAW if settings.rung == "auto" else settings.rung
+    law = EXPECTED_LAW if settings.law == "auto" else settings.law
     choice = LawChoice(law, settings.symmetry == "symmetric", settings.adopt)
     centre = float(np.round(np.mean(recipe.scene.opening_rad), 3))
     structure = {
@@ -164,7 +164,7 @@ def expected_friction(recipe: Recipe) -> FrictionState:
 
 
 def expected_cut(
-    recipe: Recipe, friction: FrictionState, edge: EdgeBelief | None = None
+    recipe: Recipe, friction: FrictionState, edge: EdgeDistribution | None = None
 ) -> CutState:
     """Response and fracture before any data: the recipe's priors at their centres.
 
@@ -177,7 +177,7 @@ def expected_cut(
     basis = CutBasis.of(recipe, friction.known, edge)
     layout, prior = cut_prior(basis, law)
     geometry = basis.geometry
-    structure = {**law.key, **geometry_of(recipe, geometry.belief.edge)}
+    structure = {**law.key, **geometry_of(recipe, geometry.edge_prior.edge)}
     share = 0.01 * recipe.fit.cut.lack_of_fit_percent
     kinds = (
         "loading",
@@ -227,13 +227,13 @@ def sharing_of(recipe: Recipe, friction: FrictionState, cut: CutState) -> Sharin
 def _cut_state(
     design: CutExperiment, point: Array, recipe: Recipe, between: Array | None
 ) -> CutState:
-    told = cut_information(design, point)
+    information = cut_information(design, point)
     owners = {int(s): int(r) for s, r in zip(design.strokes, design.bins.recording, strict=True)}
     knowledge = Knowledge(
         design.layout,
         point,
         design.prior_precision,
-        _by_recording(told, owners, len(point)),
+        _by_recording(information, owners, len(point)),
         line_information(design, point),
         error_shares(design, point, 0.01 * recipe.fit.cut.lack_of_fit_percent),
         between=between,
@@ -243,11 +243,11 @@ def _cut_state(
 
 
 def _by_recording(
-    told: Mapping[int, Information], owners: Mapping[int, int], parameters: int
+    information: Mapping[int, Information], owners: Mapping[int, int], parameters: int
 ) -> tuple[Information, ...]:
     """Sums of the strokes' information over each recording."""
     sums: dict[int, Information] = {}
-    for stroke, one in told.items():
+    for stroke, one in information.items():
         before = sums.get(owners[stroke], Information.none(parameters))
         sums[owners[stroke]] = before + one
     return tuple(sums[recording] for recording in sorted(sums))

@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.calibration.camera.checks import MOST_SD_PX
 from scissorcal.calibration.edge.model import MOST_EVALUATIONS
-from scissorcal.calibration.edge.result import BladeFit, PhotographRow, RungRow, SeenPair
+from scissorcal.calibration.edge.result import BladeFit, EdgeCandidate, PhotographRow, SeenPair
 from scissorcal.inference import Effort, SamplingStatus
 from scissorcal.verdicts import INTERVALS, STATED, Check, Verdict
 
@@ -60,7 +60,7 @@ LAMPS_APART = Check(
 
 
 def blade_verdicts(
-    fit: BladeFit, best: RungRow, status: SamplingStatus, sentence: str, effort: Effort
+    fit: BladeFit, best: EdgeCandidate, status: SamplingStatus, sentence: str, effort: Effort
 ) -> tuple[Verdict, ...]:
     """The verdicts on one blade's fit."""
     spoilt = max(row.spoilt_share for row in fit.photographs)
@@ -95,12 +95,12 @@ def pair_verdicts(pairs: Sequence[SeenPair]) -> tuple[Verdict, ...]:
     return (_lengths(opened), _lamps(opened))
 
 
-def _agreement(fit: BladeFit, best: RungRow) -> Verdict:
+def _agreement(fit: BladeFit, best: EdgeCandidate) -> Verdict:
     """Whether photographs show one blade: first by what the fit had to allow them, then by each."""
     if len(fit.photographs) < 2:
         why = "One photograph does not show how far others of the same blade would agree."
         return PHOTOGRAPHS_AGREE.not_evaluated(why)
-    apart = best.between_m / fit.belief.edge.length_m
+    apart = best.between_m / fit.edge_posterior.edge.length_m
     if apart > MOST_APART:
         return PHOTOGRAPHS_AGREE.judge(
             apart,
@@ -120,7 +120,7 @@ def _agreement(fit: BladeFit, best: RungRow) -> Verdict:
     )
 
 
-def _residuals(fit: BladeFit, best: RungRow) -> Verdict:
+def _residuals(fit: BladeFit, best: EdgeCandidate) -> Verdict:
     """Whether the fitted edge follows the measured one as closely as its sd claims.
 
     The statistic is the largest mean residual of a stretch over its sd: that of the edge there, of
@@ -152,7 +152,7 @@ def _residuals(fit: BladeFit, best: RungRow) -> Verdict:
 
 
 def _worst_stretch(
-    row: PhotographRow, fit: BladeFit, best: RungRow
+    row: PhotographRow, fit: BladeFit, best: EdgeCandidate
 ) -> tuple[float, float, float, float]:
     """Largest mean residual over its sd in one photograph; its place, size and sd."""
     station, residual = np.array(row.station), np.array(row.residual)
@@ -162,7 +162,11 @@ def _worst_stretch(
     for part in parts:
         place, off = float(station[part].mean()), float(residual[part].mean())
         noise = float(residual[part].std(ddof=1)) / np.sqrt(len(part))
-        apart = best.between_m * np.hypot(1.0, place / fit.belief.edge.length_m) if several else 0.0
+        apart = (
+            best.between_m * np.hypot(1.0, place / fit.edge_posterior.edge.length_m)
+            if several
+            else 0.0
+        )
         own = row.away_sd if several else 0.0
         claimed = float(np.interp(place, fit.station, fit.offset.sd))
         sd = float(np.sqrt(claimed**2 + noise**2 + apart**2 + own**2))

@@ -19,12 +19,18 @@ from scissorcal.calibration.edge.model import (
     basis_of,
     search,
 )
-from scissorcal.calibration.edge.result import Band, BladeFit, FoundNick, PhotographRow, RungRow
+from scissorcal.calibration.edge.result import (
+    Band,
+    BladeFit,
+    EdgeCandidate,
+    FoundNick,
+    PhotographRow,
+)
 from scissorcal.errors import InputError
 from scissorcal.inference import Effort, InferOptions
 from scissorcal.inference.infer import infer
 from scissorcal.inference.status import SamplingStatus
-from scissorcal.model import Edge, EdgeBelief, draw_edges, edge_height
+from scissorcal.model import Edge, EdgeDistribution, draw_edges, edge_height
 from scissorcal.recipe.priors import BladePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.blade.measure import BladeMeasurement
@@ -73,9 +79,9 @@ def fit_blade(
     first = min(float(c.station[0]) for c in cells)
     last = max(float(c.station[-1]) for c in cells)
     station = np.linspace(first, last, PLACES)
-    edges = best.belief.with_values(best.draws)
+    edges = best.edge_posterior.with_values(best.draws)
     rows = _rows(sized, cells, best)
-    opening, contact, height = _height(best.belief, recipe, rng) if metric else _no_height()
+    opening, contact, height = _height(best.edge_posterior, recipe, rng) if metric else _no_height()
     pivot = [
         float(
             np.sqrt(
@@ -88,7 +94,7 @@ def fit_blade(
     ]
     fit = BladeFit(
         blade.name,
-        best.belief,
+        best.edge_posterior,
         best.draws,
         best.rows,
         station,
@@ -167,14 +173,14 @@ def _band(draws: Array) -> Band:
 
 
 def _height(
-    belief: EdgeBelief, recipe: Recipe | None, rng: np.random.Generator
+    edge_posterior: EdgeDistribution, recipe: Recipe | None, rng: np.random.Generator
 ) -> tuple[Array, Array, Band | None]:
     """phi over the scene's openings and contacts."""
     if recipe is None:
         return _no_height()
     opening = np.radians(np.linspace(*recipe.scene.opening_deg, 7))
     contact = 1e-3 * np.linspace(*recipe.scene.contact_mm, 9)
-    edges = draw_edges(belief, rng, HEIGHT_DRAWS)
+    edges = draw_edges(edge_posterior, rng, HEIGHT_DRAWS)
     x, theta = np.meshgrid(contact, opening)
     view = edge_height(edges, x.ravel(), theta.ravel() / recipe.rig.moving_blades)
     shape = (-1, len(opening), len(contact))
@@ -244,13 +250,13 @@ _COUNT = {"draft": 200, "standard": 300, "thorough": 600}
 class EdgeComparison:
     """All families compared, their errors' sizes at the optimum, and the chosen one fitted.
 
-    ``belief`` is the edge with its covariance, ``draws`` (n, k) are of its parameters, ``residual``
-    (n,) is of all cells in the order of the photographs. ``status`` and ``sentence`` are the
-    sampler's, ``evaluations`` counts those of the likelihood over all families.
+    ``edge_posterior`` is the edge with its covariance, ``draws`` (n, k) are of its parameters,
+    ``residual`` (n,) is of all cells in the order of the photographs. ``status`` and ``sentence``
+    are the sampler's, ``evaluations`` counts those of the likelihood over all families.
     """
 
-    rows: tuple[RungRow, ...]
-    belief: EdgeBelief
+    rows: tuple[EdgeCandidate, ...]
+    edge_posterior: EdgeDistribution
     draws: Array
     residual: Array
     status: SamplingStatus
@@ -258,7 +264,7 @@ class EdgeComparison:
     evaluations: int
 
     @property
-    def best(self) -> RungRow:
+    def best(self) -> EdgeCandidate:
         return next(row for row in self.rows if row.chosen)
 
 
@@ -306,12 +312,12 @@ def compare_edges(
     )
     draws = np.stack([_draw(evidence, u, rng) for u in posterior.draws])
     residual = data.offset - evidence.basis.columns @ draws.mean(axis=0)
-    belief, natural = _belief(data, families[chosen], draws)
+    edge_posterior, natural = _edge_posterior(data, families[chosen], draws)
     others = sum(searched.evaluations for index, searched in enumerate(found) if index != chosen)
     tell(1.0, f"edge fitted: {families[chosen]}")
     return EdgeComparison(
         rows,
-        belief,
+        edge_posterior,
         natural,
         residual,
         posterior.status,
@@ -320,10 +326,10 @@ def compare_edges(
     )
 
 
-def _row(data: CellData, family: Family, found: Found, chosen: bool) -> RungRow:
+def _row(data: CellData, family: Family, found: Found, chosen: bool) -> EdgeCandidate:
     noise, rough, length, _, *more = (float(size) for size in np.exp(found.optimum.point))
     between = more[0] if data.several else 0.0
-    return RungRow(family, found.evidence, chosen, noise, rough, length, between)
+    return EdgeCandidate(family, found.evidence, chosen, noise, rough, length, between)
 
 
 def _chosen(families: Sequence[Family], sizes: Sequence[int], evidences: Sequence[float]) -> int:
@@ -355,7 +361,7 @@ def _draw(evidence: EdgeEvidence, u: Array, rng: np.random.Generator) -> Array:
     )
 
 
-def _belief(data: CellData, family: Family, draws: Array) -> tuple[EdgeBelief, Array]:
+def _edge_posterior(data: CellData, family: Family, draws: Array) -> tuple[EdgeDistribution, Array]:
     """The normal distribution that the draws amount to, and the draws in the edge's parameters."""
     natural = draws.copy()
     if family == "spline":
@@ -372,5 +378,5 @@ def _belief(data: CellData, family: Family, draws: Array) -> tuple[EdgeBelief, A
         spline_start_m=data.start if family == "spline" else 0.0,
     )
     covariance = np.atleast_2d(np.cov(natural, rowvar=False))
-    edge = EdgeBelief(blank, names, covariance).with_values(natural.mean(axis=0))
-    return EdgeBelief(edge, names, covariance), natural
+    edge = EdgeDistribution(blank, names, covariance).with_values(natural.mean(axis=0))
+    return EdgeDistribution(edge, names, covariance), natural

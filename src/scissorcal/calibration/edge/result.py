@@ -8,7 +8,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.result import Result, Stored, by_name
 from scissorcal.errors import InputError
-from scissorcal.model import EdgeBelief
+from scissorcal.model import EdgeDistribution
 from scissorcal.verdicts import Verdict
 
 
@@ -33,7 +33,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class RungRow:
+class EdgeCandidate:
     """One family of edges in the model comparison.
 
     ``evidence`` is the logarithm of the marginal likelihood. ``roughness_m`` is the standard
@@ -80,7 +80,7 @@ _STATION = Stored(("station",))
 class BladeFit:
     """One blade fitted to all its photographs.
 
-    ``belief`` is the prior of a cut's fit, ``draws`` (n, k) are of its parameters. Lengths
+    ``edge_posterior`` is the prior of a cut's fit, ``draws`` (n, k) are of its parameters. Lengths
     are metres where ``metric``, else blade lengths. ``station`` (n,) are places along the edge with
     the bands ``offset`` (e) and ``taper`` (alpha, rad). ``opening`` (i,) and ``contact`` (j,) span
     the scene, ``height`` (i, j) is phi there; None without a scale. ``length_sd`` is the standard
@@ -89,9 +89,9 @@ class BladeFit:
     """
 
     name: str
-    belief: EdgeBelief
-    draws: Annotated[Array, by_name("posterior", "belief.names")]
-    rungs: tuple[RungRow, ...]
+    edge_posterior: EdgeDistribution
+    draws: Annotated[Array, by_name("posterior", "edge_posterior.names")]
+    candidates: tuple[EdgeCandidate, ...]
     station: Annotated[Array, _STATION]
     offset: Annotated[Band, _STATION]
     taper: Annotated[Band, _STATION]
@@ -109,7 +109,7 @@ class BladeFit:
     @property
     def family(self) -> str:
         """The chosen family of edges."""
-        return next(rung.family for rung in self.rungs if rung.chosen)
+        return next(candidate.family for candidate in self.candidates if candidate.chosen)
 
 
 @dataclass(frozen=True)
@@ -148,14 +148,14 @@ class BladeResult(Result):
     shared_verdicts: tuple[Verdict, ...] = ()
 
     @property
-    def belief(self) -> EdgeBelief:
+    def edge_posterior(self) -> EdgeDistribution:
         """The edge for a cut's fit, which assumes that both blades are alike: the first one's.
 
         Raises InputError where no photograph had a scale.
         """
         for blade in self.blades:
             if blade.metric:
-                return blade.belief
+                return blade.edge_posterior
         raise InputError(
             "The photographs of the blade have no scale, so its edge is known up to its size only: "
             "photograph it on the mat, or give its length with --length-mm."
@@ -185,10 +185,10 @@ def blade_facts(fit: BladeFit) -> dict[str, Any]:
         f"offset_at_middle_sd_{unit}": float(fit.offset.sd[middle]) * size,
         "taper_at_middle_deg": float(np.degrees(fit.taper.mean[middle])),
         "taper_at_middle_sd_deg": float(np.degrees(fit.taper.sd[middle])),
-        f"length_{unit}": fit.belief.edge.length_m * size,
-        "rungs": [
-            {"name": rung.family, "evidence": rung.evidence, "chosen": rung.chosen}
-            for rung in fit.rungs
+        f"length_{unit}": fit.edge_posterior.edge.length_m * size,
+        "candidates": [
+            {"name": candidate.family, "evidence": candidate.evidence, "chosen": candidate.chosen}
+            for candidate in fit.candidates
         ],
         "nicks": [
             {

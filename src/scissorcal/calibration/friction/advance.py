@@ -1,6 +1,6 @@
-"""Fit mass and friction of the sledge to empty motion along the cut, driven by commands.
+"""Fit mass and friction of the carriage to empty motion along the cut, driven by commands.
 
-No sensor measures the force along the cut, so the drive of the sledge is what was commanded. The
+No sensor measures the force along the cut, so the drive of the carriage is what was commanded. The
 equation of motion wants the means of the acting force over two ticks, as a second difference of
 places is the acceleration's (decision 047): these follow exactly from the commands, once the delay
 and the lag are known, and those from the motion itself.
@@ -38,7 +38,7 @@ def fit_friction_advance(
     rng: np.random.Generator,
     run: FrictionRun = FrictionRun(),
 ) -> FitResult:
-    """Identify mass, friction and offset of the sledge from empty motion of it.
+    """Identify mass, friction and offset of the carriage from empty motion of it.
 
     As :func:`~.fit.fit_friction`, with the commanded force for the drive, which no sensor measures:
     how late it acts is found first (:func:`find_actuation`). Newtons are those of the
@@ -47,8 +47,8 @@ def fit_friction_advance(
     if not any(np.any(driven(recording)) for recording in recordings):
         names = ", ".join(recording.source or "the recording" for recording in recordings)
         raise InputError(
-            f"{names or 'Nothing'}: no sample has the motors on, so no force moved the sledge: run "
-            "'scissorcal capture friction --axis advance' again."
+            f"{names or 'Nothing'}: no sample has the motors on, so no force moved the carriage: "
+            "run 'scissorcal capture friction --axis advance' again."
         )
     try:
         actuation = find_actuation(recordings, settings.cutoff_Hz)
@@ -62,7 +62,7 @@ def fit_friction_advance(
 def sliding_joints(
     recordings: tuple[Recording, ...], actuation: "Actuation", lack_of_fit: float
 ) -> tuple[Recording, ...]:
-    """Recordings of the sledge as those of a sliding joint that the acting force drives.
+    """Recordings of the carriage as those of a sliding joint that the acting force drives.
 
     White noise of the share ``lack_of_fit`` of the force is added, the same one each time: without
     noise a likelihood has widths that no search and no sampler can follow, far below what the law
@@ -83,7 +83,7 @@ def actuation_of(fit: FitResult) -> "Actuation":
 def _of_advance(
     fit: FitResult, recordings: tuple[Recording, ...], actuation: "Actuation"
 ) -> FitResult:
-    """The fit of a sliding joint as one of the sledge: its name, keys, and samples used."""
+    """The fit of a sliding joint as one of the carriage: its name, keys, and samples used."""
     tick_ms = 1e3 * _tick_s(recordings[0])
     late = (
         f"A commanded force acts {tick_ms * actuation.late_ticks:.2f} ms late (a delay of "
@@ -137,7 +137,7 @@ def _adopted(proposal: Proposal) -> Proposal:
 
 
 def _renamed(text: str) -> str:
-    """A sentence of a friction fit, with the keys of the sledge's table in the recipe."""
+    """A sentence of a friction fit, with the keys of the carriage's table in the recipe."""
     return text.replace("fit.friction.", "fit.friction_advance.")
 
 

@@ -79,7 +79,7 @@ def start_verdict(experiment: FrictionExperiment, point: Array) -> Verdict:
     """
     layout, starts = experiment.layout, experiment.candidate(experiment.observed).starts
     apart = np.abs(starts - point) / layout.sd
-    judged = [not parameter.believed for parameter in layout.parameters]
+    judged = [not parameter.measured_prior for parameter in layout.parameters]
     names = [name for name, own in zip(layout.names, judged, strict=True) if own]
     least = apart.min(axis=0)[judged]
     stuck = [name for name, far in zip(names, least, strict=True) if far < START.threshold]
@@ -206,7 +206,10 @@ def _names(experiment: FrictionExperiment, values: Mapping[str, float]) -> list[
     if side_of("viscous_pos", values) is None:
         sides = ("",) if experiment.key["symmetric"] else ("_pos", "_neg")
         offered = [f"viscous{side}" for side in sides]
-    fixed = ("noise", *(parameter.name for parameter in layout.parameters if parameter.believed))
+    fixed = (
+        "noise",
+        *(parameter.name for parameter in layout.parameters if parameter.measured_prior),
+    )
     return [*(name for name in layout.names if name not in fixed), *offered]
 
 

@@ -340,7 +340,7 @@ def _laws(
     are felt through the handles, and an offset of a sensor is not.
     """
     names = [law for law in settings.candidates if windows.bears_load or not needs_load(law)]
-    names = names if settings.rung == "auto" else [settings.rung]
+    names = names if settings.law == "auto" else [settings.law]
     either = (True, False) if joint.kind == "linear" else (False, True)
     both = {"auto": either, "symmetric": (True,), "asymmetric": (False,)}
     strokes = _strokes(windows.bins)

@@ -113,7 +113,7 @@ def _rows(
 def _zero(term: Term, joint: Joint, sd: float) -> Parameter:
     unit = term.unit(joint.position_unit, joint.effort_unit)
     meaning = "what is left of the sensors' zeros"
-    return Parameter(term.name, unit, term.transform, 0.0, sd, meaning, believed=True)
+    return Parameter(term.name, unit, term.transform, 0.0, sd, meaning, measured_prior=True)
 
 
 def _adopted(names: tuple[str, ...], joint: Joint, priors: FrictionPriors) -> list[Parameter]:

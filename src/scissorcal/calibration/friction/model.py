@@ -190,7 +190,7 @@ class FrictionExperiment:
             for parameter in layout.parameters:
                 stem = side_of(parameter.name, begin)
                 start = parameter.mean
-                if stem is not None and not parameter.believed:
+                if stem is not None and not parameter.measured_prior:
                     value = begin[stem] * (factor if stem in SCALES else 1.0)
                     start = float(parameter.transform.unconstrained(np.asarray(value)))
                 point.append(start)

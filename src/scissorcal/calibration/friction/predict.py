@@ -78,15 +78,15 @@ class Prediction:
     @property
     def share_inside(self) -> float:
         """Share of measured samples within the band, over those that it promises; NaN for none."""
-        told = np.isfinite(self.low) & np.isfinite(self.measured)
+        judged = np.isfinite(self.low) & np.isfinite(self.measured)
         inside = (self.measured >= self.low) & (self.measured <= self.high)
-        return float(np.mean(inside[told])) if np.any(told) else float("nan")
+        return float(np.mean(inside[judged])) if np.any(judged) else float("nan")
 
     @property
     def rms_error(self) -> float:
         """Root mean square of predicted minus measured, where the joint moves; NaN for none."""
-        told = self.moving & np.isfinite(self.measured)
-        error = (self.predicted - self.measured)[told]
+        judged = self.moving & np.isfinite(self.measured)
+        error = (self.predicted - self.measured)[judged]
         return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
 
 
@@ -320,11 +320,11 @@ class _Folds:
 
     def without(self, left_out: Integers) -> Array:
         """The optimum (p,) without some strokes."""
-        rung = self.design.candidate(self.design.observed)
-        assert rung.reduced is not None
-        problem = rung.problem(self.design.series)
+        candidate = self.design.candidate(self.design.observed)
+        assert candidate.reduced is not None
+        problem = candidate.problem(self.design.series)
         return search_from(
-            replace(problem, reduced=rung.reduced.without(left_out)), self.point
+            replace(problem, reduced=candidate.reduced.without(left_out)), self.point
         ).point
 
 

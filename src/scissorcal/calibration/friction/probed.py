@@ -31,8 +31,8 @@ LEFT_OUT = 0.5
 """Error of either logarithm by what the probe's law lacks. With it, errors of level and rate are
 1.1 and 1.0 of their sd (rms) on the 14 of 24 random rigs (63000 to 63023) whose probe tells them.
 """
-TOLD_SD = 0.5
-"""Sd of either logarithm up to which pushes told it: the probe's own priors have 1.0 and 0.7."""
+DETERMINED_SD = 0.5
+"""Sd of either logarithm up to which pushes determine it: the probe's priors have 1.0 and 0.7."""
 HELD_FALL = 2.0
 """Of a static friction 0.3 above Coulomb's, e^-2 is 4 %: as much as laws are off by on strokes that
 they had not seen (2 to 4 %)."""
@@ -65,12 +65,12 @@ class SlowFriction:
         probe = probes.newest_probe(recording.device for recording in recordings)
         found = probe.posterior if probe else None
         stated = settings.priors.rotary.model_fields_set & {_key(name) for name in FOUND}
-        told = found is not None and set(FOUND.values()) <= set(found.names)
-        if found is None or not told or stated or recordings[0].joint.kind != "rotary":
+        complete = found is not None and set(FOUND.values()) <= set(found.names)
+        if found is None or not complete or stated or recordings[0].joint.kind != "rotary":
             return None
         at = [found.names.index(name) for name in FOUND.values()]
         covariance = np.array(found.covariance)[np.ix_(at, at)]
-        if np.any(np.sqrt(np.diag(covariance)) > TOLD_SD):
+        if np.any(np.sqrt(np.diag(covariance)) > DETERMINED_SD):
             return None
         covariance = covariance + LEFT_OUT**2 * np.eye(2)
         return cls((found.mean[at[0]], found.mean[at[1]]), covariance, bins.slowest_rate)
@@ -177,7 +177,7 @@ def with_pushed_inertia(
         own,
         **FittedParameter.summary_of(draws[:, place]),
         identifiability=min(spread / prior_sd, 1.0),
-        believed=True,
+        measured_prior=True,
     )
     note = (
         f"Sweeps give an inertia of {_shown(sweeps)}, but the blades swing by less than an encoder "

@@ -175,9 +175,9 @@ def _refuse_drift(bins: Bins, recordings: tuple[Recording, ...], joint: Joint) -
 
 def _refuse_terms(settings: FitFriction, windows: Windows, joint: Joint) -> None:
     """Refuse terms that these recordings cannot determine: of a load or angle that they lack."""
-    named = "" if settings.rung == "auto" else settings.rung
+    named = "" if settings.law == "auto" else settings.law
     own = terms_of(named) if named else ()
-    wanted = [f'fit.friction.rung = "{named}"'] if any(one.needs_load for one in own) else []
+    wanted = [f'fit.friction.law = "{named}"'] if any(one.needs_load for one in own) else []
     wanted += [f'the term "{name}"' for name in settings.adopt if TERMS[name].needs_load]
     if wanted and not windows.bears_load:
         raise InputError(

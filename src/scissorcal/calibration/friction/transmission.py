@@ -34,7 +34,7 @@ def two_ended(fit: FitResult, recordings: tuple[Recording, ...], cutoff_Hz: floa
     """
     if not needs_load(str(fit.structure["law"])):
         raise InputError(
-            f'The law "{fit.rung}" has no load: fit one that does (fit.friction.rung with '
+            f'The law "{fit.candidate}" has no load: fit one that does (fit.friction.law with '
             '"+load") to recordings of both ends.'
         )
     every = weigh(recordings, cutoff_Hz)

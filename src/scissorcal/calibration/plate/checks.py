@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from scissorcal.calibration.camera.checks import MOST_SD_PX, CameraThere
-from scissorcal.calibration.plate.result import Halves, PoseView
+from scissorcal.calibration.plate.result import PoseHalves, PoseView
 from scissorcal.verdicts import STATED, Check, Verdict
 from scissorcal.vision.geometry.board_pose import ODDS, BoardPose
 from scissorcal.vision.geometry.camera import Camera
@@ -40,7 +40,7 @@ RIG_FRAME = Check(
 def plate_verdicts(
     whole: BoardPose,
     views: Sequence[PoseView],
-    halves: Halves | None,
+    halves: PoseHalves | None,
     camera: Camera,
     there: CameraThere | None,
     rig: RigPose | None,
@@ -95,7 +95,7 @@ def _residuals(whole: BoardPose) -> Verdict:
     return RESIDUALS.judge(whole.sd_px, why, why + remedy)
 
 
-def _halves(halves: Halves | None) -> Verdict:
+def _halves(halves: PoseHalves | None) -> Verdict:
     from scipy.stats import chi2
 
     limit = float(chi2.isf(0.5 * FALSE_ALARM, 6))
@@ -137,12 +137,12 @@ def _rig(rig: RigPose | None) -> Verdict:
             "markers at several advances and openings."
         )
         return RIG_FRAME.not_evaluated(why)
-    if rig.untold:
+    if rig.undetermined:
         why = (
-            f"The rig's motion does not determine: {', '.join(rig.untold)}. Photograph the rig "
-            "markers at several advances and several openings."
+            f"The rig's motion does not determine: {', '.join(rig.undetermined)}. Photograph the "
+            "rig markers at several advances and several openings."
         )
-        return RIG_FRAME.judge(len(rig.untold), why, threshold=0.0)
+        return RIG_FRAME.judge(len(rig.undetermined), why, threshold=0.0)
     off = rig.rms_px / np.sqrt(2.0)
     bad = (
         f"The card's corner residuals have a standard deviation of {off:.2g} px (limit "

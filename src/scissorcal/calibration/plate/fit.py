@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scissorcal.calibration.camera.checks import CameraThere
 from scissorcal.calibration.camera.result import PixelMap
 from scissorcal.calibration.plate.checks import plate_verdicts
-from scissorcal.calibration.plate.result import Halves, PlateFit, PoseView
+from scissorcal.calibration.plate.result import PlateFit, PoseHalves, PoseView
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
@@ -128,7 +128,7 @@ def _located(
         ) from None
 
 
-def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> Halves | None:
+def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> PoseHalves | None:
     """Compare poses of two halves of the corners, of the same camera: the worse of two ways.
 
     Every other group of four corners (a marker's, or neighbours on a chessboard, which err
@@ -144,7 +144,7 @@ def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> Halves | N
 
 def _half_and_half(
     corners: Corners, camera: Camera, priors: PlatePriors, way: NDArray[np.bool_]
-) -> Halves | None:
+) -> PoseHalves | None:
     alone = replace(camera, covariance=None), priors.model_copy(update=_EXACT_PRINT)
     try:
         first, second = (locate_board(corners.where(half), *alone) for half in (way, ~way))
@@ -159,7 +159,7 @@ def _half_and_half(
     if camera.covariance is not None:
         bent = first.by_camera - second.by_camera
         claimed = claimed + bent @ camera.covariance @ bent.T
-    return Halves(
+    return PoseHalves(
         rotation_deg=float(np.degrees(np.linalg.norm(away[:3]))),
         translation_mm=float(1e3 * np.linalg.norm(away[3:])),
         square=float(away @ np.linalg.solve(claimed, away)),

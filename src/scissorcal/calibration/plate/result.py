@@ -27,7 +27,7 @@ class PoseView:
 
 
 @dataclass(frozen=True)
-class Halves:
+class PoseHalves:
     """Difference of the poses fitted to two halves of the corners. ``square`` is its squared
     Mahalanobis length by their covariances: chi-square with six degrees of freedom where these are
     right."""
@@ -57,7 +57,7 @@ class PlateFit(Result):
     ambiguity: float
     rig_plate: Pose | None
     views: tuple[PoseView, ...]
-    halves: Halves | None
+    halves: PoseHalves | None
     rms_px: float
     noise_px: float
     verdicts: tuple[Verdict, ...]

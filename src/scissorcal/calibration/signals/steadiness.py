@@ -81,7 +81,7 @@ class Steadiness:
             from_speed = min((row.speed for row in self.rows), default=float("nan"))
             good = f"The joint slid in every sweep, from {from_speed:.2g} {self._unit} on."
             return STEADY_SWEEPS.judge(worst, good)
-        told = "; ".join(
+        shares = "; ".join(
             f"{row.at_rest:.0%} at rest: friction at {row.speed:.2g} {self._unit} is not measured"
             for row in self.rows
             if row.stuck
@@ -91,9 +91,9 @@ class Steadiness:
             "these speeds out of the recipe"
         )
         if np.isinf(self.steady_from):
-            why = f"{told}; no faster sweep was steady. {remedy}, and sweep faster."
+            why = f"{shares}; no faster sweep was steady. {remedy}, and sweep faster."
             return STEADY_SWEEPS.judge(worst, why)
-        why = f"{told}; steady from {self.steady_from:.2g}. {remedy}."
+        why = f"{shares}; steady from {self.steady_from:.2g}. {remedy}."
         return STEADY_SWEEPS.not_evaluated(why)
 
     @property

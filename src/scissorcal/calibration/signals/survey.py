@@ -78,11 +78,11 @@ def survey(recording: Recording, measured: Iterable[str]) -> Survey:
         sensors=tuple(_sensor(recording, channel) for channel in channels),
         closings=counts["closing"],
         openings=counts["opening"],
-        notes=tuple(said for channel in channels for said in _told(recording, channel)),
+        notes=tuple(said for channel in channels for said in _notes_on(recording, channel)),
     )
 
 
-def _told(recording: Recording, channel: Channel) -> list[str]:
+def _notes_on(recording: Recording, channel: Channel) -> list[str]:
     """Sentences on a channel that holds what is no measurement."""
     unit = unit_of(channel.name, recording.joint)
     said = []

@@ -143,7 +143,7 @@ def assess(
         format=FORMAT,
         what=fit.what,
         fit_hash=fit.inputs_hash,
-        rung=fit.rung,
+        candidate=fit.candidate,
         effort=fit.effort,
         seed=study.seed,
         calibration=calibration,
@@ -192,7 +192,7 @@ def _stream(seed: int, stream: int) -> np.random.Generator:
 
 
 COVERAGE_LEVELS = (0.5, 0.9)
-RUNGS = ("draft", "standard", "thorough")
+EFFORTS = ("draft", "standard", "thorough")
 SLOPE_STEP = 1e-3
 """Step of the effort's derivatives, in standard deviations of the difference of halves."""
 
@@ -218,8 +218,8 @@ def summarise_simulated(
         for i, (name, unit) in enumerate(zip(names, units, strict=True))
         if ranked[:, i].any()
     )
-    higher = RUNGS.index(study.effort)
-    reached = [RUNGS.index(record["effort"]) for record in sound]
+    higher = EFFORTS.index(study.effort)
+    reached = [EFFORTS.index(record["effort"]) for record in sound]
     return Calibration(
         fits=len(sound),
         levels=LEVELS,
@@ -229,7 +229,7 @@ def summarise_simulated(
         noise=study.simulator.noise,
         quantities=quantities,
         band=ecdf_band(len(sound), each),
-        escalated=float(np.mean([rung > higher for rung in reached])),
+        escalated=float(np.mean([effort > higher for effort in reached])),
         other_law=float(np.mean([record["law"] != study.law for record in sound])),
         unreliable=float(np.mean([_unreliable(record) for record in sound])),
         broken=tuple(record["broken"] for record in records if "broken" in record),

@@ -167,7 +167,7 @@ class VerifyResult(Result):
     format: Literal["scissorcal-verify/1"]
     what: Literal["friction", "friction-advance", "cut"]
     fit_hash: str
-    rung: str
+    candidate: str
     effort: Effort
     seed: int
     calibration: Calibration | None

@@ -20,7 +20,7 @@ MOVED_HZ = 15.0
 """Motion up to here is kept however coarse an encoder is: excitations of the inertia end here."""
 HALF_SD = 0.1325
 """Standard deviation of a Gaussian times the frequency at which it passes 1 / sqrt(2)."""
-SLEDGE_SD = 10.0
+CARRIAGE_SD = 10.0
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def _piece(motion: PathMotion, start: int, recording: Recording, smoothing: floa
     return SmoothPiece(
         start=start,
         opening=_smoothed(motion.opening, smoothing),
-        advance=_smoothed(motion.advance, SLEDGE_SD),
+        advance=_smoothed(motion.advance, CARRIAGE_SD),
         load=load,
         stroke=_held(motion.stroke),
         sheet=motion.sheet,

@@ -23,7 +23,7 @@ from scissorcal.calibration.verify.simulated_recordings import (
     simulate_cut,
     simulate_friction,
 )
-from scissorcal.model import EdgeBelief
+from scissorcal.model import EdgeDistribution
 from scissorcal.recipe.priors import CutPriors
 from scissorcal.recipe.schema import FitFriction, Recipe
 from scissorcal.recording.recording import Recording
@@ -62,7 +62,7 @@ class FrictionSimulator:
     settings: FitFriction
     layout: Layout
     structure: Mapping[str, Any]
-    rung: str
+    candidate: str
     torque_noise: TorqueNoise
     stroke_sd: float
     contenders: tuple[str, ...]
@@ -96,7 +96,7 @@ class FrictionSimulator:
             self.settings,
             effort=effort,
             rng=rng,
-            run=FrictionRun(last_chosen=self.rung, prior=replace(prior, laws=self.contenders)),
+            run=FrictionRun(last_chosen=self.candidate, prior=replace(prior, laws=self.contenders)),
         )
 
     @property
@@ -114,10 +114,10 @@ class CutSimulator:
     motions: tuple[Motion, ...]
     recipe: Recipe
     friction: FitResult
-    edge: EdgeBelief | None
+    edge: EdgeDistribution | None
     layout: Layout
     structure: Mapping[str, Any]
-    rung: str
+    candidate: str
     contenders: tuple[str, ...]
 
     @property
@@ -156,7 +156,9 @@ class CutSimulator:
             effort=effort,
             rng=rng,
             run=CutRun(
-                edge=self.edge, last_chosen=self.rung, prior=replace(prior, laws=self.contenders)
+                edge=self.edge,
+                last_chosen=self.candidate,
+                prior=replace(prior, laws=self.contenders),
             ),
         )
 
@@ -174,10 +176,10 @@ def friction_simulator(
         settings=settings.model_copy(update={"critic": False}),
         layout=layout,
         structure=dict(fit.structure),
-        rung=fit.rung,
+        candidate=fit.candidate,
         torque_noise=noise,
         stroke_sd=_finite(fit.diagnostics.get("stroke_offset_sd_Nm", 0.0)),
-        contenders=names_of_contenders(fit.rungs),
+        contenders=names_of_contenders(fit.candidates),
     )
 
 
@@ -187,7 +189,7 @@ def cut_simulator(
     friction: FitResult,
     fit: FitResult,
     layout: Layout,
-    edge: EdgeBelief | None = None,
+    edge: EdgeDistribution | None = None,
 ) -> CutSimulator:
     """A simulator for a finished fit of cuts or presses over its own recordings.
 
@@ -201,9 +203,11 @@ def cut_simulator(
     # Truths are of the fit's law: an average with its twin would have another prior than they.
     own = bool(fit.structure.get("load_share", False))
     near = names_of_contenders(
-        [row for row in fit.rungs if bool(row["key"].get("load_share", False)) == own]
+        [row for row in fit.candidates if bool(row["key"].get("load_share", False)) == own]
     )
-    return CutSimulator(motions, quiet, friction, edge, layout, dict(fit.structure), fit.rung, near)
+    return CutSimulator(
+        motions, quiet, friction, edge, layout, dict(fit.structure), fit.candidate, near
+    )
 
 
 def noise_in_words(noise: TorqueNoise, stroke_sd: float, unit: str) -> str:

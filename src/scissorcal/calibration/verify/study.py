@@ -117,7 +117,7 @@ def _simulated(study: Study, index: int, rng: np.random.Generator) -> dict[str, 
     return {
         "ranks": ranks,
         "truths": truths.tolist(),
-        "law": fit.rung,
+        "law": fit.candidate,
         "effective": float(fit.diagnostics["effective_samples"]),
         "effort": fit.diagnostics["effort_reached"],
         "trusted": _passes(fit, "k-hat"),
@@ -132,7 +132,7 @@ def _shown(study: Study, fit: FitResult, chosen: NDArray[np.int64]) -> list[Arra
     except MissingError:
         u = None
     own = study.experiment.candidate(study.experiment.observed)
-    if u is not None and fit.rung == own.name:
+    if u is not None and fit.candidate == own.name:
         return list(quantities(study, u).T)
     names = [parameter.name for parameter in fit.parameters]
     other = []
@@ -171,10 +171,10 @@ def _half(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
     assert study.split is not None
     experiment = study.experiment
     keep = study.split.first if index == 0 else study.split.second
-    rung = replace(experiment.candidate(experiment.observed), starts=study.start[None, :])
+    candidate = replace(experiment.candidate(experiment.observed), starts=study.start[None, :])
     series = unbroken(experiment.series, keep)
-    posterior = infer(rung.problem(series, keep), study.effort, rng, count=study.draws)
-    residuals = rung.likelihood.standardised(posterior.optimum.point)
+    posterior = infer(candidate.problem(series, keep), study.effort, rng, count=study.draws)
+    residuals = candidate.likelihood.standardised(posterior.optimum.point)
     white = ljung_box(residuals[keep], series[keep])
     return {
         "mean": posterior.draws.mean(axis=0).tolist(),
@@ -191,15 +191,15 @@ def _whole(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]
     that a recipe states, and keeps its weight.
     """
     experiment = study.experiment
-    rung = replace(experiment.candidate(experiment.observed), starts=study.start[None, :])
-    posterior = infer(rung.problem(experiment.series), study.effort, rng, count=study.draws)
+    candidate = replace(experiment.candidate(experiment.observed), starts=study.start[None, :])
+    posterior = infer(candidate.problem(experiment.series), study.effort, rng, count=study.draws)
     shown = quantities(study, posterior.draws)
-    stated = [i for i in study.wanted if not experiment.layout.parameters[i].believed]
-    away = (posterior.draws - rung.prior_mean)[:, stated]
-    own = rung.prior_precision[np.ix_(stated, stated)]
+    stated = [i for i in study.wanted if not experiment.layout.parameters[i].measured_prior]
+    away = (posterior.draws - candidate.prior_mean)[:, stated]
+    own = candidate.prior_precision[np.ix_(stated, stated)]
     log_prior = -0.5 * np.einsum("ni,ij,nj->n", away, own, away)
-    every = posterior.draws - rung.prior_mean
-    whole_prior = -0.5 * np.einsum("ni,ij,nj->n", every, rung.prior_precision, every)
+    every = posterior.draws - candidate.prior_mean
+    whole_prior = -0.5 * np.einsum("ni,ij,nj->n", every, candidate.prior_precision, every)
     log_likelihood = np.array([posterior.log_posterior(u) for u in posterior.draws]) - whole_prior
     return {
         "prior": power_sensitivity(shown, log_prior).tolist(),
@@ -284,10 +284,10 @@ def generating_prior(
 
     "recipe": the recipe's own prior, for simulated fits and refits.
     """
-    rung = experiment.candidate(experiment.observed)
-    prior = rung.prior_precision
+    candidate = experiment.candidate(experiment.observed)
+    prior = candidate.prior_precision
     if kind == "recipe":
-        return Generating(kind, 1.0, rung.prior_mean, prior)
+        return Generating(kind, 1.0, candidate.prior_mean, prior)
     scale = experiment.layout.sd
     unit = np.outer(scale, scale)
     posterior = np.linalg.inv(np.cov(draws, rowvar=False) / unit)

@@ -31,11 +31,11 @@ CLIPPING = Check(
 
 @dataclass(frozen=True)
 class Strike:
-    """What one strike showed; ``told`` is False where it was braked or never arrived."""
+    """What one strike showed; ``determined`` is False where it was braked or never arrived."""
 
     flagged: bool
     largest_Nm: float
-    told: bool
+    determined: bool
 
 
 def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Verdict:
@@ -44,7 +44,7 @@ def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Ver
     The watchdog is set to 1 ms for it, so that a computer that stalls there gives three ticks of
     torque at most: with these and the least inertia the rate is bounded before it is tried. Then
     it is set to ``brake_after_ms`` again, whatever happened. A strike that was braked or lost is
-    repeated from rest, each way by turns; if none arrives, nothing is told.
+    repeated from rest, each way by turns; if none arrives, nothing is determined.
     """
     limit, bounds = talk.identity.torque_limit, talk.bounds
     if inertia is None or not inertia.mean > SDS * inertia.sd:
@@ -73,9 +73,9 @@ def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Ver
 
 
 def _judged(found: Strike, limit: float) -> Verdict:
-    if not found.told:
+    if not found.determined:
         why = (
-            f"Clipping could not be told: in {ATTEMPTS} attempts the command of "
+            f"Clipping could not be determined: in {ATTEMPTS} attempts the command of "
             f"{ABOVE * limit:.3g} N m was lost, the watchdog (1 ms for this check) braked first, "
             "or the blades did not rest. Close other programs on this computer, let go of the "
             "handles, and probe again."
@@ -90,8 +90,8 @@ def _judged(found: Strike, limit: float) -> Verdict:
 
 
 def _strikes(talk: Talk, torque: float) -> Strike:
-    """Strike until one is told, each way by turns, a few times at most."""
-    found = Strike(flagged=False, largest_Nm=0.0, told=False)
+    """Strike until one is determined, each way by turns, a few times at most."""
+    found = Strike(flagged=False, largest_Nm=0.0, determined=False)
     for attempt in range(ATTEMPTS):
         try:
             found = _strike(talk, -torque if attempt % 2 else torque)
@@ -99,7 +99,7 @@ def _strikes(talk: Talk, torque: float) -> Strike:
             if attempt == ATTEMPTS - 1:
                 raise
             continue
-        if found.told:
+        if found.determined:
             break
     return found
 
@@ -108,13 +108,13 @@ def _strike(talk: Talk, torque: float) -> Strike:
     """One strike and what was heard of it, frames that came several at once among them."""
     begin = talk.play(_struck(talk, torque))
     if begin is None:
-        return Strike(flagged=False, largest_Nm=0.0, told=False)
+        return Strike(flagged=False, largest_Nm=0.0, determined=False)
     heard = talk.heard(begin)
     flagged = bool(np.any(heard["flags"] & int(StateFlag.TORQUE_SATURATED)))
     braked = bool(np.any(heard["flags"] & int(StateFlag.FAULT_LATCHED)))
     largest = float(np.abs(heard["motor_torque"]).max())
     arrived = largest >= ARRIVED_SHARE * talk.identity.torque_limit
-    return Strike(flagged, largest, told=flagged or (arrived and not braked))
+    return Strike(flagged, largest, determined=flagged or (arrived and not braked))
 
 
 def _struck(talk: Talk, torque: float) -> Stage[int | None]:

@@ -24,7 +24,7 @@ MOST_LOG_SPREAD = math.log(1e3)
 REST = Check("probe.sensors rest", f"{SENSORS}: motion with the motors off, rad", at_most=REST_RAD)
 MOVE = {
     "blades": Check("probe.motors blades move", f"{MOTORS}: largest torque that was tried, mN m"),
-    "sledge": Check("probe.motors sledge move", f"{MOTORS}: largest force that was tried, N"),
+    "carriage": Check("probe.motors carriage move", f"{MOTORS}: largest force that was tried, N"),
 }
 DIRECTION = {
     axis: Check(
@@ -63,10 +63,10 @@ BLADES = Words(
     "Clear the blades, check the encoder's cable and the motor's supply, or raise "
     "rig.probe.largest_torque_Nm",
 )  # fmt: skip
-SLEDGE = Words(
-    "sledge", "advances", "retracts", "force", "N", 1.0,
+CARRIAGE = Words(
+    "carriage", "advances", "retracts", "force", "N", 1.0,
     "its motor or its encoder is reversed. Swap the motor's wires, or the encoder's channels if "
-    "the advance shrinks while the sledge moves along the cut",
+    "the advance shrinks while the carriage moves along the cut",
     "",
     "Clear its way, check its encoder's cable and its motor",
 )  # fmt: skip

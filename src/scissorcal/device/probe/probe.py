@@ -22,7 +22,7 @@ from scissorcal.device.probe.joint_values import Prior
 from scissorcal.device.probe.judge import judge_follow, judge_idle, judge_step, judge_watchdog
 from scissorcal.device.probe.judge_push import (
     BLADES,
-    SLEDGE,
+    CARRIAGE,
     Outcome,
     judge_joint,
     judge_rest,
@@ -49,7 +49,7 @@ REQUEST = (
     "Take everything out from between the blades, leave them half open, let go of the handles and "
     "keep clear: the motors move the blades by up to {degrees:.2g} degrees each push, both ways"
 )
-REQUEST_SLEDGE = ", and the sledge by up to {millimetres:.2g} mm each push"
+REQUEST_CARRIAGE = ", and the carriage by up to {millimetres:.2g} mm each push"
 PUSH_BRAKE_S, PUSH_BRAKE_TICKS = 3e-3, 1.6
 """The watchdog while the motors push: a host that is away cannot make a push longer by more. Below
 1.6 ticks a command that arrives late in its tick would brake a sound device."""
@@ -59,15 +59,15 @@ deviations of the difference of two readings then are half of the bound."""
 FLAG_TO_DELAY_TICKS, DELAY_SD_TICKS = 0.25, 0.6
 """A flag shows at the end of the tick in which a torque began; where in the tick it was measured
 and began is the device's affair."""
-TOLD_SD = 0.25
+DETERMINED_SD = 0.25
 """Of the logarithms of Stribeck's level and rate, of presliding's lengths, and of the odds of its
 share: beyond 50 % at 90 % they are the prior's and no facts. A capture then judges slow sweeps by a
 bound, and a fit of cuts lets friction jump at turns."""
 GAIN_HOLD_S, HELD_SHARE = 0.1, 0.6
 """How long an effort is held for its gain, and its share of the one that moved the blades."""
-SLEDGE_FORCE_SHARE = 0.2
-"""Of the recipe's and the device's force limit, for the sledge."""
-SLEDGE_WAY_M, SLEDGE_SPEED_M_PER_S = 2e-3, 0.05
+CARRIAGE_FORCE_SHARE = 0.2
+"""Of the recipe's and the device's force limit, for the carriage."""
+CARRIAGE_WAY_M, CARRIAGE_SPEED_M_PER_S = 2e-3, 0.05
 
 
 class ProbeRefusedError(DeviceError):
@@ -164,9 +164,9 @@ def _stages(talk: Talk, finding: _Finding, recipe: Recipe, hand: bool, tell: Sho
         tell(0.35, "pushes that grow until the blades move")
         talk.pushing = True
         _push(talk, finding, quiet, recipe, hand=hand, tell=tell)
-        if _pushes_sledge(identity):
-            tell(0.85, "small pushes on the sledge")
-            _push_sledge(talk, finding, recipe)
+        if _pushes_carriage(identity):
+            tell(0.85, "small pushes on the carriage")
+            _push_carriage(talk, finding, recipe)
     finding.add([clipping(talk, finding.result.inertia_kg_m2, recipe.rig.line.brake_after_ms)])
     finding.add(
         [],
@@ -192,11 +192,11 @@ def bounds_of(recipe: Recipe, identity: Identity) -> Bounds:
     force = min(recipe.limits.force_N, identity.force_limit)
     return Bounds(
         torque_Nm=min(limits.largest_torque_Nm, recipe.limits.torque_Nm, identity.torque_limit),
-        force_N=SLEDGE_FORCE_SHARE * force,
+        force_N=CARRIAGE_FORCE_SHARE * force,
         rate_rad_per_s=limits.largest_rate_rad_per_s,
-        speed_m_per_s=SLEDGE_SPEED_M_PER_S,
+        speed_m_per_s=CARRIAGE_SPEED_M_PER_S,
         angle_rad=math.radians(limits.largest_angle_deg),
-        way_m=SLEDGE_WAY_M,
+        way_m=CARRIAGE_WAY_M,
     )
 
 
@@ -208,12 +208,12 @@ def identity_digest(identity: Identity) -> str:
 def request_of(recipe: Recipe, identity: Identity) -> str:
     """What a person is asked before a probe: to clear the blades, and what will move how far."""
     request = REQUEST.format(degrees=recipe.rig.probe.largest_angle_deg)
-    if _pushes_sledge(identity):
-        request += REQUEST_SLEDGE.format(millimetres=1e3 * SLEDGE_WAY_M)
+    if _pushes_carriage(identity):
+        request += REQUEST_CARRIAGE.format(millimetres=1e3 * CARRIAGE_WAY_M)
     return request + "."
 
 
-def _pushes_sledge(identity: Identity) -> bool:
+def _pushes_carriage(identity: Identity) -> bool:
     return bool(identity.capabilities & Capability.ADVANCE_MOTOR) and identity.force_limit > 0.0
 
 
@@ -310,7 +310,7 @@ def _of_swings(swung: Swung) -> dict[str, object]:
     fit = swung.fit
     joint = fit.joint
     fall = ("log_rise_share", "log_rise_rate")
-    told = {
+    estimates = {
         "stribeck_Nm": (fit.built_up * joint.rise, fall),
         "stribeck_rate_rad_per_s": (joint.rise_rate, fall),
         "presliding_fine_rad": (joint.fine, ("log_fine",)),
@@ -325,8 +325,8 @@ def _of_swings(swung: Swung) -> dict[str, object]:
         "facts": {
             **{
                 name: value
-                for name, (value, by) in told.items()
-                if max(fit.sd(one) for one in by) <= TOLD_SD
+                for name, (value, by) in estimates.items()
+                if max(fit.sd(one) for one in by) <= DETERMINED_SD
             },
             "coulomb_opening_Nm": fit.built_up * joint.opening,
             "coulomb_closing_Nm": fit.built_up * joint.closing,
@@ -337,13 +337,13 @@ def _of_swings(swung: Swung) -> dict[str, object]:
     }
 
 
-def _push_sledge(talk: Talk, finding: _Finding, recipe: Recipe) -> None:
+def _push_carriage(talk: Talk, finding: _Finding, recipe: Recipe) -> None:
     axis = axis_of(talk, "advance", 0.0, talk.identity.advance_resolution)
     found = search(talk, axis, alive=True)
-    finding.take(judge_search(found, axis, SLEDGE, hand=False))
+    finding.take(judge_search(found, axis, CARRIAGE, hand=False))
     sensed = sense(talk, axis, found)
-    finding.take(judge_sense(found, sensed, SLEDGE, recipe.rig.motor_sign, hand=False))
-    finding.add([], facts={"sledge_breakaway_N": found.effort})
+    finding.take(judge_sense(found, sensed, CARRIAGE, recipe.rig.motor_sign, hand=False))
+    finding.add([], facts={"carriage_breakaway_N": found.effort})
 
 
 def _finite(estimate: Estimate) -> Estimate | None:

@@ -1,4 +1,4 @@
-"""Pushes: a torque, or a force on the sledge, for a time by the device's ticks, rest to rest."""
+"""Pushes: a torque, or a force on the carriage, for a time by the device's ticks, rest to rest."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -14,7 +14,7 @@ AxisName = Literal["opening", "advance"]
 
 MOVED_RAD, MOVED_M = 3e-3, 2e-4
 """Real joints yield by 0.1 to 30 mrad before they slide: moved is not slid. 3 mrad are 0.2 mm at a
-handle of 60 mm, which a person would call moved; on the sledge as much."""
+handle of 60 mm, which a person would call moved; on the carriage as much."""
 MOVED_STEPS, MOVED_JITTERS = 3.0, 8.0
 """Fewer steps are two readings and their rounding; 8 sds of jitter come once in 1e15 by chance."""
 MOVED_RATE, MOVED_SPEED = 0.3, 0.02

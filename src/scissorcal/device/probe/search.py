@@ -32,7 +32,7 @@ LEAST_INERTIA = 5e-5
 """kg m^2 of the opening: two halves of 10 g at 70 mm, smaller than any scissors with finger rings.
 What bounds the rate of blades that an encoder does not show."""
 LEAST_MASS = 0.05
-"""kg of the sledge, for the same."""
+"""kg of the carriage, for the same."""
 ROOM = 4.0
 """In units of the way that means motion: nearer to a stop a push is not told from the stop."""
 ROOM_PUSHES = 40

@@ -66,7 +66,7 @@ Stage = Generator[Answer | None, State, Done]
 
 
 class RunawayError(DeviceError):
-    """The blades or the sledge moved faster or farther than the probe may move them."""
+    """The blades or the carriage moved faster or farther than the probe may move them."""
 
 
 class StalledError(RunawayError):
@@ -306,7 +306,7 @@ class Talk(AbstractContextManager["Talk"]):
             raise RunawayError(f"{self.name}: {wrong} The motors are off.")
 
     def _guard(self, state: State, free: bool) -> None:
-        """Raise where the blades or the sledge move more than the probe may move them."""
+        """Raise where the blades or the carriage move more than the probe may move them."""
         place = (state.opening, state.advance)
         if self._origin is None:
             self._origin = place
@@ -323,7 +323,7 @@ class Talk(AbstractContextManager["Talk"]):
             what = (
                 f"the blades moved by {abs(place[0] - origin[0]):.3g} rad at {rate:.2g} rad/s"
                 if rate > bounds.rate_rad_per_s or far
-                else f"the sledge moved by {1e3 * abs(place[1] - origin[1]):.3g} mm at "
+                else f"the carriage moved by {1e3 * abs(place[1] - origin[1]):.3g} mm at "
                 f"{speed:.2g} m/s"
             )
             late = np.diff([row[7] for row in self._rows[-STUCK_FRAMES:]])

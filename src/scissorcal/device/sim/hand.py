@@ -48,10 +48,10 @@ class Phase(Enum):
 
 
 class VirtualHand:
-    """Forces of the hand on handles and sledge, one tick at a time.
+    """Forces of the hand on handles and carriage, one tick at a time.
 
     A round is: open the blades, move on until they just reach the end of the cut, close them.
-    After ``strokes`` rounds (or at the end of the sheet or of the sledge's travel) the hand opens
+    After ``strokes`` rounds (or at the end of the sheet or of the carriage's travel) the hand opens
     the blades once more and releases them.
     """
 
@@ -90,7 +90,7 @@ class VirtualHand:
     def forces(
         self, opening: float, rate: float, advance: float, advance_rate: float, crack: float | None
     ) -> tuple[float, float]:
-        """Force on the handles (N, positive closes) and on the sledge (N, positive forwards).
+        """Force on the handles (N, positive closes) and on the carriage (N, positive forwards).
 
         ``crack`` is where the cut ends (m, plate frame), None where there is no material.
         """
@@ -148,7 +148,7 @@ class VirtualHand:
         self._advance_path = (advance, to_advance, way_time)
 
     def _stroke_advance(self) -> float:
-        """Where the sledge must stand for the next stroke."""
+        """Where the carriage must stand for the next stroke."""
         law = self._law
         if self._presses:
             return _between(self._seen - law.press_contact_mm * 1e-3, self._way)

@@ -62,7 +62,7 @@ class EnergyBook:
 class VirtualRig:
     """A rig made of a specimen and a seeded generator; the same calls give the same numbers.
 
-    ``joint`` and ``sledge`` are its two axes; they, ``opening``, ``rate``, ``advance``,
+    ``joint`` and ``carriage`` are its two axes; they, ``opening``, ``rate``, ``advance``,
     ``advance_rate``, ``crack`` and ``time_s`` are the truth, for tests. What a device
     reports is what :meth:`tick` returns.
     """
@@ -84,7 +84,7 @@ class VirtualRig:
             step,
         )
         low, high = mechanism.advance.range_mm
-        self.sledge = Axis(
+        self.carriage = Axis(
             mechanism.advance.mass_kg,
             DryFriction.of_advance(mechanism.advance),
             (low * 1e-3, high * 1e-3),
@@ -107,7 +107,7 @@ class VirtualRig:
         enabled: bool = True,
         braking: bool = False,
     ) -> Measured:
-        """Advance one millisecond under a motor torque (N m) and sledge force (N); measure.
+        """Advance one millisecond under a motor torque (N m) and carriage force (N); measure.
 
         Commands beyond the motors' limits are clipped and flagged, non-finite ones count as 0.
         Disabled motors give no torque; ``braking`` shorts their windings, which damps.
@@ -120,8 +120,10 @@ class VirtualRig:
         torque = _clip(torque, -limit, limit)
         force = _clip(force, -motor.force_limit_N, motor.force_limit_N)
         crack = None if self.cut is None else self.cut.sheet.crack
-        joint, sledge = self.joint, self.sledge
-        push, shove = self.hand.forces(joint.place, joint.rate, sledge.place, sledge.rate, crack)
+        joint, carriage = self.joint, self.carriage
+        push, shove = self.hand.forces(
+            joint.place, joint.rate, carriage.place, carriage.rate, crack
+        )
         cogging = motor.cogging_Nm * math.sin(motor.cogging_periods_per_turn * joint.place)
         brakes = (motor.brake_Nm_s_per_rad, motor.brake_N_s_per_m) if braking else (0.0, 0.0)
         self._move(torque, force, self._radius * push, shove, cogging, brakes)
@@ -129,7 +131,7 @@ class VirtualRig:
         at_stop = not joint.low + STOP_MARGIN_RAD < joint.place < joint.high - STOP_MARGIN_RAD
         return self.sensors.read(
             joint.place,
-            sledge.place,
+            carriage.place,
             self._torque - brakes[0] * joint.rate,
             push,
             at_stop,
@@ -181,12 +183,12 @@ class VirtualRig:
     @property
     def advance(self) -> float:
         """Place of the pivot in the plate frame, in m."""
-        return self.sledge.place
+        return self.carriage.place
 
     @property
     def advance_rate(self) -> float:
         """Rate of the advance in m/s."""
-        return self.sledge.rate
+        return self.carriage.rate
 
     @property
     def crack(self) -> float:
@@ -196,7 +198,7 @@ class VirtualRig:
     @property
     def kinetic_energy(self) -> float:
         """Kinetic energy of both axes in joules."""
-        return self.joint.kinetic_energy + self.sledge.kinetic_energy
+        return self.joint.kinetic_energy + self.carriage.kinetic_energy
 
     @property
     def stored_energy(self) -> float:
@@ -210,8 +212,8 @@ class VirtualRig:
     def energy(self) -> EnergyBook:
         """The works so far, a copy."""
         book = EnergyBook(**vars(self._book))
-        book.friction = self.joint.friction_J + self.sledge.friction_J
-        book.stops = self.joint.stops_J + self.sledge.stops_J
+        book.friction = self.joint.friction_J + self.carriage.friction_J
+        book.stops = self.joint.stops_J + self.carriage.stops_J
         if self.cut is not None:
             book.fracture += self.cut.fracture_J
             book.arrest += self.cut.arrest_J
@@ -230,7 +232,7 @@ class VirtualRig:
         cogging: float,
         brakes: tuple[float, float],
     ) -> None:
-        joint, sledge, cut, book = self.joint, self.sledge, self.cut, self._book
+        joint, carriage, cut, book = self.joint, self.carriage, self.cut, self._book
         plate = self.plate
         damping, moving = self.specimen.material.rate_damping_N_s_per_m, self.blade.moving
         keep, offset = self._keep, self.specimen.mechanism.torque_offset_Nm
@@ -242,30 +244,30 @@ class VirtualRig:
             motor = 0.5 * (motor + actual) + cogging
             thrust = 0.5 * (thrust + actual_force)
             joint.coast()
-            sledge.coast()
-            on_joint = on_sledge = drag_torque = drag_force = 0.0
+            carriage.coast()
+            on_joint = on_carriage = drag_torque = drag_force = 0.0
             if cut is not None:
-                on_joint, drive, lever, slope, share = cut.move_to(joint.place, sledge.place)
-                on_sledge = -drive
+                on_joint, drive, lever, slope, share = cut.move_to(joint.place, carriage.place)
+                on_carriage = -drive
                 if damping and share and lever > 0.0:
-                    drag = damping * share * (slope * sledge.rate - lever * joint.rate / moving)
+                    drag = damping * share * (slope * carriage.rate - lever * joint.rate / moving)
                     drag = max(drag, -on_joint / lever)
                     drag_torque, drag_force = drag * lever, -moving * drag * slope
             tip_torque = tip_force = 0.0
             if plate is not None:
                 tip_torque, tip_force = plate.push(
-                    joint.place, sledge.place, joint.rate, sledge.rate
+                    joint.place, carriage.place, joint.rate, carriage.rate
                 )
             turned = joint.push(
                 motor - grip - offset + on_joint + drag_torque + tip_torque, brakes[0]
             )
-            slid = sledge.push(thrust + shove + on_sledge + drag_force + tip_force, brakes[1])
+            slid = carriage.push(thrust + shove + on_carriage + drag_force + tip_force, brakes[1])
             if plate is not None:
                 plate.settle(turned, slid)
             book.motor += motor * turned + thrust * slid
             book.hand += shove * slid - grip * turned
             book.offset -= offset * turned
-            book.blades += on_joint * turned + on_sledge * slid
+            book.blades += on_joint * turned + on_carriage * slid
             book.touch += tip_torque * turned + tip_force * slid
             book.damping -= drag_torque * turned + drag_force * slid
         self._torque, self._force = actual, actual_force

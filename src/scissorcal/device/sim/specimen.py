@@ -116,7 +116,7 @@ class Friction(Section):
 
 
 class AdvanceAxis(Section):
-    """The axis along the cut: a sledge with dry and viscous friction between two stops."""
+    """The axis along the cut: a carriage with dry and viscous friction between two stops."""
 
     mass_kg: Positive = 0.8
     coulomb_N: NonNegative = 0.8

@@ -134,7 +134,7 @@ def scene_choice(
         step_ratio=times[-1].ratio,
         step_spread_ns=0.5 * max(row.high - row.low for row in times),
         evaluations={what: _evaluations(fit.diagnostics) for what, fit in there.items()},
-        candidates={what: len(fit.rungs) for what, fit in there.items()},
+        candidates={what: len(fit.candidates) for what, fit in there.items()},
     )
 
 

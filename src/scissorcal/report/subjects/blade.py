@@ -98,10 +98,10 @@ def _lengths(seen: SeenPair) -> tuple[Value, ...]:
 
 
 def _shape(fit: BladeFit, where: str, which: str) -> Panel:
-    belief = fit.belief
-    sds = np.sqrt(np.maximum(np.diag(belief.covariance), 0.0))
+    edge_posterior = fit.edge_posterior
+    sds = np.sqrt(np.maximum(np.diag(edge_posterior.covariance), 0.0))
     rows = []
-    for name, mean, sd in zip(belief.names, belief.mean, sds, strict=True):
+    for name, mean, sd in zip(edge_posterior.names, edge_posterior.mean, sds, strict=True):
         stem = next((stem for stem in SHOWN if name.startswith(stem)), "")
         said, factor, unit, per_length = SHOWN.get(stem, (name, 1.0, "", ""))
         if not fit.metric:
@@ -170,22 +170,22 @@ def _nicks(fit: BladeFit, where: str, which: str) -> Panel:
 
 
 def _candidates(fit: BladeFit, where: str, which: str) -> Panel:
-    best = max((r.evidence for r in fit.rungs if finite(r.evidence) is not None), default=None)
+    best = max((r.evidence for r in fit.candidates if finite(r.evidence) is not None), default=None)
     micro, small = _small_unit(fit)
     rows = tuple(
         Row(
-            rung.family,
+            candidate.family,
             (
-                number("log evidence", rung.evidence, digits=5),
-                number("from the best", None if best is None else rung.evidence - best),
-                number("roughness beyond it", micro * rung.roughness_m, small, digits=2),
-                number("photographs differ by", micro * rung.between_m, small, digits=2),
-                number("noise / shot noise", rung.noise_factor, digits=2),
-                words("outcome", "✓ used" if rung.chosen else "✗ not used"),
+                number("log evidence", candidate.evidence, digits=5),
+                number("from the best", None if best is None else candidate.evidence - best),
+                number("roughness beyond it", micro * candidate.roughness_m, small, digits=2),
+                number("photographs differ by", micro * candidate.between_m, small, digits=2),
+                number("noise / shot noise", candidate.noise_factor, digits=2),
+                words("outcome", "✓ used" if candidate.chosen else "✗ not used"),
             ),
-            marked=rung.chosen,
+            marked=candidate.chosen,
         )
-        for rung in fit.rungs
+        for candidate in fit.candidates
     )
     caption = (
         "The simplest first. The richest of line, arc and cubic that the photographs do not "

@@ -46,7 +46,7 @@ MOST_CELLS = 12
 def camera_panels(fit: CameraFit, files: Sequence[Path]) -> tuple[Panel, ...]:
     """Parameters, candidate distortion models, uncertainty over the picture, photographs."""
     panels = [_parameters(fit)]
-    if fit.rungs:
+    if fit.candidates:
         panels.append(_candidates(fit))
     if fit.pixel_map is not None:
         panels.append(_uncertainty(fit, fit.pixel_map))
@@ -78,7 +78,7 @@ def _parameters(fit: CameraFit) -> Panel:
         source = "imported from a file"
     note = (
         f"{camera.width} × {camera.height} pixels, {short(float(across))}° across, {source}. "
-        f"Distortion: {fit.rung}."
+        f"Distortion: {fit.candidate}."
     )
     return Panel(
         f"{PART}-parameters", PART, "Camera parameters", _precision(fit, finite(sd[0])),
@@ -104,7 +104,7 @@ def _precision(fit: CameraFit, sd: float | None) -> str:
 
 def _candidates(fit: CameraFit) -> Panel:
     rows = []
-    for row in fit.rungs:
+    for row in fit.candidates:
         chosen, alike = bool(row["chosen"]), bool(row["equivalent"])
         outcome = "✓ used" if chosen else "≈ equivalent" if alike else "✗ worse"
         rows.append(

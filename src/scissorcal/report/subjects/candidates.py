@@ -50,7 +50,7 @@ class Candidate:
 
 def candidates_of(fit: FitResult) -> tuple[Candidate, ...]:
     """Candidates in the fit's order, the simplest first."""
-    return tuple(_candidate(entry) for entry in fit.rungs)
+    return tuple(_candidate(entry) for entry in fit.candidates)
 
 
 def candidates_panel(fit: FitResult, part: str) -> Panel:

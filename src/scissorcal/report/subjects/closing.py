@@ -116,7 +116,7 @@ def trace(
         tuple(sources),
         tuple(
             FitOrigin(
-                fit.what, part, fit.rung, fit.effort, fit.effort_unit, fit.position_unit,
+                fit.what, part, fit.candidate, fit.effort, fit.effort_unit, fit.position_unit,
                 fit.inputs_hash, posterior_sha256(fit), fit.sources,
             )
             for part, fit in fits.items()

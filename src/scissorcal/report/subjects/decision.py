@@ -12,7 +12,7 @@ from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.package.scene_torque import SceneTorque
 from scissorcal.recipe.schema import Recipe
-from scissorcal.report.headline import SAID, STANCES, Headline, Stance
+from scissorcal.report.headline import ASSESSMENTS, SAID, Assessment, Headline
 from scissorcal.report.inputs import Cell, Evidence, Geometry, RecordingSummary
 from scissorcal.report.numbers import finite, percent
 from scissorcal.report.panel import Panel, Row, Value, count, percent_of, words
@@ -37,7 +37,7 @@ TITLES: dict[Origin, str] = {
     "mixed": "Simulated and real",
     "unknown": "Origin not stated",
 }
-OUTCOMES: dict[Stance, str] = {
+OUTCOMES: dict[Assessment, str] = {
     "trust": "Trust",
     "unverified": "Not verified",
     "care": "Use with care",
@@ -85,12 +85,12 @@ def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
             one.fit,
             (words("decision", _decision(one, rig)), words("why", one.brief)),
             link=one.fit,
-            marked=one.stance in {"reject", "care"},
+            marked=one.assessment in {"reject", "care"},
         )
         for one in headlines
     )
-    overall = overall_stance(headlines, rig)
-    own = [one for one in headlines if one.stance == overall]
+    overall = overall_assessment(headlines, rig)
+    own = [one for one in headlines if one.assessment == overall]
     first = next((one for one in own if one.fit in rig), own[0] if own else None)
     sentence = f"Next: {first.next_steps[0]}" if first and first.next_steps else ""
     title = "Checks passed" if first and _photographs_passed(first, rig) else OUTCOMES[overall]
@@ -98,17 +98,17 @@ def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
 
 
 def _decision(one: Headline, rig: Sequence[str]) -> str:
-    return PHOTOGRAPHS_PASSED if _photographs_passed(one, rig) else SAID[one.stance]
+    return PHOTOGRAPHS_PASSED if _photographs_passed(one, rig) else SAID[one.assessment]
 
 
 def _photographs_passed(one: Headline, rig: Sequence[str]) -> bool:
-    return one.fit not in rig and one.stance == "unverified"
+    return one.fit not in rig and one.assessment == "unverified"
 
 
-def overall_stance(headlines: Sequence[Headline], rig: Sequence[str]) -> Stance:
-    """The worst stance; photographs that passed their checks do not lower that of the rig."""
-    counted = [h.stance for h in headlines if not (rig and _photographs_passed(h, rig))]
-    return min(counted or ["unverified"], key=STANCES.index)
+def overall_assessment(headlines: Sequence[Headline], rig: Sequence[str]) -> Assessment:
+    """The worst assessment; photographs that passed their checks do not lower that of the rig."""
+    counted = [h.assessment for h in headlines if not (rig and _photographs_passed(h, rig))]
+    return min(counted or ["unverified"], key=ASSESSMENTS.index)
 
 
 def cells_of(

@@ -66,7 +66,7 @@ def _pose(fit: PlateFit) -> Panel:
     ]
     if fit.rig_plate is None:
         notes.append(
-            "The pose in the rig's frame is not known: run `scissorcal capture plate --stances "
+            "The pose in the rig's frame is not known: run `scissorcal capture plate --positions "
             "FILE` with photographs of the card on the rig, then `scissorcal fit plate`."
         )
     caption = (

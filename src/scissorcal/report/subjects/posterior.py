@@ -116,7 +116,7 @@ def prior_panel(fit: FitResult, part: str) -> Panel:
     for i, parameter in enumerate(fit.parameters):
         scale, unit = shown_unit(parameter.unit)
         ends = [np.quantile(scale * draws[:, i], [0.05, 0.5, 0.95]) for draws in (prior, fit.draws)]
-        narrowed = None if parameter.believed else finite(parameter.identifiability)
+        narrowed = None if parameter.measured_prior else finite(parameter.identifiability)
         rows.append(
             Row(
                 plain_name(parameter),
@@ -206,7 +206,7 @@ def plain_name(parameter: FittedParameter) -> str:
 def _word(parameter: FittedParameter) -> str:
     """In a word, where a parameter's value comes from."""
     ratio = finite(parameter.identifiability)
-    if parameter.believed:
+    if parameter.measured_prior:
         return "measured before"
     if ratio is None:
         return "not available"

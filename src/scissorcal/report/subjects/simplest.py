@@ -21,7 +21,7 @@ def simplest_panel(choice: SceneChoice, fits: Sequence[FitResult]) -> Panel:
     """Aspect by aspect: the fitted candidate, the one that is enough, its cost and savings."""
     record = choice.simplification
     rows = tuple(_row(row, choice) for row in record.aspects if row.tried or row.fitted != "none")
-    notes = [f"Data, {fit.what}: {fit.selection or fit.rung}" for fit in fits]
+    notes = [f"Data, {fit.what}: {fit.selection or fit.candidate}" for fit in fits]
     notes.append(f"Scene: {record.sentence}")
     rest = 1.0 - (record.allowed_share + record.tables_share) / record.tolerance
     notes.append(

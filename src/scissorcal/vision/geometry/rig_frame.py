@@ -44,7 +44,7 @@ OPEN = 3.0
 """Prior standard deviation (rad and m) of both poses: a turn that may be any has 1.8 rad, and no
 camera stands so far away. It bounds what the motion leaves open, and decides nothing else."""
 
-UNTOLD = 0.1
+UNDETERMINED_SD = 0.1
 """A direction of the camera's pose with a larger standard deviation (rad or m) is undetermined by
 the motion."""
 
@@ -53,12 +53,12 @@ REJECTIONS = 3
 """Times that corners which least squares leave far off are left out, and it is tried again."""
 MOST_OF_A_VIEW = 0.25
 """Share of a picture's corners, those of one marker of the card's four, beyond which it is not
-single corners that are wrong, but the stance that was stated: then none is left out."""
+single corners that are wrong, but the position that was stated: then none is left out."""
 
 
 @dataclass(frozen=True)
 class CardView:
-    """The card in one picture, and the rig's stance: ``advance_m`` and, for a card on a moving
+    """The card in one picture, and the rig's position: ``advance_m`` and, for a card on a moving
     blade, that blade's angle ``blade_angle_rad`` (zero for a card on the carriage)."""
 
     corners: Corners
@@ -66,10 +66,10 @@ class CardView:
     blade_angle_rad: float
 
 
-def card_view(detection: Detection, stance: tuple[float, float], moving_blades: int) -> CardView:
-    """The card as detected in one photograph; ``stance`` is advance (mm) and opening (deg)."""
+def card_view(detection: Detection, position: tuple[float, float], moving_blades: int) -> CardView:
+    """The card as detected in one photograph; ``position`` is advance (mm) and opening (deg)."""
     corners = Corners.of(detection)
-    return CardView(corners, 1e-3 * stance[0], float(np.radians(stance[1]) / moving_blades))
+    return CardView(corners, 1e-3 * position[0], float(np.radians(position[1]) / moving_blades))
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,14 @@ class RigPose:
 
     The rig's frame has its origin on the pivot's axis at no advance, level with the middle of the
     card; x is the direction in which the pivot advances, z the pivot's axis, and blades open about
-    +z. ``untold`` names the directions that the motion does not determine. ``by_camera`` (6, 9)
-    says how ``camera_rig`` moves with the camera's parameters.
+    +z. ``undetermined`` names the directions that the motion does not determine. ``by_camera`` (6,
+    9) says how ``camera_rig`` moves with the camera's parameters.
     """
 
     camera_rig: Pose
     rig_card: Pose
     rms_px: float
-    untold: tuple[str, ...]
+    undetermined: tuple[str, ...]
     by_camera: Array
 
     def holds(self, board: BoardPose, camera: Camera) -> Pose:
@@ -108,15 +108,15 @@ def locate_rig(
     T_camera_card(i) = T_camera_rig Shift(advance_i) Turn_z(blade_angle_i) T_rig_card, by least
     squares on all corners, both poses unknown at once. Corners that the other pictures contradict
     (a blade's edge taken for one of a marker's) are left out. Advances determine the x axis, turns
-    the pivot's axis and place; with one of them only, ``untold`` names the undetermined directions.
-    The covariance includes the camera's and that of the card's print.
+    the pivot's axis and place; with one of them only, ``undetermined`` names the undetermined
+    directions. The covariance includes the camera's and that of the card's print.
     ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
-    be located at all, or where fewer than two different stances were seen.
+    be located at all, or where fewer than two different positions were seen.
     """
-    stances = {(round(v.advance_m, 6), round(v.blade_angle_rad, 6)) for v in views}
-    if len(stances) < 2:
+    positions = {(round(v.advance_m, 6), round(v.blade_angle_rad, 6)) for v in views}
+    if len(positions) < 2:
         raise ValueError(
-            "the rig has the same stance in all pictures: take pictures at several advances and "
+            "the rig has the same position in all pictures: take pictures at several advances and "
             "several openings"
         )
     located = [locate_board(view.corners, camera) for view in views]
@@ -148,13 +148,15 @@ def locate_rig(
     turn[:3, :3] = left_jacobian(point[:3])
     covariance = turn @ inverse @ (spread + prior) @ inverse @ turn.T
     deviation = np.sqrt(np.diag(covariance)[:6])
-    untold = tuple(name for name, sd in zip(_DIRECTIONS, deviation, strict=True) if not sd < UNTOLD)
+    undetermined = tuple(
+        name for name, sd in zip(_DIRECTIONS, deviation, strict=True) if not sd < UNDETERMINED_SD
+    )
     rig, card = _poses(point, middle_m)
     return RigPose(
         Pose(rig.quaternion, rig.translation_m, covariance[:6, :6]),
         card,
         float(np.sqrt(2.0 * square / len(residual))),
-        untold,
+        undetermined,
         -(turn @ inverse @ drawn)[:6, :9],
     )
 

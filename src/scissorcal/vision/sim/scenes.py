@@ -125,9 +125,9 @@ class PlateScene:
     def layers(
         self, target: MarkedBoard, advance_m: float = 0.0, blade_angle: float = 0.0
     ) -> list[PaintLayer]:
-        """The target on the plate, and the card at the rig's stance."""
-        stance = SimPose(about(2, blade_angle), np.array([advance_m, 0.0, 0.0]))
-        card = chained(self.camera_rig, stance, self.rig_card)
+        """The target on the plate, and the card at the rig's position."""
+        position = SimPose(about(2, blade_angle), np.array([advance_m, 0.0, 0.0]))
+        card = chained(self.camera_rig, position, self.rig_card)
         lying = chained(self.camera_plate, self.plate_target)
         return [*target_layers(RIG_MARKERS, card), *target_layers(target, lying)]
 

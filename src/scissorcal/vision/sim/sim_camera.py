@@ -122,25 +122,27 @@ def render_card_photographs(
 ) -> dict[Path, tuple[float, float]]:
     """Render photographs of the rig's card.
 
-    Returns the files with the rig's stance in each: advance (mm) and opening (deg).
+    Returns the files with the rig's position in each: advance (mm) and opening (deg).
     """
     scene = sim_plate_scene(recipe, seed, rig_plate)
-    stances = [(advance, opening) for advance in ADVANCES_MM for opening in OPENINGS_DEG]
-    stance_of = {folder / f"rig-{n:02d}.jpg": stance for n, stance in enumerate(stances, start=1)}
-    for path, stance in stance_of.items():
-        path.write_bytes(_plate_jpeg(scene, stance, recipe, path, seed))
-    return stance_of
+    positions = [(advance, opening) for advance in ADVANCES_MM for opening in OPENINGS_DEG]
+    position_of = {
+        folder / f"rig-{n:02d}.jpg": position for n, position in enumerate(positions, start=1)
+    }
+    for path, position in position_of.items():
+        path.write_bytes(_plate_jpeg(scene, position, recipe, path, seed))
+    return position_of
 
 
 def render_frame(
-    scene: PlateScene, recipe: "Recipe", stance: tuple[float, float], seed: int, number: int
+    scene: PlateScene, recipe: "Recipe", position: tuple[float, float], seed: int, number: int
 ) -> NDArray[np.uint8]:
     """Render one picture of a running camera, (height, width, 3).
 
-    ``stance`` is the rig's advance (mm) and opening (deg); ``number`` gives each picture of a seed
-    another noise.
+    ``position`` is the rig's advance (mm) and opening (deg); ``number`` gives each picture of a
+    seed another noise.
     """
-    return _plate_picture(scene, stance, recipe, np.random.default_rng([seed, 11, number]))
+    return _plate_picture(scene, position, recipe, np.random.default_rng([seed, 11, number]))
 
 
 def standing_plate(recipe: "Recipe") -> SimPose | None:
@@ -199,21 +201,21 @@ def _write(layers: Sequence[PaintLayer], rng: np.random.Generator, path: Path) -
 
 def _plate_jpeg(
     scene: PlateScene,
-    stance: tuple[float, float],
+    position: tuple[float, float],
     recipe: "Recipe",
     path: Path,
     seed: int,
 ) -> bytes:
     rng = np.random.default_rng([seed, 10, *path.name.encode()])
-    return as_jpeg(_plate_picture(scene, stance, recipe, rng), _JPEG_QUALITY)
+    return as_jpeg(_plate_picture(scene, position, recipe, rng), _JPEG_QUALITY)
 
 
 def _plate_picture(
     scene: PlateScene,
-    stance: tuple[float, float],
+    position: tuple[float, float],
     recipe: "Recipe",
     rng: np.random.Generator,
 ) -> NDArray[np.uint8]:
-    advance_mm, opening_deg = stance
+    advance_mm, opening_deg = position
     angle = float(np.radians(opening_deg)) / recipe.rig.moving_blades
     return render(scene.layers(PLATE_BOARD, 1e-3 * advance_mm, angle), SIM_LENS, _LOOKS, rng)

@@ -58,7 +58,7 @@ class DemoResult:
     specimen: str
     judged: tuple[Judged, ...]
     torque_error: float
-    rungs: tuple[str, ...]
+    candidates: tuple[str, ...]
     rendering: RenderResult
     verified: tuple[VerifyResult, ...]
     verdicts: tuple[Verdict, ...]
@@ -123,7 +123,7 @@ def run_demo(
             *judge_photographs(workspace, recipe, specimen, seed),
         ),
         torque_error=torque_error(package, specimen, recipe),
-        rungs=tuple(f"{fit.what}: {fit.rung}" for fit in fits_made),
+        candidates=tuple(f"{fit.what}: {fit.candidate}" for fit in fits_made),
         rendering=rendering,
         verified=tuple(check.result for check in verified),
         verdicts=(*verdicts, *built.verdicts, *rendering.verdicts),

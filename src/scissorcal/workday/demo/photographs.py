@@ -102,8 +102,8 @@ def photograph(workspace: Workspace, recipe: Recipe, seed: int, progress: Progre
                 made = render_plate_photographs(recipe, folder, seed)
                 capture_plate(workspace, made, tell)
                 card = render_card_photographs(recipe, folder, seed)
-                stances = {path.name: stance for path, stance in card.items()}
-                capture_plate(workspace, list(card), tell, stances=stances)
+                positions = {path.name: position for path, position in card.items()}
+                capture_plate(workspace, list(card), tell, positions=positions)
 
 
 def fit_photographs(
@@ -133,8 +133,8 @@ def judge_photographs(
 
 def _judge_edge(workspace: Workspace, specimen: Specimen) -> list[Judged]:
     fit = load_result(Engine.of(workspace), "blade").blades[0]
-    edges = fit.belief.with_values(fit.draws)
-    blade, length = specimen.blade, fit.belief.edge.length_m
+    edges = fit.edge_posterior.with_values(fit.draws)
+    blade, length = specimen.blade, fit.edge_posterior.edge.length_m
     rows = []
     for share in (0.25, 0.5, 0.75):
         s = share * length

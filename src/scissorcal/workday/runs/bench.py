@@ -280,8 +280,8 @@ class _Run:
         keys = {task.key for task in tasks}
         own = [record for record in self._of(TOGETHER) if key_of(record) in keys]
         curve = measured_curve(self._case, knob, own, reference)
-        told = (together_sentence(curve, apart),)
-        return replace(curve, against=against, sentences=told) if own else None
+        sentences = (together_sentence(curve, apart),)
+        return replace(curve, against=against, sentences=sentences) if own else None
 
     def result(
         self,

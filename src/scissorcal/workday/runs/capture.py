@@ -38,7 +38,7 @@ from scissorcal.workday.workspace import Workspace
 ADVANCE: Literal["friction-advance"] = "friction-advance"
 
 THEN = (
-    "The capture follows at once: keep clear, as the motors move the blades and the sledge along "
+    "The capture follows at once: keep clear, as the motors move the blades and the carriage along "
     "the whole of its path."
 )
 
@@ -68,11 +68,11 @@ def capture_into(
     Each recording of one seed of a virtual rig has another noise. The operator is asked to load
     material; a virtual rig loads by itself. A rig without a probe that counts is probed first
     (`ensure_probed`); the blades are then cleared once for both. A hand's capture needs none.
-    Friction of the sledge may be captured for any scene. Whatever was recorded before an error
+    Friction of the carriage may be captured for any scene. Whatever was recorded before an error
     stays in the file.
 
     Raises InputError where options are at odds, where the scene needs no such capture, where it
-    would take longer than 4 hours (24 where the options say that this is meant), or for a sledge
+    would take longer than 4 hours (24 where the options say that this is meant), or for a carriage
     without an advance motor or without travel, before anything moves; MissingError where one until
     the tolerance lacks a fit that it builds on; and what the capture itself raises.
     """
@@ -113,8 +113,8 @@ def _refuse_at_odds(kind: CaptureKind, options: CaptureOptions) -> None:
     if kind == ADVANCE:
         if options.designed is not None or options.until_tolerance or bounded:
             raise InputError(
-                "The sledge's capture takes the speeds that capture.friction_advance lists: leave "
-                "out --designed, --as-in-recipe, --until-tolerance and its options."
+                "The carriage's capture takes the speeds that capture.friction_advance lists: "
+                "leave out --designed, --as-in-recipe, --until-tolerance and its options."
             )
     elif not options.until_tolerance:
         if bounded:
@@ -212,7 +212,7 @@ def _earlier(engine: Engine, kind: DesignedKind) -> Earlier:
     swept = used("friction")
     if kind == "cut":
         friction = load_result(engine, "friction")
-        law = load_result(engine, "cut").rung if "cut" in there else None
+        law = load_result(engine, "cut").candidate if "cut" in there else None
         return Earlier(swept, used("cut"), friction, edge=edge, last_law=law)
     friction = load_result(engine, "friction") if "friction" in there else None
     cut = None

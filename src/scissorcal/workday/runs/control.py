@@ -84,7 +84,7 @@ def control_workspace(
         edge=blade_edge(engine, engine.recipe),
     )
     if options.pose is not None and operator is not None:
-        operator.say(f"The plate stands {task.told}.")
+        operator.say(f"The plate stands {task.pose_origin}.")
     return run_at_rig(workspace, task, rig, operator, record=not options.no_record)
 
 
@@ -138,11 +138,11 @@ class _ControlTask(RigTask["ControlResult"]):
         )
         result = control(session, _mechanics(self.fits, self.edge, session), job, writer)
         if writer is not None:
-            writer.note(_note(result, self.told))
+            writer.note(_note(result, self.pose_origin))
         return result
 
     @property
-    def told(self) -> str:
+    def pose_origin(self) -> str:
         """Where the plate's pose was from, as an end of a sentence."""
         if self.options.pose is None:
             return "where it was tracked" if self.tracked else "as it was fitted"
@@ -212,10 +212,10 @@ def _sliding_sd(fit: FitResult, law: FrictionLaw) -> float:
     return math.hypot(float(np.std(sliding, axis=0).max()), LACK_OF_FIT * level)
 
 
-def _note(done: ControlResult, told: str) -> str:
+def _note(done: ControlResult, pose_origin: str) -> str:
     figures = done.figures
     return (
         f"Followed {figures.way_mm:.1f} mm of path with {done.wanted_N:g} N, the plate standing "
-        f"{told}: force off by {figures.force_rms_N:.3f} N (rms), path by "
+        f"{pose_origin}: force off by {figures.force_rms_N:.3f} N (rms), path by "
         f"{figures.path_rms_mm:.3f} mm (rms)."
     )

@@ -7,7 +7,7 @@ from scissorcal.calibration.cut.structure import edge_of
 from scissorcal.calibration.fit_model import CutRun
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError
-from scissorcal.model import EdgeBelief
+from scissorcal.model import EdgeDistribution
 from scissorcal.model.edge import Edge
 from scissorcal.recipe.schema import Recipe
 from scissorcal.verdicts import Verdict
@@ -40,7 +40,7 @@ def fit(engine: Engine, request: Request) -> Made:
     return Made(finished(result, request))
 
 
-def edge_of_photographs(engine: Engine) -> tuple[EdgeBelief | None, tuple[Verdict, ...]]:
+def edge_of_photographs(engine: Engine) -> tuple[EdgeDistribution | None, tuple[Verdict, ...]]:
     """The edge that photographs gave and the verdicts on it; None where the recipe states it.
 
     Raises MissingError where the recipe asks for photographs and the blade's fit is not current,
@@ -49,10 +49,10 @@ def edge_of_photographs(engine: Engine) -> tuple[EdgeBelief | None, tuple[Verdic
     if not engine.needed("fit blade"):
         return None, ()
     blade = load_result(engine, "blade")
-    return blade.belief, blade.verdicts
+    return blade.edge_posterior, blade.verdicts
 
 
 def blade_edge(engine: Engine, recipe: Recipe) -> Edge:
     """The edge of photographs, else the recipe's."""
-    belief, _ = edge_of_photographs(engine)
-    return (belief or edge_of(recipe)).edge
+    edge_posterior, _ = edge_of_photographs(engine)
+    return (edge_posterior or edge_of(recipe)).edge

@@ -99,8 +99,8 @@ def design_captures(workspace: Workspace, identity: "Identity | None" = None) ->
         rig, assumed = _assumed_rig(recipe), (ASSUMED_RIG, *assumed)
     stock = capture_stock(recipe, rig, *states)
     found = choose_captures(known, stock)
-    told, listed_s = listed_captures(recipe, rig, *states)
-    listed = expected_band(known.plus(*told, new_recording=True))
+    information, listed_s = listed_captures(recipe, rig, *states)
+    listed = expected_band(known.plus(*information, new_recording=True))
     design = CaptureDesign(
         format=FORMAT,
         inputs=inputs_of(engine),

@@ -30,7 +30,7 @@ def fit(engine: Engine, request: Request) -> Made:
 
 
 def fit_advance(engine: Engine, request: Request) -> Made:
-    """Fit mass and friction to the used recordings of the sledge's empty motion."""
+    """Fit mass and friction to the used recordings of the carriage's empty motion."""
     return _fitted(engine, request, "friction-advance")
 
 

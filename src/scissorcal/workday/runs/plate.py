@@ -15,7 +15,7 @@ from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.rig_frame import RigPose, card_view, locate_rig
 from scissorcal.vision.overlay import residual_overlay, write_picture
 from scissorcal.vision.photo import Photo, read_photo
-from scissorcal.vision.stances import Stances, stance_of
+from scissorcal.vision.rig_positions import RigPositions, position_of
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP, RIG_MARKERS, MarkedBoard
 from scissorcal.vision.targets.detect import find_any_board
 from scissorcal.workday.engine import Engine
@@ -39,28 +39,28 @@ def capture_plate(
     paths: Iterable[Path],
     tell: Callable[[str], None],
     *,
-    stances: Stances | None = None,
+    positions: RigPositions | None = None,
 ) -> Taken:
-    """Capture photographs of the plate's target, or with ``stances`` of the card on the rig.
+    """Capture photographs of the plate's target, or with ``positions`` of the card on the rig.
 
     The first photograph says which target it is; one that shows another, or none, is left out with
     its reason. Raises InputError, and keeps nothing, where none is left.
     """
-    kind: Literal["plate", "rig"] = "plate" if stances is None else "rig"
+    kind: Literal["plate", "rig"] = "plate" if positions is None else "rig"
     boards: tuple[MarkedBoard, ...] = (
-        (PLATE_BOARD, PLATE_STRIP) if stances is None else (RIG_MARKERS,)
+        (PLATE_BOARD, PLATE_STRIP) if positions is None else (RIG_MARKERS,)
     )
 
     def look(path: Path, photo: Photo) -> Seen:
         nonlocal boards
-        stance = None if stances is None else stance_of(path, stances)
+        position = None if positions is None else position_of(path, positions)
         detection = find_any_board(photo, boards)
         boards = (detection.board,)  # type: ignore[assignment]
         words = (
             f"{photo.source}: {len(detection.ids)} of {len(detection.board.points)} corners of "
             f"the {detection.board.name}, {detection.square_px:.0f} px a side"
         )
-        return Seen(words, detection, stance)
+        return Seen(words, detection, position)
 
     return take_photographs(workspace, kind, paths, look, tell)
 
@@ -103,9 +103,9 @@ def locate_workspace_rig(engine: Engine, camera: Camera) -> RigPose | None:
     for capture in captures:
         _refuse_other_camera(capture, camera)
         for photo in capture.index.photographs:
-            stance = photo.advance_mm or 0.0, photo.opening_deg or 0.0
+            position = photo.advance_mm or 0.0, photo.opening_deg or 0.0
             found = detection_of(capture, photo)
-            views.append(card_view(found, stance, engine.recipe.rig.moving_blades))
+            views.append(card_view(found, position, engine.recipe.rig.moving_blades))
     if not views:
         return None
     middle = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])

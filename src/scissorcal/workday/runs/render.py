@@ -2,9 +2,9 @@
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import InputError, MissingError, ScissorcalError, VerdictError
@@ -15,7 +15,6 @@ from scissorcal.recipe.plate_surface import CLAMPED_deg_per_s, CLAMPED_mm_per_s,
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording import RecordingWriter
 from scissorcal.render import (
-    PoseSource,
     Rendering,
     RenderResult,
     RigFacts,
@@ -25,15 +24,13 @@ from scissorcal.render import (
 )
 from scissorcal.render.mismatch import refuse_other_rig
 from scissorcal.render.rig_facts import fitted_facts, rig_facts, with_probe
+from scissorcal.tracking.plate_pose import PoseSource
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, RenderOptions, RigOptions
 from scissorcal.workday.runs.at_rig import RigRun, RigTask, run_at_rig
 from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 def render_workspace(

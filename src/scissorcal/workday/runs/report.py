@@ -183,7 +183,7 @@ def load_side(path: Path) -> Side:
                 f"{path} has no {RECIPE_FILE}, so it is no workspace: name a workspace, a "
                 "report.json or a fit (.nc)."
             )
-        source = told_path(path) if path.name not in ("", "..") else path.resolve().name
+        source = shown_path(path) if path.name not in ("", "..") else path.resolve().name
         return _side_of_workspace(Workspace(path.absolute()), source)
     if not path.is_file():
         raise MissingError(
@@ -193,10 +193,10 @@ def load_side(path: Path) -> Side:
         return _side_of_fit(path)
     remedy = "Run 'scissorcal report' again, or name a workspace or a fit (.nc)."
     with reading(path, REPORT, remedy):
-        return Side(told_path(path), read_twin(read_foreign(path, REPORT)))
+        return Side(shown_path(path), read_twin(read_foreign(path, REPORT)))
 
 
-def told_path(path: Path) -> str:
+def shown_path(path: Path) -> str:
     """The name of a side on a page that goes to others, without the folders above its workspace."""
     if not path.is_absolute():
         return str(path)
@@ -225,4 +225,4 @@ def _side_of_fit(path: Path) -> Side:
         recipe = find_workspace(path.parent).recipe()
     except MissingError:
         recipe = None
-    return Side(told_path(path), document_of_fit(fit, recipe))
+    return Side(shown_path(path), document_of_fit(fit, recipe))

@@ -78,7 +78,7 @@ def sweep_bounds(
 
 
 def sliding_below_encoder(recipe: Recipe, identity: Identity) -> str:
-    """Which planned speeds of the sledge a fit will not use, as a sentence; empty for none.
+    """Which planned speeds of the carriage a fit will not use, as a sentence; empty for none.
 
     Below the rate's floor, which the encoder's step and the fit's cutoff give, the sign of the
     rate is noise.

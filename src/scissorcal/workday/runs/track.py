@@ -136,7 +136,7 @@ def _opened(engine: Engine, recipe: Recipe, options: TrackOptions) -> Iterator[_
         if device != NONE:
             session = stack.enter_context(open_session(recipe, options.rig))
             link = session.link
-            feeds.refuse_without_sledge(link)
+            feeds.refuse_without_carriage(link)
             on = stack.enter_context(feeds.idle_rig(session))
         frames = frames_of(camera) if camera != NONE else None
         if eye is not None and frames is not None and camera_number(camera) is None:

@@ -167,13 +167,13 @@ def idle_rig(session: RigSession) -> AbstractContextManager[Motion]:
     return open_motion(session.link, servo_config(session.recipe, session.identity))
 
 
-def refuse_without_sledge(link: Link) -> None:
+def refuse_without_carriage(link: Link) -> None:
     """DeviceError where the tip's place along the cut is not measured."""
     identity = link.identity
     if identity.advance_min < identity.advance_max:
         return
     raise DeviceError(
-        f"The device {identity.name} has no sledge: it states no range of advance, so the tip's "
+        f"The device {identity.name} has no carriage: it states no range of advance, so the tip's "
         "place along the cut is not known. Track without it (--device none), or with a rig that "
         "has one."
     )

@@ -46,16 +46,16 @@ def pose_finder(
     """
     fitted = load_result(engine, "camera")
     located = locate_workspace_rig(engine, fitted.camera)
-    rig = None if located is None or located.untold else located
+    rig = None if located is None or located.undetermined else located
     if rig is None and needs_rig:
         photographs = (
-            "--camera sim --stances sim"
+            "--camera sim --positions sim"
             if camera == SIM
-            else "--image rig-*.jpg --stances stances.csv"
+            else "--image rig-*.jpg --positions positions.csv"
         )
-        told = f" ({', '.join(located.untold)} is not determined)" if located else ""
+        gap = f" ({', '.join(located.undetermined)} is not determined)" if located else ""
         raise MissingError(
-            f"The camera's place in the rig's frame is not known{told}, so contacts and pictures "
+            f"The camera's place in the rig's frame is not known{gap}, so contacts and pictures "
             "cannot be told together: photograph the rig card at several advances and openings "
             f"('scissorcal capture plate {photographs}'), or {otherwise}."
         )

@@ -25,7 +25,7 @@ from scissorcal.vision.sim.sim_camera import render_frame, sim_plate_scene
 
 CAMERA_OFFSET_S, CAMERA_DRIFT = 3000.0, 80e-6
 """The camera's clock: when it was switched on, and that it runs faster."""
-STANCE = (0.0, 8.0)
+POSITION = (0.0, 8.0)
 PLATE = 2.0
 """MATERIAL that puts the specimen's plate in."""
 HAND = {
@@ -160,11 +160,11 @@ class SimWorld:
         """What the camera shows at a time of the host's clock, (height, width, 3)."""
         rotation, place = self.truth(exposed)
         scene = sim_plate_scene(self._recipe, self._seed, SimPose(rotation, place))
-        stance = STANCE
+        position = POSITION
         if self._link is not None:
             rig = self._link.rig
-            stance = (1e3 * rig.advance, math.degrees(rig.opening))
-        return render_frame(scene, self._recipe, stance, self._seed, self._number)
+            position = (1e3 * rig.advance, math.degrees(rig.opening))
+        return render_frame(scene, self._recipe, position, self._seed, self._number)
 
     def _shot(self, exposed: float, arrives: float) -> Frame:
         image = self.image(exposed)

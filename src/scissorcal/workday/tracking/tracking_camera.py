@@ -96,7 +96,7 @@ class TrackingCamera:
         Raises DeviceError, nothing having moved, where the camera fails meanwhile, with its own
         sentence, and where no picture gave a pose within `PATIENCE_S`; later as `TrackedPose`.
         """
-        feeds.refuse_without_sledge(session.link)
+        feeds.refuse_without_carriage(session.link)
         virtual = self._world is not None
         base_ns, begun_s = (0, 0.0) if virtual else (time.time_ns(), time.monotonic())
         channels = TrackChannels(writer, base_ns) if writer is not None else None

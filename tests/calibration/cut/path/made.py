@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.recording.recording import SAMPLE_DTYPE, Recording, Stroke
+from scissorcal.recording import SAMPLE_DTYPE, Recording, Stroke
 
 RATE_HZ = 1000
 INERTIA = 2e-4

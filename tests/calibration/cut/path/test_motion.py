@@ -144,7 +144,7 @@ def test_blades_that_creep_do_work_against_friction():
 
 
 def test_the_mean_advance_is_that_over_the_path():
-    """A sledge that moves on while the blades stand has no share in it."""
+    """A carriage that moves on while the blades stand has no share in it."""
     way = np.concatenate([sweep(0.6, 0.5, 0.2), np.full(300, 0.5)])
     motion = motion_of(record(way, spring))
     moved = np.where(np.arange(len(way)) < len(way) - 300, 0.01, 0.02)
@@ -153,7 +153,7 @@ def test_the_mean_advance_is_that_over_the_path():
 
 
 def test_the_advance_at_the_ends_is_on_the_line_along_the_path():
-    """By steps of 10 um, a sledge that goes 0.05 m a rad: within a tenth of a step at the ends."""
+    """By steps of 10 um, a carriage at 0.05 m a rad: within a tenth of a step at the ends."""
     motion = motion_of(record(sweep(0.6, 0.5, 0.2), spring))
     advance = 0.03 + np.round(0.05 * (0.6 - motion.opening) / 1e-5) * 1e-5
     ends = np.array([100, 220, 340])
@@ -172,8 +172,8 @@ def test_segments_of_one_step_have_the_advance_of_its_ends():
 
 
 @pytest.mark.parametrize("hertz", [25.0, 60.0])
-def test_the_line_stays_within_what_the_sledge_did(hertz):
-    """Swings on a slow drift, in and out of what counts as standing, while the sledge goes on."""
+def test_the_line_stays_within_what_the_carriage_did(hertz):
+    """Swings on a slow drift, in and out of what counts as standing, while the carriage goes on."""
     time = np.arange(600) / RATE_HZ
     way = 0.6 - 0.02 * time - 1e-3 * np.sin(2 * np.pi * hertz * time) * np.exp(-time / 0.15)
     motion = motion_of(record(way, spring, step_rad=COARSE))
@@ -185,7 +185,7 @@ def test_the_line_stays_within_what_the_sledge_did(hertz):
             assert advance[first] - 2e-6 < pair.min() <= pair.max() < advance[last] + 2e-6
 
 
-def test_a_sledge_that_moves_back_at_rest_does_not_count():
+def test_a_carriage_that_moves_back_at_rest_does_not_count():
     """30 mm in 0.3 s before the blades turn, and then 0.05 m a rad: the line is that of the way."""
     motion = motion_of(record(np.concatenate([np.full(300, 0.6), sweep(0.6, 0.5, 0.2)]), spring))
     back = np.linspace(0.03, 0.0, 300)

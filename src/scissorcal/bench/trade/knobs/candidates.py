@@ -249,8 +249,8 @@ class Friction(CandidateKnob):
     def recipe(self, recipe: Recipe, candidate: str) -> Recipe:
         """With this law; without friction the simplest is fitted, since a cut contains it."""
         if candidate == NONE:
-            return with_scene(with_friction(recipe, rung=self.laws[0]), render_friction=False)
-        return with_friction(recipe, rung=candidate)
+            return with_scene(with_friction(recipe, law=self.laws[0]), render_friction=False)
+        return with_friction(recipe, law=candidate)
 
     def single(self, case: Case) -> str:
         """A scene that renders no friction ships none of its laws."""

@@ -82,7 +82,7 @@ class Photographs:
         """Fit the edge, and put it into the model of the present fits."""
         chosen = setting.value["count"], setting.value["factor"]
         fit, seconds = fit_edge(case, chosen, np.random.default_rng([case.seed, repeat]))
-        model, edge = fitted_model(case), fit.belief.edge
+        model, edge = fitted_model(case), fit.edge_posterior.edge
         length = case.recipe.rig.edge.length_m
         station = np.linspace(0.1, 0.95, STATIONS) * length
         changed = ExactModel(replace(model.cutting, edge=edge), model.friction)

@@ -1,19 +1,19 @@
-"""The table of stances: columns in any order; what is no table of stances names its line."""
+"""The table of rig positions: columns in any order; a wrong table names its line."""
 
 from pathlib import Path
 
 import pytest
 
 from scissorcal.errors import InputError
-from scissorcal.vision.stances import read_stances
+from scissorcal.vision.rig_positions import read_rig_positions
 
 WANTED = {"rig-01.jpg": (30.0, 25.0), "rig-02.jpg": (40.5, -1.0)}
 
 
 def read(tmp_path: Path, text: str) -> object:
-    path = tmp_path / "stances.csv"
+    path = tmp_path / "positions.csv"
     path.write_bytes(text.encode())
-    return read_stances(path)
+    return read_rig_positions(path)
 
 
 @pytest.mark.parametrize(
@@ -73,6 +73,6 @@ def test_columns_stand_in_any_order(tmp_path: Path, text: str) -> None:
         ("file,advance_mm,opening_deg\n" + "a" * 200_000 + ",30,25\n", "no line of CSV"),
     ],
 )
-def test_what_is_no_stance_names_its_line(tmp_path: Path, rows: str, words: str) -> None:
+def test_what_is_no_position_names_its_line(tmp_path: Path, rows: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read(tmp_path, rows)

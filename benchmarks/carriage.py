@@ -1,8 +1,8 @@
-"""Mass and friction of sledges on two virtual rigs: errors, and what the 90 % intervals hold.
+"""Mass and friction of carriages on two virtual rigs: errors, and what the 90 % intervals hold.
 
-    python -m benchmarks.sledge --count 42
+    python -m benchmarks.carriage --count 42
 
-Each run draws another sledge: mass, Coulomb and viscous friction, how late its force acts, the
+Each run draws another carriage: mass, Coulomb and viscous friction, how late its force acts, the
 encoder's step, and on the second rig (tests/second_rig, Runge-Kutta steps) how dry friction builds
 up after a reversal. Captures and fits are those of the commands; standard effort.
 """
@@ -32,7 +32,7 @@ NAMES = {"inertia": "mass", "coulomb": "Coulomb friction", "viscous": "viscous f
 
 @dataclass(frozen=True)
 class Run:
-    """One sledge: its true parameters, recording and recipe."""
+    """One carriage: its true parameters, recording and recipe."""
 
     truth: dict[str, float]
     recording: Recording
@@ -70,15 +70,15 @@ def main() -> None:
             )
             rows += [_row(fit, key, value) for key, value in made.truth.items()]
             failed = [verdict.check for verdict in fit.rejected]
-            odd += [f"seed {seed}, {fit.rung}: {', '.join(failed)} failed"] if failed else []
-            print(f"{name} rig, seed {seed}: {fit.rung}", file=sys.stderr)
+            odd += [f"seed {seed}, {fit.candidate}: {', '.join(failed)} failed"] if failed else []
+            print(f"{name} rig, seed {seed}: {fit.candidate}", file=sys.stderr)
         _print(name, rows, odd)
 
 
 def first_rig(seed: int) -> Run:
-    """A sledge on the virtual rig of --device sim, captured in virtual time."""
+    """A carriage on the virtual rig of --device sim, captured in virtual time."""
     rng = np.random.default_rng([seed, 1])
-    truth = _sledge(rng)
+    truth = _carriage(rng)
     specimen = load_specimen("office-paper")
     advance = specimen.mechanism.advance.model_copy(
         update={
@@ -104,12 +104,12 @@ def first_rig(seed: int) -> Run:
 
 
 def second_rig(seed: int) -> Run:
-    """A sledge on the rig of other construction, with friction that builds up after a reversal."""
+    """A carriage on the rig of other construction; friction builds up after a reversal."""
     from tests.second_rig import capture_friction_advance as captured
     from tests.second_rig import coarse, fine, recipe_for
 
     rng = np.random.default_rng([seed, 2])
-    truth = _sledge(rng)
+    truth = _carriage(rng)
     rig = (fine if seed % 2 else coarse)()
     mechanism = replace(
         rig.mechanism,
@@ -129,7 +129,7 @@ def second_rig(seed: int) -> Run:
 RIGS: dict[str, Callable[[int], Run]] = {"first": first_rig, "second": second_rig}
 
 
-def _sledge(rng: np.random.Generator) -> dict[str, float]:
+def _carriage(rng: np.random.Generator) -> dict[str, float]:
     return {
         "inertia": _log_uniform(rng, 0.45, 1.5),
         "coulomb": _log_uniform(rng, 0.2, 2.0),

@@ -1,0 +1,103 @@
+from .camera.fit import CameraPhoto as CameraPhoto
+from .camera.fit import fit_camera as fit_camera
+from .camera.result import CameraFit as CameraFit
+from .camera.result import CrossValidation as CrossValidation
+from .camera.result import PixelMap as PixelMap
+from .camera.result import ViewError as ViewError
+from .caveats import NEXT_RECORDING as NEXT_RECORDING
+from .caveats import ON_RECORD as ON_RECORD
+from .checks import HOLD_OUT as HOLD_OUT
+from .checks import K_HAT as K_HAT
+from .cut import CutExperiment as CutExperiment
+from .cut import cut_experiment as cut_experiment
+from .cut import cutting_from as cutting_from
+from .cut import fit_cut as fit_cut
+from .cut.curves import EdgePlace as EdgePlace
+from .cut.curves import force_along_edge as force_along_edge
+from .cut.curves import fracture_work as fracture_work
+from .cut.curves import response_curve as response_curve
+from .cut.laws import allowed_laws as allowed_laws
+from .cut.unknowns import SceneMean as SceneMean
+from .design.band import expected_band as expected_band
+from .design.choice import CaptureList as CaptureList
+from .design.choice import choose_captures as choose_captures
+from .design.choice import first_captures as first_captures
+from .design.state import expected_cut as expected_cut
+from .design.state import expected_friction as expected_friction
+from .edge.result import Band as Band
+from .edge.result import BladeFit as BladeFit
+from .edge.result import BladeResult as BladeResult
+from .edge.result import EdgeCandidate as EdgeCandidate
+from .edge.result import FoundNick as FoundNick
+from .edge.result import PhotographRow as PhotographRow
+from .edge.result import SeenPair as SeenPair
+from .fit_model import CutRun as CutRun
+from .fit_model import Experiment as Experiment
+from .fit_model import FrictionRun as FrictionRun
+from .friction.curve import friction_curve as friction_curve
+from .friction.curve import friction_map as friction_map
+from .friction.fit import fit_friction as fit_friction
+from .friction.fit import friction_experiment as friction_experiment
+from .friction.layout import at_typical as at_typical
+from .friction.model import FrictionExperiment as FrictionExperiment
+from .plate.checks import HALVES as HALVES
+from .plate.checks import RESIDUALS as RESIDUALS
+from .plate.fit import plate_target as plate_target
+from .plate.result import PlateFit as PlateFit
+from .plate.result import PoseHalves as PoseHalves
+from .plate.result import PoseView as PoseView
+from .plate.track_lines import TrackHead as TrackHead
+from .plate.track_lines import TrackPose as TrackPose
+from .plate.track_lines import TrackRow as TrackRow
+from .plate.track_lines import read_track_lines as read_track_lines
+from .result import FitResult as FitResult
+from .result import FitSeries as FitSeries
+from .result import FittedParameter as FittedParameter
+from .result import Proposal as Proposal
+from .result import ReplayComparison as ReplayComparison
+from .result import ReplayRow as ReplayRow
+from .result import StrokeError as StrokeError
+from .signals.sensors import channels_of as channels_of
+from .signals.steadiness import steadiness as steadiness
+from .signals.survey import survey as survey
+from .store import load as load
+from .store import load_any_fit as load_any_fit
+from .store import load_fit as load_fit
+from .store import read_header as read_header
+from .store import save as save
+from .verify.result import FORMAT as FORMAT
+from .verify.result import Calibration as Calibration
+from .verify.result import Coverage as Coverage
+from .verify.result import Halves as Halves
+from .verify.result import HalvesRow as HalvesRow
+from .verify.result import RankBand as RankBand
+from .verify.result import RankedQuantity as RankedQuantity
+from .verify.result import Sensitivity as Sensitivity
+from .verify.result import SensitivityRow as SensitivityRow
+from .verify.result import VerifyResult as VerifyResult
+from .verify.simulated_recordings import Sheet as Sheet
+from .verify.simulated_recordings import Unevenness as Unevenness
+from .verify.simulated_recordings import crack_law as crack_law
+from .verify.simulated_recordings import material_torque as material_torque
+
+__all__ = [
+    "CutExperiment",
+    "CutRun",
+    "Experiment",
+    "FitResult",
+    "FitSeries",
+    "FittedParameter",
+    "FrictionExperiment",
+    "FrictionRun",
+    "StrokeError",
+    "cut_experiment",
+    "cutting_from",
+    "fit_cut",
+    "fit_friction",
+    "friction_experiment",
+    "load",
+    "load_any_fit",
+    "load_fit",
+    "read_header",
+    "save",
+]

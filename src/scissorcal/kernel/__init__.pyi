@@ -1,0 +1,162 @@
+from .compiled_step import missing_tools as missing_tools
+from .control import CONTROL_DTYPE as CONTROL_DTYPE
+from .control import AxisFriction as AxisFriction
+from .control import Contour as Contour
+from .control import ControlConfig as ControlConfig
+from .control import ControlFlag as ControlFlag
+from .control import ControlTask as ControlTask
+from .crack import CrackLaw as CrackLaw
+from .crack import CrackPath as CrackPath
+from .crack import Curve as Curve
+from .crack import walk_crack as walk_crack
+from .cut_fit import CutFitData as CutFitData
+from .cut_fit import CutFitParameters as CutFitParameters
+from .cut_fit import cut_log_likelihood as cut_log_likelihood
+from .cut_fit import cut_log_likelihoods as cut_log_likelihoods
+from .hybrid import HYBRID_INPUT_DTYPE as HYBRID_INPUT_DTYPE
+from .hybrid import HYBRID_OUTPUT_DTYPE as HYBRID_OUTPUT_DTYPE
+from .hybrid import Hybrid as Hybrid
+from .hybrid import HybridConfig as HybridConfig
+from .hybrid import HybridFlag as HybridFlag
+from .hybrid import NormalLaw as NormalLaw
+from .hybrid import hybrid_inputs as hybrid_inputs
+from .layout import fill_struct as fill_struct
+from .loop import Histogram as Histogram
+from .loop import LoopBlock as LoopBlock
+from .loop import LoopCounters as LoopCounters
+from .loop import ask_for_slice as ask_for_slice
+from .loop import lock_memory as lock_memory
+from .loop import run_loop as run_loop
+from .messages import PROTOCOL_VERSION as PROTOCOL_VERSION
+from .messages import SCHEMA_HASH as SCHEMA_HASH
+from .messages import Capability as Capability
+from .messages import Command as Command
+from .messages import CommandFlag as CommandFlag
+from .messages import Config as Config
+from .messages import ConfigEcho as ConfigEcho
+from .messages import ConfigKey as ConfigKey
+from .messages import ConfigStatus as ConfigStatus
+from .messages import Hello as Hello
+from .messages import Identity as Identity
+from .messages import Message as Message
+from .messages import State as State
+from .messages import StateFlag as StateFlag
+from .modes import Mode as Mode
+from .passivity import EnergyLedger as EnergyLedger
+from .passivity import PassivityConfig as PassivityConfig
+from .paths import estimated_rates as estimated_rates
+from .paths import presliding_path as presliding_path
+from .pieces import MOST_PIECES as MOST_PIECES
+from .pieces import MOST_STRIPS as MOST_STRIPS
+from .pieces import Piece as Piece
+from .pieces import PiecesModel as PiecesModel
+from .pieces import Strip as Strip
+from .pieces import largest_overlap as largest_overlap
+from .plate import PlacedModel as PlacedModel
+from .plate import PlateConfig as PlateConfig
+from .plate import Pull as Pull
+from .plate import Section as Section
+from .servo import SAMPLE_DTYPE as SAMPLE_DTYPE
+from .servo import SampleFlag as SampleFlag
+from .servo import Servo as Servo
+from .servo import ServoConfig as ServoConfig
+from .servo import ServoCounters as ServoCounters
+from .sources import c_sources as c_sources
+from .stepping import STEP_DTYPE as STEP_DTYPE
+from .stepping import Kernel as Kernel
+from .stepping import StepFlag as StepFlag
+from .stepping import StepOutput as StepOutput
+from .stop_reason import StopReason as StopReason
+from .table16 import Row16 as Row16
+from .table16 import Table16 as Table16
+from .tables import TABLE_NAMES as TABLE_NAMES
+from .tables import ModelTables as ModelTables
+from .tables import Table as Table
+from .watching import LagCounts as LagCounts
+from .watching import WatchConfig as WatchConfig
+from .wire import FrameDecoder as FrameDecoder
+from .wire import crc16 as crc16
+from .wire import decode as decode
+from .wire import encode as encode
+from .wire import encode_frame as encode_frame
+
+__all__ = [
+    "CONTROL_DTYPE",
+    "HYBRID_INPUT_DTYPE",
+    "HYBRID_OUTPUT_DTYPE",
+    "MOST_PIECES",
+    "MOST_STRIPS",
+    "PROTOCOL_VERSION",
+    "SAMPLE_DTYPE",
+    "SCHEMA_HASH",
+    "STEP_DTYPE",
+    "AxisFriction",
+    "Capability",
+    "Command",
+    "CommandFlag",
+    "Config",
+    "ConfigEcho",
+    "ConfigKey",
+    "ConfigStatus",
+    "Contour",
+    "ControlConfig",
+    "ControlFlag",
+    "ControlTask",
+    "CrackLaw",
+    "CrackPath",
+    "Curve",
+    "CutFitData",
+    "CutFitParameters",
+    "EnergyLedger",
+    "FrameDecoder",
+    "Hello",
+    "Histogram",
+    "Hybrid",
+    "HybridConfig",
+    "HybridFlag",
+    "Identity",
+    "Kernel",
+    "LagCounts",
+    "LoopBlock",
+    "LoopCounters",
+    "Message",
+    "Mode",
+    "ModelTables",
+    "NormalLaw",
+    "PassivityConfig",
+    "Piece",
+    "PiecesModel",
+    "PlacedModel",
+    "PlateConfig",
+    "Pull",
+    "Row16",
+    "SampleFlag",
+    "Section",
+    "Servo",
+    "ServoConfig",
+    "ServoCounters",
+    "State",
+    "StateFlag",
+    "StepFlag",
+    "StepOutput",
+    "StopReason",
+    "Strip",
+    "Table",
+    "Table16",
+    "WatchConfig",
+    "ask_for_slice",
+    "c_sources",
+    "crc16",
+    "cut_log_likelihood",
+    "cut_log_likelihoods",
+    "decode",
+    "encode",
+    "encode_frame",
+    "estimated_rates",
+    "hybrid_inputs",
+    "largest_overlap",
+    "lock_memory",
+    "presliding_path",
+    "run_loop",
+    "walk_crack",
+]

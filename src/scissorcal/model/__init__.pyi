@@ -1,0 +1,59 @@
+from .blade_point import BladePoint as BladePoint
+from .course_terms import LIBRARY as LIBRARY
+from .curvature import edge_breaks as edge_breaks
+from .curvature import edge_curvature as edge_curvature
+from .curvature import level_curvature as level_curvature
+from .curvature import response_breaks as response_breaks
+from .curvature import response_curvature as response_curvature
+from .cutting import Cutting as Cutting
+from .cutting import cut_torque_along as cut_torque_along
+from .cutting import damped as damped
+from .cutting import mean_share as mean_share
+from .cutting import settled_contact as settled_contact
+from .cutting import torque_at as torque_at
+from .cutting import within_thickness as within_thickness
+from .edge import Edge as Edge
+from .edge import EdgeDistribution as EdgeDistribution
+from .edge import EdgeView as EdgeView
+from .edge import draw_edges as draw_edges
+from .edge import edge_height as edge_height
+from .edge_points import edge_through as edge_through
+from .friction import FrictionLaw as FrictionLaw
+from .friction import angle_factor as angle_factor
+from .friction import friction_level as friction_level
+from .friction import friction_torque as friction_torque
+from .friction import presliding_state as presliding_state
+from .friction_terms import CANDIDATES as CANDIDATES
+from .friction_terms import TERMS as TERMS
+from .friction_terms import law_names as law_names
+from .friction_terms import terms_of as terms_of
+from .mechanism import AxisLaw as AxisLaw
+from .plate_pieces import Layer as Layer
+from .plate_pieces import Outline as Outline
+from .plate_pieces import spans_on_line as spans_on_line
+from .response import Response as Response
+from .surface.height_field import HeightField as HeightField
+from .surface.protocol import Cylinder as Cylinder
+from .surface.protocol import Plane as Plane
+from .surface.protocol import Sphere as Sphere
+from .surface.protocol import Surface as Surface
+from .transforms import IDENTITY as IDENTITY
+from .transforms import LOG as LOG
+from .transforms import LOGIT as LOGIT
+
+__all__ = [
+    "Cutting",
+    "Edge",
+    "EdgeDistribution",
+    "EdgeView",
+    "FrictionLaw",
+    "Response",
+    "cut_torque_along",
+    "damped",
+    "draw_edges",
+    "edge_height",
+    "friction_torque",
+    "mean_share",
+    "presliding_state",
+    "settled_contact",
+]

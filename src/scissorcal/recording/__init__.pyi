@@ -1,0 +1,86 @@
+from .chunks import run_end as run_end
+from .exporting import export_channel as export_channel
+from .exporting import export_table as export_table
+from .faulty_values import continued_clock as continued_clock
+from .faulty_values import jumps_in as jumps_in
+from .faulty_values import lone_excursion as lone_excursion
+from .faulty_values import marks_in as marks_in
+from .faulty_values import overflows as overflows
+from .following import RecordingFollower as RecordingFollower
+from .header import Joint as Joint
+from .header import Kind as Kind
+from .header import RecordingHeader as RecordingHeader
+from .header import Stroke as Stroke
+from .header import StrokeKind as StrokeKind
+from .header_reader import read_header as read_header
+from .importing import ImportOptions as ImportOptions
+from .importing import import_table as import_table
+from .layout import MESSAGE_DTYPE as MESSAGE_DTYPE
+from .layout import SAMPLE_DTYPE as SAMPLE_DTYPE
+from .layout import empty_samples as empty_samples
+from .probe import PROBE_KEY as PROBE_KEY
+from .probe import Estimate as Estimate
+from .probe import Posterior as Posterior
+from .probe import ProbeResult as ProbeResult
+from .probe import Swing as Swing
+from .probe import probe_from_dict as probe_from_dict
+from .probe import probe_of as probe_of
+from .quantities import size_note as size_note
+from .reader import content_hash as content_hash
+from .reader import read_attachments as read_attachments
+from .reader import read_recording as read_recording
+from .reader import read_telemetry as read_telemetry
+from .recording import UNLOADED_MARK as UNLOADED_MARK
+from .recording import Recording as Recording
+from .recovering import Recovered as Recovered
+from .recovering import recover as recover
+from .resolution import resolution_of as resolution_of
+from .samplefile import create_locked as create_locked
+from .scan import Attachment as Attachment
+from .schema import RecordingFacts as RecordingFacts
+from .schema import recording_schema as recording_schema
+from .strokes import StrokeLabels as StrokeLabels
+from .strokes import TurningPoints as TurningPoints
+from .strokes import label_strokes as label_strokes
+from .summarising import RecordingSummary as RecordingSummary
+from .summarising import gap_cost as gap_cost
+from .summarising import summary as summary
+from .telemetry import CONTROL as CONTROL
+from .telemetry import FRAME as FRAME
+from .telemetry import PICTURE as PICTURE
+from .telemetry import POSE as POSE
+from .until import UNTIL_MARK as UNTIL_MARK
+from .until import UntilMark as UntilMark
+from .writer import RecordingWriter as RecordingWriter
+from .writer import write_recording as write_recording
+
+__all__ = [
+    "SAMPLE_DTYPE",
+    "Attachment",
+    "ImportOptions",
+    "Joint",
+    "Kind",
+    "Recording",
+    "RecordingFacts",
+    "RecordingHeader",
+    "RecordingSummary",
+    "RecordingWriter",
+    "Recovered",
+    "Stroke",
+    "StrokeKind",
+    "StrokeLabels",
+    "TurningPoints",
+    "content_hash",
+    "export_channel",
+    "export_table",
+    "import_table",
+    "label_strokes",
+    "read_attachments",
+    "read_header",
+    "read_recording",
+    "read_telemetry",
+    "recording_schema",
+    "recover",
+    "summary",
+    "write_recording",
+]
