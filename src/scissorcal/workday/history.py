@@ -1,4 +1,7 @@
-"""Earlier versions of results: kept when a new one is written, listed, and restored."""
+"""Earlier versions of results: kept when a new one is written, listed, and restored.
+
+A result that its workspace could not take is kept in another folder, and put in place later.
+"""
 
 import contextlib
 import errno
@@ -126,7 +129,7 @@ def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:
         )
     (version,) = found
     if not version.current:
-        before = take_place(engine, f"fit {version.what}", version.path)
+        before = _take_place(engine, f"fit {version.what}", version.path)
         discard_folder(version.path.parent)
         return version, before
     folder = _version_folder(engine, version.path)
@@ -139,7 +142,7 @@ def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:
     return version, None
 
 
-def take_place(engine: Engine, name: str, source: Path) -> Path | None:
+def _take_place(engine: Engine, name: str, source: Path) -> Path | None:
     """Put the result ``source``, with what stands beside it, in use; the one in use is kept.
 
     Gives the folder of the one that was in use. Killed, or without space, it leaves one of the two
@@ -316,7 +319,7 @@ def put_in_place(engine: Engine, path: Path) -> tuple[Step, Path | None]:
             f"{path} holds a fit of {found.what}, and its name begins with {step.what}-: give it "
             f"a name that begins with {found.what}-. Nothing was changed."
         )
-    return step, take_place(engine, step.name, path)
+    return step, _take_place(engine, step.name, path)
 
 
 def _kept_elsewhere(

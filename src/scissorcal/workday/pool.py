@@ -1,4 +1,7 @@
-"""Where the fits of a trust check run: here, in processes of this machine, or on a cluster."""
+"""Where fits and measurements run: here, in processes of this machine, or on a cluster.
+
+A cluster's worker answers with JSON text: values and errors, never pickles of ours.
+"""
 
 import gc
 import json

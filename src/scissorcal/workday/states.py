@@ -1,4 +1,4 @@
-"""The states that a step of the day may be in."""
+"""The states of a step of the day, that of photographs among them, and what clears a failed one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One state: model, kernel and package against 50 digits, and whether each keeps what it states."""
+"""Whether model, kernel and package keep what they state: at one state, and over a long run."""
 
 import dataclasses
 import itertools

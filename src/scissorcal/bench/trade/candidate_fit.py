@@ -130,10 +130,10 @@ def needed_minutes(case: Case, friction_speeds: int, cut_speeds: int) -> float |
         return None
 
 
-def some_speeds(speeds: Sequence[float], count: int) -> tuple[float, ...]:
+def _some_speeds(speeds: Sequence[float], count: int) -> tuple[float, ...]:
     """So many of some speeds, spread over their range: the middle one alone, or both ends and more.
 
-    >>> some_speeds((0.05, 0.12, 0.3, 0.7, 1.5), 1), some_speeds((0.05, 0.12, 0.3, 0.7, 1.5), 3)
+    >>> _some_speeds((0.05, 0.12, 0.3, 0.7, 1.5), 1), _some_speeds((0.05, 0.12, 0.3, 0.7, 1.5), 3)
     ((0.3,), (0.05, 0.3, 1.5))
     """
     ordered = sorted(set(speeds))
@@ -144,5 +144,5 @@ def some_speeds(speeds: Sequence[float], count: int) -> tuple[float, ...]:
 
 
 def _with_speeds(section: Section, count: int) -> Section:
-    speeds = some_speeds(section.speeds_rad_per_s, count)
+    speeds = _some_speeds(section.speeds_rad_per_s, count)
     return section.model_copy(update={"speeds_rad_per_s": speeds})

@@ -1,4 +1,4 @@
-"""The model of a case: that of its fits, that of a package of them, and their tables."""
+"""The model of a case: of its fits, of a package of them; its tables and what they cost."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Torque that a loop of one rate renders over hand strokes, against the continuous torque."""
+"""Strokes of a hand over a scene, and the torque that a loop of one rate renders over them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -69,7 +69,7 @@ def load_case(engine: Engine, seed: int = 0) -> Case:
     )
     if case.cut_fit is not None and not nothing_rendered(case):
         case = replace(case, held=held_law(case, case.cut_fit, case.friction_fit))
-    return with_photographs(case, engine)
+    return _with_photographs(case, engine)
 
 
 def wanted_knobs(case: Case, wanted: Sequence[str], *, on_cluster: bool = False) -> tuple[str, ...]:
@@ -153,7 +153,7 @@ def _virtual(recording: Recording) -> bool:
     return bool(int(recording.device.get("capabilities", 0)) & Capability.SIMULATOR)
 
 
-def with_photographs(case: Case, engine: Engine) -> Case:
+def _with_photographs(case: Case, engine: Engine) -> Case:
     """The case with the workspace's photographs of the blade and the plate, and its camera.
 
     Of the plate only the newest capture counts, as in its fit. A camera counts where its fit is

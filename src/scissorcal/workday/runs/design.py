@@ -103,7 +103,7 @@ def design_captures(workspace: Workspace, identity: "Identity | None" = None) ->
     listed = expected_band(known.plus(*information, new_recording=True))
     design = CaptureDesign(
         format=FORMAT,
-        inputs=inputs_of(engine),
+        inputs=_inputs_of(engine),
         tolerance=0.01 * recipe.scene.tolerance_percent,
         confidence=0.01 * recipe.scene.confidence_percent,
         rows=tuple(
@@ -170,10 +170,10 @@ def stored_design(engine: Engine) -> CaptureDesign | None:
             found = TypeAdapter(CaptureDesign).validate_json(read_foreign(path, STATE))
     except InputError:
         return None  # of another version, or damaged: 'plan --explain' designs it again
-    return found if found.inputs == inputs_of(engine) else None
+    return found if found.inputs == _inputs_of(engine) else None
 
 
-def inputs_of(engine: Engine) -> str:
+def _inputs_of(engine: Engine) -> str:
     """Identity of what a design is made from: the recipe, and the fits that are there."""
     fits = {what: engine.state(f"fit {what}").content for what in ("friction", "cut")}
     return digest({"format": FORMAT, "recipe": engine.recipe.model_dump(), "fits": fits})

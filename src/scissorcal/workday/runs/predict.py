@@ -55,7 +55,7 @@ def predict_workspace(
     settings = recipe.fit.friction
     tell(0.0, "prediction: reading recordings")
     own = used_recordings(workspace, recipe, "friction", engine.index)
-    given = read_motion(options.motion, own[0].joint, own[0].handle_radius_m)
+    given = _read_motion(options.motion, own[0].joint, own[0].handle_radius_m)
     tell(0.2, "prediction: calibrating the band on what the fit had not seen")
     design = friction_experiment(own, settings, fit)
     if options.what == "load":
@@ -74,7 +74,7 @@ def predict_workspace(
     return found, band, fit
 
 
-def read_motion(path: Path, joint: Joint, handle_radius_m: float) -> Recording:
+def _read_motion(path: Path, joint: Joint, handle_radius_m: float) -> Recording:
     """Read a recording, or a table of motion with units in its headings.
 
     Raises InputError where columns are missing, or the joint is of another kind than ``joint``.

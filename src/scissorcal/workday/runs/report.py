@@ -1,4 +1,4 @@
-"""Write a workspace's report from what its steps gave."""
+"""Write a workspace's report from what its steps gave, and compare two runs."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime

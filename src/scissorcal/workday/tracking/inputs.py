@@ -94,12 +94,12 @@ def track_facts(
         radius_m = link.identity.handle_radius
     if radius_m is None:
         return facts
-    contacts, known = tip_contacts(engine, recipe)
-    drive = rig_drive(engine, radius_m, link)
+    contacts, known = _tip_contacts(engine, recipe)
+    drive = _rig_drive(engine, radius_m, link)
     return replace(facts, drive=drive, contacts=contacts, friction_known=known)
 
 
-def tip_contacts(engine: Engine, recipe: Recipe) -> tuple[TipContacts, bool]:
+def _tip_contacts(engine: Engine, recipe: Recipe) -> tuple[TipContacts, bool]:
     """Contacts of the upper blade's tip, and whether friction of the opening was fitted."""
     edge = blade_edge(engine, recipe)
     tip = BladePoint.on_edge(edge, edge.length_m, recipe.rig.moving_blades)
@@ -109,7 +109,7 @@ def tip_contacts(engine: Engine, recipe: Recipe) -> tuple[TipContacts, bool]:
     return TipContacts(tip, replace(law, rest_rate=REST_RATE_RAD_PER_S)), True
 
 
-def rig_drive(engine: Engine, radius_m: float, link: Link | None = None) -> RigDrive:
+def _rig_drive(engine: Engine, radius_m: float, link: Link | None = None) -> RigDrive:
     """Zeros of the sensors are those that the last probe of this rig found."""
     probe = last_probe(engine.workspace, link)
     if probe is None:

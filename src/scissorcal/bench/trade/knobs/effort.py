@@ -1,4 +1,4 @@
-"""Effort of the fits: draft, standard, thorough."""
+"""Knobs of both fits: their effort (draft, standard, thorough) and the windows of friction."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping

@@ -60,7 +60,7 @@ class Photographs:
 
     def settings(self, case: Case) -> tuple[Setting, ...]:
         """Fewer photographs, then coarser ones; all at full width are the reference."""
-        return photo_settings(case.photographs)
+        return _photo_settings(case.photographs)
 
     def applied(self, case: Case, setting: Setting) -> Case:
         """The case with the first so many photographs; the width is that of the files."""
@@ -128,7 +128,7 @@ class Plate:
 
     def settings(self, case: Case) -> tuple[Setting, ...]:
         """Fewer photographs, then coarser ones; all at full width are the reference."""
-        return photo_settings((case.plate,)) if case.plate else ()
+        return _photo_settings((case.plate,)) if case.plate else ()
 
     def applied(self, case: Case, setting: Setting) -> Case:
         """The case with the first so many photographs; the width is that of the files."""
@@ -168,7 +168,7 @@ class Plate:
         }
 
 
-def photo_settings(photographed: Sequence[Photographed]) -> tuple[Setting, ...]:
+def _photo_settings(photographed: Sequence[Photographed]) -> tuple[Setting, ...]:
     """Numbers of photographs at full width, and widths of all of them; cheapest first."""
     count, (width, height) = count_of(photographed), size_of(photographed)
     coarser = [factor for factor in factors_of(width, height) if factor > 1]
