@@ -17,7 +17,8 @@ from scissorcal.bench.extremes.states import package_states
 from scissorcal.files import replacing
 from scissorcal.identity import VERSION
 from scissorcal.package import ModelPackage
-from scissorcal.report.extremes import extremes_page, extremes_panels
+from scissorcal.report.extremes import extremes_panels
+from scissorcal.report.html import panels_page
 from scissorcal.report.panel import Panel
 
 FORMAT = "scissorcal-extremes/2"
@@ -47,15 +48,21 @@ def run_extremes(
         "seed": seed,
         "states": len(states),
     }
-    said = (
-        f"{len(states)} states of the package {manifest.name} ({manifest.content_hash[:12]}), seed "
-        f"{seed}. Made {now:%Y-%m-%d %H:%M %Z} by scissorcal {VERSION}."
+    package_words = f"the package {manifest.name} ({manifest.content_hash[:12]})"
+    shown = {"tried": f"{len(states)} states of {package_words}, seed {seed}"}
+    page = panels_page(
+        "Numerical stability",
+        "The extremes",
+        panels,
+        made=(now, VERSION),
+        facts=shown,
+        findings=[panels[0].sentence],
     )
     plain = TypeAdapter(list[Panel]).dump_python(panels, mode="json", exclude_defaults=True)
     twin = json.dumps(facts | {"panels": plain}, ensure_ascii=False, allow_nan=False) + "\n"
     folder.mkdir(parents=True, exist_ok=True)
     html, twin_path = folder / "extremes.html", folder / "extremes.json"
-    for path, text in ((twin_path, twin), (html, extremes_page(panels, said))):
+    for path, text in ((twin_path, twin), (html, page)):
         with replacing(path) as part:
             part.write_text(text, encoding="utf-8")
     return panels, (html, twin_path)

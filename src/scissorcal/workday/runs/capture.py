@@ -1,9 +1,9 @@
 """Take a capture into a workspace: rig, recording, and what is kept when something goes wrong."""
 
 import shutil
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from scissorcal.calibration.design.state import fitted_cut
 from scissorcal.device.advance_trajectory import refuse_without_motor
@@ -43,8 +43,7 @@ THEN = (
 )
 
 
-@dataclass(frozen=True)
-class Captured:
+class Captured(NamedTuple):
     """A finished capture: its file, its report, and the rig it was taken from.
 
     ``until`` says how far a capture until the tolerance got.
@@ -182,7 +181,8 @@ def _capture_until(
         minutes = seconds_at_rig(recipe, planned(recipe, identity, kind)) / 60.0
     limits = Limits(minutes, options.at_least)
     if kind == "friction":
-        limits = replace(limits, slowest_sweep=sweep_bounds(recipe, identity, session.probe)[1])
+        slowest = sweep_bounds(recipe, identity, session.probe)[1]
+        limits = limits._replace(slowest_sweep=slowest)
     choice = UntilTolerance(kind, recipe, identity, earlier, limits)
     with open_writer(session, kind, path, by_parts=True) as writer:
 

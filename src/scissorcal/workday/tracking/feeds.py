@@ -5,7 +5,8 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,8 +118,7 @@ NO_PICTURE_S = 5.0
 """A camera that gives none for so long has stopped."""
 
 
-@dataclass(frozen=True, eq=False)
-class Feed:
+class Feed(NamedTuple):
     """A stream of events; ``base_ns`` is the computer's clock at 0 s of the pictures' times."""
 
     events: Iterator[Event]

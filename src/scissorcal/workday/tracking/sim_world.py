@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +47,7 @@ CUTTING_HAND = {**HAND, "strength_N": 6.0, "margin_mm": 1.0}
 _LEVEL_PLATE = TouchedPlate(place_mm=(20.0, 10.0, 0.0))
 
 
-@dataclass(frozen=True)
-class SimCamera:
+class SimCamera(NamedTuple):
     """A rendered camera: its rate, by how much more than camera_delay_ms a picture may come late,
     and every how many pictures one is black."""
 

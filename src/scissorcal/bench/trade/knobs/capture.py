@@ -2,8 +2,8 @@
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from scissorcal.recording.header import Stroke
 from scissorcal.recording.recording import UNLOADED_MARK, Recording
 
 
-@dataclass(frozen=True)
-class Movement:
+class Movement(NamedTuple):
     """A stroke with the opening that follows it: what a capture adds at a time.
 
     ``number`` counts the movements of one sheet, of one speed where no sheet is loaded.
