@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Self
 
 import typer
 
+from scissorcal.cli.fit_plate import pose_lines
 from scissorcal.cli.opening import open_workspace
 from scissorcal.cli.options import RIG, Folder, options_of, positive
 from scissorcal.cli.output import Answer, command
-from scissorcal.cli.pose_lines import pose_lines
 from scissorcal.cli.progress import time_words
 from scissorcal.cli.terminal import echo, printable
 from scissorcal.workday.options import TrackOptions
