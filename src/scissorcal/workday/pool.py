@@ -8,6 +8,7 @@ import json
 import logging
 import multiprocessing
 import os
+import pickle
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
@@ -22,7 +23,7 @@ from concurrent.futures import (
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
 
@@ -63,8 +64,8 @@ class Pool:
         """Do ``job`` for every item and call ``finished`` here with each result, as they come.
 
         ``kind`` is the type of a result, to which a cluster's answers are held.
-        Raises what a job raised, ScissorcalError where a worker died, and DeviceError where the
-        cluster did.
+        Raises what a job raised, InputError where a worker lacks a module, ScissorcalError where a
+        worker died, and DeviceError where the cluster did.
         """
         todo = iter(items)
         running: set[Future[Any]] = set()
@@ -84,6 +85,11 @@ class Pool:
                     with self._connected():
                         found = future.result()
                     finished(read_answer(found, kind) if self.remote else found)
+        except ModuleNotFoundError as error:
+            raise InputError(
+                f"The cluster's workers lack {error.name}: install this version of scissorcal "
+                "where they run."
+            ) from error
         except BrokenProcessPool as error:
             raise ScissorcalError(
                 "A worker process was killed, most likely for want of memory. What was done is "
@@ -125,6 +131,12 @@ def _why_cluster_failed(error: Exception) -> str:
             "failed. Start it again"
         )
     return ""
+
+
+@lru_cache(maxsize=2)
+def unpacked(blob: bytes) -> Any:
+    """What many jobs share, as `pickle` packed it: a worker unpacks it once."""
+    return pickle.loads(blob)
 
 
 @contextmanager

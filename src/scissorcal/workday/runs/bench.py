@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import lru_cache
 from typing import Any
 
 from scissorcal.aliases import Progress
@@ -46,7 +45,7 @@ from scissorcal.report.trade import trade_page
 from scissorcal.report.twin import twin_text
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import Processes, TradeOptions
-from scissorcal.workday.pool import Pool, open_pool
+from scissorcal.workday.pool import Pool, open_pool, unpacked
 from scissorcal.workday.records import Record, RecordFile
 from scissorcal.workday.runs.bench_case import (
     LOCAL_KNOBS,
@@ -368,18 +367,12 @@ class _Run:
             self._tell(share, f"{record['knob']}: {record['label']}")
 
         handed = pool if self._deadline is None else replace(pool, ahead=1)
-        try:
-            handed.work(_do, jobs, keep, dict[str, Any] | None)
-        except ModuleNotFoundError as error:
-            raise InputError(
-                f"The cluster's workers lack {error.name}: install this version of scissorcal "
-                "where they run."
-            ) from error
+        handed.work(_do, jobs, keep, dict[str, Any] | None)
 
 
 def _do(job: tuple[bytes, Task, float | None]) -> Record | None:
     blob, task, end = job
-    record = run_task(_unpacked(blob), task, end)
+    record = run_task(unpacked(blob), task, end)
     return record and {**record, "machine": machine()}
 
 
@@ -387,8 +380,3 @@ def _forced(record: Record, names: Sequence[str]) -> bool:
     """Whether a record is of one of the knobs named, or of the settings that they have now."""
     alike = key_of(record) == PRESENT_TASK.key and any(name in PRESENT_ALIKE for name in names)
     return not names or record["knob"] in names or alike
-
-
-@lru_cache(maxsize=2)
-def _unpacked(blob: bytes) -> Any:
-    return pickle.loads(blob)

@@ -4,7 +4,6 @@ import pickle
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +18,12 @@ from scissorcal.calibration.verify.check import StudySettings, assess, make_stud
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.calibration.verify.simulator import Simulator, cut_simulator, friction_simulator
 from scissorcal.calibration.verify.study import Study, Task, run
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import MissingError
 from scissorcal.identity import digest
 from scissorcal.recording import Recording
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import Processes, VerifySettings
-from scissorcal.workday.pool import Pool, open_pool
+from scissorcal.workday.pool import Pool, open_pool, unpacked
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.records import Record, RecordFile
 from scissorcal.workday.runs.cut import edge_of_photographs
@@ -171,24 +170,13 @@ def _run(
             f"{_duration(seconds)} left",
         )
 
-    try:
-        pool.work(_do, [(blob, task) for task in left], keep, dict[str, Any])
-    except ModuleNotFoundError as error:
-        raise InputError(
-            f"The cluster's workers lack {error.name}: install this version of scissorcal where "
-            "they run."
-        ) from error
+    pool.work(_do, [(blob, task) for task in left], keep, dict[str, Any])
     return finished
 
 
 def _do(job: tuple[bytes, Task]) -> Record:
     blob, task = job
-    return run(_unpacked(blob), task)
-
-
-@lru_cache(maxsize=2)
-def _unpacked(blob: bytes) -> Any:
-    return pickle.loads(blob)
+    return run(unpacked(blob), task)
 
 
 def _inputs_hash(engine: Engine, kind: FitKind, settings: VerifySettings) -> str:
