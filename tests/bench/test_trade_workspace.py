@@ -264,7 +264,7 @@ def test_what_changes_nothing_at_once_is_named_and_alone_not_measured(
     asked: list[Task] = []
     file = SimpleNamespace(records=[record(Task("effort", "standard"))])
 
-    def work(self: object, pool: object, schedule: Schedule, count: int) -> None:
+    def work(self: object, pool: object, schedule: Schedule) -> None:
         asked.extend(schedule.left)
         file.records += [record(task) for task in schedule.left]
 

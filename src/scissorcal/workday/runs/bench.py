@@ -161,17 +161,8 @@ class _Run:
         """
         together = Together(())
         present = together.settings(self._case)[0]
-        tasks = tasks_of(self._case, names)
-        known = {key_of(record) for record in self._known()}
-        left = [task for task in tasks if task.key not in known]
-        expected = {}
-        for task in tasks:
-            knob = knob_of(task)
-            setting = setting_of(knob, self._case, task.label)
-            expected[task] = knob.expected_s(self._case, setting)
-        schedule = Schedule(left, expected, self._deadline)
-        for record in self._known():
-            schedule.learn(record)
+        schedule = self._schedule(tasks_of(self._case, names), self._known())
+        planned = len(schedule.left)
 
         def reserve() -> float:
             # without the present fits there is nothing to compare all settings at once with
@@ -190,8 +181,8 @@ class _Run:
 
         order()
         before = self.made
-        self._work(pool, schedule, len(left), order)
-        if not self._file.records and self._budget_s is not None and left and not keep_time:
+        self._work(pool, schedule, order)
+        if not self._file.records and self._budget_s is not None and planned and not keep_time:
             fixed = self._budget_s - (self._deadline or 0.0) + self._began
             least = max(fixed + 2.0 * schedule.least_s(), 3.0 * self._budget_s)
             raise InputError(
@@ -218,16 +209,24 @@ class _Run:
         """Measure simulated captures that have no record yet; whether any was."""
         known = {key_of(record) for record in self._records}
         left = [task for task in tasks if task.key not in known]
+        before = self.made
+        self._work(pool, self._schedule(left, (), share=1.0))
+        return self.made > before
+
+    def _schedule(
+        self, tasks: Sequence[Task], records: Sequence[Record], **limits: Any
+    ) -> Schedule:
+        """The tasks that none of the records is of, with what all known records tell of times."""
+        known = {key_of(record) for record in records}
         expected = {}
-        for task in left:
+        for task in tasks:
             knob = knob_of(task)
             expected[task] = knob.expected_s(self._case, setting_of(knob, self._case, task.label))
-        schedule = Schedule(left, expected, self._deadline, share=1.0)
+        left = [task for task in tasks if task.key not in known]
+        schedule = Schedule(left, expected, self._deadline, **limits)
         for record in self._known():
             schedule.learn(record)
-        before = self.made
-        self._work(pool, schedule, len(left))
-        return self.made > before
+        return schedule
 
     def curves(self, names: Sequence[str]) -> tuple[Curve, ...]:
         """The curves of the knobs named, from all records; of those left out, why."""
@@ -262,23 +261,12 @@ class _Run:
             if not make_knob(name).combined
         ]
         tasks = [PRESENT_TASK, Task(TOGETHER, RECOMMENDED, choices=changed)]
-        known = {key_of(record) for record in self._known()}
-        left = [task for task in tasks if task.key not in known]
-        knob = Together(changed)
-        expected = {
-            task: knob.expected_s(self._case, setting)
-            for task in tasks
-            for setting in knob.settings(self._case)
-            if setting.label == task.label
-        }
         # nothing else waits for the time that is left, so it is used even where it may not do
-        schedule = Schedule(left, expected, self._deadline, share=STRETCH, stretch=STRETCH)
-        for record in self._known():
-            schedule.learn(record)
-        self._work(pool, schedule, len(left))
+        schedule = self._schedule(tasks, self._known(), share=STRETCH, stretch=STRETCH)
+        self._work(pool, schedule)
         keys = {task.key for task in tasks}
         own = [record for record in self._of(TOGETHER) if key_of(record) in keys]
-        curve = measured_curve(self._case, knob, own, reference)
+        curve = measured_curve(self._case, Together(changed), own, reference)
         sentences = (together_sentence(curve, apart),)
         return replace(curve, against=against, sentences=sentences) if own else None
 
@@ -337,7 +325,6 @@ class _Run:
         self,
         pool: Pool,
         schedule: Schedule,
-        count: int,
         learned: Callable[[], None] = lambda: None,
     ) -> None:
         """Make measurements, keep each, and call ``learned`` after it.
@@ -348,7 +335,7 @@ class _Run:
             (self._blob, task, self._deadline and self._deadline - schedule.reserve())
             for task in schedule
         )
-        done = 0
+        done, count = 0, len(schedule.left)
 
         def keep(record: Record | None) -> None:
             nonlocal done
