@@ -160,6 +160,7 @@ RIG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RIG)
 def test_a_command_with_a_rig_works_or_gives_one_sentence(bare: Path, name: str) -> None:
     done = without(bare, "-m", "scissorcal", *RIG[name], cwd="work")

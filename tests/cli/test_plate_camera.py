@@ -135,6 +135,7 @@ def test_without_the_rigs_frame_it_says_what_to_photograph(
     assert recordings(workspace) == []
 
 
+@pytest.mark.slow
 def test_a_rendering_is_tracked_and_keeps_the_rows_of_a_track(
     cli: Cli, calibrated: Path, packages: dict[str, Path]
 ) -> None:

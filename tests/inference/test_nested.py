@@ -50,6 +50,7 @@ def test_moments_of_a_bent_ridge_are_exact() -> None:
     assert off.std() == pytest.approx(NARROW, rel=0.07)
 
 
+@pytest.mark.slow
 def test_it_takes_fewer_evaluations_than_a_mixture_that_adapts() -> None:
     plain = infer(ridge(), "standard", np.random.default_rng(1))
     followed = infer(replace(ridge(), curved=(1,)), "standard", np.random.default_rng(1))

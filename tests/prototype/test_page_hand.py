@@ -104,6 +104,7 @@ def drag(opened: Open, share: float) -> None:
     mouse.up()
 
 
+@pytest.mark.slow
 def test_blades_lag_behind_the_pointer_by_the_force(opened: Open) -> None:
     lag = "() => scissorcal.rig.pose.opening - scissorcal.rig.wanted.opening"
     drag(opened, 0.4)
@@ -117,6 +118,7 @@ def test_blades_lag_behind_the_pointer_by_the_force(opened: Open) -> None:
     assert abs(opened.run(lag)) < 0.003
 
 
+@pytest.mark.slow
 def test_what_if_stands_beside_as_fitted_and_is_felt_after_a_swap(opened: Open) -> None:
     opened.set_slider("fracture_energy", 400)
     drag(opened, 0.45)

@@ -6,6 +6,8 @@ import pytest
 
 from tests.prototype.test_page_hand import Open, file, opened, package, scene
 
+pytestmark = pytest.mark.slow
+
 __all__ = ["file", "opened", "package", "scene"]
 
 MINUTE = """() => {

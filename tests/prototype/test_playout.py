@@ -54,6 +54,7 @@ def test_a_rig_that_stands_still_and_goes_on_is_shown_at_once() -> None:
     assert len(playout.take(9.0 + LAG_s)) == 0.1 * MOST_A_s
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 2.0)), max_size=6))
 def test_no_sample_is_given_twice_or_in_disorder_and_all_are_counted(
     bursts: list[tuple[float, float]],

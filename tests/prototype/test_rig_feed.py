@@ -150,6 +150,7 @@ def another(tmp_path: Path) -> "subprocess.Popen[str]":
     return process
 
 
+@pytest.mark.slow
 def test_a_recording_of_another_process_is_followed_through_its_new_name(
     tmp_path: Path, clock: Clock, feed: RigFeed
 ) -> None:

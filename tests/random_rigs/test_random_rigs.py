@@ -78,6 +78,7 @@ LOOSE = RigParameters(coulomb_opening=2e-3, coulomb_closing=2e-3, gravity=-0.012
 """Blades that fall to their closed stop."""
 
 
+@pytest.mark.slow
 def test_blades_that_fall_are_probed_off_their_stop() -> None:
     trial = trial_of(LOOSE)
     assert trial.outcome == "right"
@@ -99,6 +100,7 @@ CREEPING, BOUNCING = 61_001, 61_026
 -38 %. Blades that stand on a stop after a rebound: one of several modes claimed -73 %."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [CREEPING, pytest.param(BOUNCING, marks=pytest.mark.slow)])
 def test_inertia_far_off_has_no_narrow_interval(seed: int) -> None:
     trial = trial_of(healthy(seed))

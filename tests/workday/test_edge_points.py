@@ -32,6 +32,8 @@ from tests.device.sim.build import specimen
 from tests.workday.faults import run
 from tests.workday.made import RECIPE
 
+pytestmark = pytest.mark.slow
+
 SEED = 5
 CAPTURE = """
 [capture.friction]

@@ -18,6 +18,8 @@ from scissorcal.workday.runs.fit import available, fit_workspace, load_result
 from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.workspace import Workspace, create_workspace
 
+pytestmark = pytest.mark.slow
+
 NAME = "friction-advance"
 STEPS = [f"{verb} {NAME}" for verb in ("capture", "fit", "verify")]
 SHORT = """

@@ -258,6 +258,7 @@ def test_terms_that_cannot_be_adopted_are_refused(recording, settings, says):
         fit_friction((recording,), wanted, effort="draft", rng=np.random.default_rng(5))
 
 
+@pytest.mark.slow
 def test_presliding_is_recovered_from_turns():
     """Swings of several sizes, friction by Dahl's law in small steps; 4 sd, false alarm 1e-4."""
     rng = np.random.default_rng(23)

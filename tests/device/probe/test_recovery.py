@@ -70,6 +70,7 @@ def test_inertia_friction_and_delay_are_recovered(
     assert result.facts["largest_rate_rad_per_s"] < RECIPE.rig.probe.largest_rate_rad_per_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "rigs"), [(8, 1), pytest.param(5, 3, marks=pytest.mark.slow)], ids=["one", "three"]
 )

@@ -32,6 +32,8 @@ from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.tracking.stated_pose import stated_pose
 from scissorcal.workday.workspace import Workspace, create_workspace
 
+pytestmark = pytest.mark.slow
+
 LONG = """speeds_rad_per_s = [0.05, 0.12, 0.3, 0.7, 1.5]
 repeats = 2
 excitation_s = 10.0

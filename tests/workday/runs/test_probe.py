@@ -53,6 +53,7 @@ def test_the_first_run_probes_and_the_next_ones_do_not(workspace: Workspace) -> 
     ]
 
 
+@pytest.mark.slow
 def test_an_old_probe_another_rig_and_another_sign_do_not_count(workspace: Workspace) -> None:
     recipe = workspace.recipe()
     first = ensure_probed(workspace, RigSession(virtual_rig(), recipe)).probe
@@ -74,6 +75,7 @@ def test_an_old_probe_another_rig_and_another_sign_do_not_count(workspace: Works
     assert "let go of the handles and keep clear" in person.heard[-1]
 
 
+@pytest.mark.slow
 def test_a_refused_rig_is_probed_again(workspace: Workspace) -> None:
     recipe = workspace.recipe()
     said: list[str] = []
