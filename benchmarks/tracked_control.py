@@ -22,11 +22,11 @@ from scissorcal.control.surface_path import map_contour
 from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import Specimen
 from scissorcal.kernel import ControlFlag
-from scissorcal.model.mechanism import AxisLaw
+from scissorcal.model.friction import AxisLaw
 from scissorcal.model.surface import Plane
 from scissorcal.recipe.schema import Recipe
-from scissorcal.tracking.contacts import TipContacts
 from scissorcal.tracking.plate_pose import PlatePose, level_plate
+from scissorcal.tracking.rows import TipContacts
 from scissorcal.tracking.tracker import Outcome
 from scissorcal.vision.sim.sim_camera import SIM_LENS
 from scissorcal.workday.tracking.feeds import idle_rig

@@ -32,8 +32,7 @@ from scissorcal.calibration import FitResult
 from scissorcal.calibration.cut.fit import fit_cut
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.result import Effort
-from scissorcal.device.capture import open_writer
-from scissorcal.device.capture_by_parts import capture_by_parts
+from scissorcal.device.capture import capture_by_parts, open_writer
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.probe import probe

@@ -29,7 +29,6 @@ ROOMS = (
     "scissorcal.recording",
     "scissorcal.model",
     "scissorcal.model.surface",
-    "scissorcal.model.mechanism",
     "scissorcal.inference",
     "scissorcal.calibration",
     "scissorcal.package",

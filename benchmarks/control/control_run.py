@@ -38,7 +38,7 @@ from scissorcal.aliases import Array
 from scissorcal.control.contact_loop import ContactLoop
 from scissorcal.control.gains import FORCE_KP, HybridGains, choose_gains, friction_rates
 from scissorcal.kernel.hybrid import Hybrid, HybridConfig, NormalLaw, hybrid_inputs
-from scissorcal.tracking.rotation import cross
+from scissorcal.tracking.plate_pose import cross
 from scissorcal.tracking.tracker import PoseEstimate, PoseTracker
 
 POSES = ("vision", "contact", "true")

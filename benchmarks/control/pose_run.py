@@ -17,7 +17,7 @@ from benchmarks.control.world import (
 )
 
 from scissorcal.model.surface import Surface
-from scissorcal.tracking.rotation import pose_error
+from scissorcal.tracking.plate_pose import pose_error
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import (
     CameraErrors,

@@ -76,9 +76,15 @@ def open_fit(path: Path | str) -> "FitResult | CameraFit | BladeResult | PlateFi
     Traceback (most recent call last):
     scissorcal.errors.MissingError: There is no file fits/cut.nc. Make it with 'scissorcal fit'.
     """
-    from scissorcal.calibration.store import load_any_fit
+    from scissorcal.calibration.camera.result import CameraFit
+    from scissorcal.calibration.edge.result import BladeResult
+    from scissorcal.calibration.plate.result import PlateFit
+    from scissorcal.calibration.result import FitResult
+    from scissorcal.calibration.store import load, read_header
 
-    return load_any_fit(_existing(path, "Make it with 'scissorcal fit'."))
+    file = _existing(path, "Make it with 'scissorcal fit'.")
+    kinds = {"camera": CameraFit, "blade": BladeResult, "plate": PlateFit}
+    return load(file, kinds.get(read_header(file).what, FitResult))
 
 
 def open_package(path: Path | str) -> "ModelPackage":

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from scissorcal.control.contours import contour_at, foot_of, on_plate
+from scissorcal.control.surface_path import contour_at, foot_of, on_plate
 from scissorcal.model import Cylinder, HeightField, Plane, Sphere
 from scissorcal.tracking import PlatePose, fixed_pose, level_plate
 

@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from scissorcal.control.contours import foot_of
 from scissorcal.control.mechanics import FASTEST_rad_per_s, axis_friction
 from scissorcal.control.settings import Material, Settings, control_settings
-from scissorcal.control.surface_path import map_contour, time_path
+from scissorcal.control.surface_path import foot_of, map_contour, time_path
 from scissorcal.device import LockstepLink
 from scissorcal.errors import InputError
 from scissorcal.kernel import fill_struct

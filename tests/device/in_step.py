@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device import capture, heartbeat, link, port_motion, servo_process
-from scissorcal.device.sim.faults import Faults
+from scissorcal.device import capture, link, port_motion, servo_process
 from scissorcal.device.sim.protocol import RigProtocol
 from scissorcal.device.sim.rig import VirtualRig
+from scissorcal.device.sim.sensors import Faults
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.kernel import Command, Config, ConfigKey, FrameDecoder, LoopBlock, decode
 from scissorcal.render import engine
@@ -116,7 +116,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
         (link, ("HELLO_WAIT_S", "CONFIGURE_WAIT_S")),
         (servo_process, ("START_TIMEOUT_S", "STREAM_TIMEOUT_S", "STOP_TIMEOUT_S")),
         (port_motion, ("IDLE_TIMEOUT_S", "FIRST_POSITION_TIMEOUT_S")),
-        (heartbeat, ("PATIENCE_S",)),
+        (servo_process, ("PATIENCE_S",)),
         (capture, ("SUPERVISOR_S",)),
         (engine, ("SUPERVISOR_S",)),
     ):

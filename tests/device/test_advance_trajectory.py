@@ -5,7 +5,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from scissorcal.device.advance_trajectory import (
+from scissorcal.device.capture import planned
+from scissorcal.device.trajectory import (
     ADVANCE_MARGIN_M,
     FORCE_SHARE,
     HEAVIEST_KG,
@@ -13,10 +14,9 @@ from scissorcal.device.advance_trajectory import (
     LEAST_TRAVEL_M,
     advance_plan,
     largest_acceleration,
+    opening_range,
     refuse_without_motor,
 )
-from scissorcal.device.capture import planned
-from scissorcal.device.trajectory import opening_range
 from scissorcal.errors import InputError
 from scissorcal.recipe import builtin_recipe
 from tests.device.conftest import IDENTITY

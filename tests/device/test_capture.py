@@ -15,12 +15,11 @@ from scissorcal.device.capture import (
 )
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
+from scissorcal.device.port_motion import open_motion
 from scissorcal.device.recorder import Recorder
-from scissorcal.device.rig_record import identity_facts
-from scissorcal.device.session import Operator, RigSession
-from scissorcal.device.sim.faults import Faults
+from scissorcal.device.session import Operator, RigSession, identity_facts
+from scissorcal.device.sim.sensors import Faults
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import (

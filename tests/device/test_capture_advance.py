@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.advance_trajectory import advance_plan
 from scissorcal.device.capture import CaptureReport, capture, open_writer
 from scissorcal.device.completeness import completeness
 from scissorcal.device.counting import count_recorded, count_used
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.session import RigSession
 from scissorcal.device.sim.specimen import Specimen, load_specimen
+from scissorcal.device.trajectory import advance_plan
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import Capability
 from scissorcal.recipe import Recipe

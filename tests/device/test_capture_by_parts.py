@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device.capture import open_writer
-from scissorcal.device.capture_by_parts import CHOOSING_S, capture_by_parts
+from scissorcal.device.capture import CHOOSING_S, capture_by_parts, open_writer
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.drive import IDLE_S
 from scissorcal.device.link import open_link
@@ -174,7 +173,7 @@ def test_samples_are_recorded_while_the_choice_goes_on_in_its_own_thread(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As on a port: a link that is not known to be in virtual time."""
-    monkeypatch.setattr("scissorcal.device.capture_by_parts.Exchanging", type("Never", (), {}))
+    monkeypatch.setattr("scissorcal.device.capture.Exchanging", type("Never", (), {}))
     link = LockstepLink("office-paper", np.random.default_rng(3))
     parts = strokes_of((0.8, 0, 0))
     threads = set()

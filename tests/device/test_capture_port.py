@@ -16,9 +16,8 @@ import pytest
 from scissorcal.device.capture import capture, open_writer, servo_config
 from scissorcal.device.coverage import coverage_of
 from scissorcal.device.link import open_link
-from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
-from scissorcal.device.port_motion import PortMotion
+from scissorcal.device.port_motion import PortMotion, open_motion
 from scissorcal.device.recorder import Recorder
 from scissorcal.device.session import RigSession
 from scissorcal.device.sim.process import SimProcess

@@ -26,9 +26,9 @@ from scissorcal.device.control import (
     open_loop,
     sag,
 )
-from scissorcal.device.open_motion import open_motion
+from scissorcal.device.control_design import StribeckFall
 from scissorcal.device.paths import PathBuilder
-from scissorcal.device.slow_sliding import StribeckFall
+from scissorcal.device.port_motion import open_motion
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Identity
 from scissorcal.recipe import builtin_recipe

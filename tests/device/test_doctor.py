@@ -9,13 +9,20 @@ import numpy as np
 import pytest
 
 from scissorcal.device import doctor as room
-from scissorcal.device.diagnosis import Measurements, brake_after_ms, diagnose
-from scissorcal.device.doctor import Examination, adapter_timer_ms, clock_drift, examine
+from scissorcal.device.doctor import (
+    Examination,
+    Measurements,
+    adapter_timer_ms,
+    brake_after_ms,
+    clock_drift,
+    diagnose,
+    examine,
+)
 from scissorcal.device.link import open_link
 from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.sim.faults import Faults
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.device.sim.rig import TICK_S
+from scissorcal.device.sim.sensors import Faults
 from scissorcal.device.timing import Percentiles
 from scissorcal.kernel import Hello, State, decode, encode
 from scissorcal.verdicts import failed

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from scissorcal.device.heartbeat import BEAT_S, PATIENCE_S, Heartbeat
+from scissorcal.device.servo_process import BEAT_S, PATIENCE_S, Heartbeat
 from tests.guard import GUARD_S
 
 

@@ -12,11 +12,10 @@ import pytest
 
 from scissorcal.device.capture import capture, open_writer, servo_config
 from scissorcal.device.link import open_link
-from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder
-from scissorcal.device.port_motion import PortMotion
+from scissorcal.device.port_motion import PortMotion, open_motion
 from scissorcal.device.session import RigSession
-from scissorcal.device.sim.faults import Faults
+from scissorcal.device.sim.sensors import Faults
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import ConfigKey, Mode, StateFlag, StopReason
 from scissorcal.recording import read_recording

@@ -9,8 +9,7 @@ import pytest
 from scissorcal.device.link import open_link
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.motion import LoopTask, Motion, Samples
-from scissorcal.device.open_motion import open_motion
-from scissorcal.device.port_motion import PortMotion
+from scissorcal.device.port_motion import PortMotion, open_motion
 from scissorcal.device.sim.process import SimProcess
 from scissorcal.kernel import (
     ConfigKey,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.device.rig_record import identity_facts, identity_of
+from scissorcal.device.session import identity_facts, identity_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
 from tests.bench.trade.cases import IDENTITY

@@ -11,10 +11,10 @@ from scissorcal.calibration import steadiness
 from scissorcal.device.capture import capture, open_writer
 from scissorcal.device.capture_gains import Probed, capture_gains
 from scissorcal.device.control import Axis, Gains, greatest_fall
+from scissorcal.device.control_design import StribeckFall
 from scissorcal.device.lockstep import LockstepLink
 from scissorcal.device.probe.probe import probe
 from scissorcal.device.session import RigSession
-from scissorcal.device.slow_sliding import StribeckFall
 from scissorcal.recipe import Recipe
 from scissorcal.recording import Recording, read_recording
 from scissorcal.workday import with_usable_sweeps

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.device.crossing import Blade
-from scissorcal.device.cut_trajectory import cut_plan, hand_requests
+from scissorcal.device.cut_trajectory import Blade, cut_plan, hand_requests
 from scissorcal.device.paths import PathBuilder, SwingLimits, glide, multisine
 from scissorcal.device.trajectory import (
     Plan,

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.device.unanswered import MOST_ENERGY_J, refuse_unanswered
+from scissorcal.device.session import MOST_ENERGY_J, refuse_unanswered
 from scissorcal.errors import DeviceError
 from scissorcal.recipe import Recipe, builtin_recipe
 from scissorcal.recording import Estimate

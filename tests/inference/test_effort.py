@@ -164,9 +164,11 @@ def test_two_hills_both_get_their_share(effort: str) -> None:
     """Share 0.7: 5000 independent draws know it to 0.007, jumps between hills make that 0.03."""
     problem = problem_of(two_hills, [[3.0, 2.0], [-3.0, -5.0]])
     found = infer(problem, effort, np.random.default_rng(0), count=4000)
-    assert [cluster.starts for cluster in found.optima] == [1, 1]
-    assert found.optima[0].point == pytest.approx([4.0, 4.0], abs=0.01)
-    assert found.optima[1].value - found.optima[0].value == pytest.approx(np.log(3 / 7), abs=0.01)
+    assert [cluster.starts for cluster in found.optimum.optima] == [1, 1]
+    assert found.optimum.optima[0].point == pytest.approx([4.0, 4.0], abs=0.01)
+    assert found.optimum.optima[1].value - found.optimum.optima[0].value == pytest.approx(
+        np.log(3 / 7), abs=0.01
+    )
     assert "1 other" in found.optimum.sentence
     assert found.status.trusted
     assert np.mean(found.draws[:, 0] > 0) == pytest.approx(0.7, abs=0.06)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from scissorcal.kernel import ModelTables
-from scissorcal.kernel.pieces import Piece, Strip
+from scissorcal.kernel.plate import Piece, Strip
 from tests.kernel.golden import FOLDER, model_of, single
 from tests.kernel.reference_pieces import PIECES_COLUMNS, ReferencePieces
 from tests.kernel.zoo import arc_edge, make_tables, power_response

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scissorcal.kernel import ModelTables
-from scissorcal.kernel.pieces import Piece
+from scissorcal.kernel.plate import Piece
 from tests.kernel.reference_model import Place, Reference
 
 PIECES_COLUMNS = ("torque", "force", "stored_J", "fracture_J", "arrest_J")

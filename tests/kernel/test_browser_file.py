@@ -8,8 +8,8 @@ from types import ModuleType
 import pytest
 
 from scissorcal.errors import MissingError
-from scissorcal.kernel import browser_file as module
-from scissorcal.kernel.browser_file import BUILDER, COMPILERS, browser_file
+from scissorcal.kernel import web_module as module
+from scissorcal.kernel.web_module import BUILDER, COMPILERS, browser_file
 
 MAKES = """
 from pathlib import Path

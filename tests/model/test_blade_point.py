@@ -13,7 +13,6 @@ from scissorcal.model.edge import Edge, edge_height
 STEP = 1e-30
 ANGLES = st.floats(-math.pi, math.pi)
 LENGTHS = st.floats(-1e3, 1e3)
-RATES = st.floats(-1e3, 1e3)
 
 
 @given(LENGTHS, LENGTHS, st.sampled_from([1, 2]), ANGLES, LENGTHS)
@@ -26,18 +25,6 @@ def test_the_jacobian_is_the_derivative_of_the_place(station, offset, moving, op
     scale = 1.0 + abs(station) + abs(offset)
     jacobian = point.jacobian([opening, advance])
     np.testing.assert_allclose(jacobian, np.stack(columns, axis=1), rtol=0, atol=1e-14 * scale)
-
-
-@given(LENGTHS, LENGTHS, st.sampled_from([1, 2]), ANGLES, LENGTHS, RATES, RATES)
-def test_the_bias_is_the_jacobians_rate_times_the_axes_rates(
-    station, offset, moving, opening, advance, omega, speed
-):
-    point = BladePoint(station, offset, moving)
-    q, rates = np.array([opening, advance]), np.array([omega, speed])
-    rate_of_jacobian = np.imag(point.jacobian(q + 1j * STEP * rates)) / STEP
-    scale = (1.0 + abs(station) + abs(offset)) * (1.0 + omega**2)
-    found = point.acceleration_bias(q, rates)
-    np.testing.assert_allclose(found, rate_of_jacobian @ rates, rtol=0, atol=1e-13 * scale)
 
 
 @pytest.mark.parametrize("moving", [1, 2])
@@ -53,15 +40,10 @@ def test_a_point_of_the_edge_lies_at_the_edges_height(moving):
 def test_arrays_give_what_each_place_gives():
     point = BladePoint(0.07, -0.008, 2)
     q = np.random.default_rng(1).normal(size=(5, 3, 2))
-    rates = np.random.default_rng(2).normal(size=(5, 3, 2))
     assert point.jacobian(q).shape == (5, 3, 3, 2)
     for index in np.ndindex(5, 3):
         np.testing.assert_array_equal(point.place(q)[index], point.place(q[index]))
         np.testing.assert_array_equal(point.jacobian(q)[index], point.jacobian(q[index]))
-        bias = point.acceleration_bias(q[index], rates[index])
-        np.testing.assert_array_equal(point.acceleration_bias(q, rates)[index], bias)
-        velocity = point.jacobian(q[index]) @ rates[index]
-        np.testing.assert_allclose(point.velocity(q, rates)[index], velocity, atol=1e-15)
 
 
 @pytest.mark.parametrize("bad", [{"moving_blades": 3}, {"offset_m": math.nan}])

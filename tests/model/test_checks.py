@@ -10,7 +10,7 @@ import pytest
 from scissorcal.errors import InputError, ModelError
 from scissorcal.model import Cutting, Edge, EdgeDistribution, FrictionLaw, Response
 from scissorcal.model.blade_point import BladePoint
-from scissorcal.model.mechanism import AxisLaw
+from scissorcal.model.friction import AxisLaw
 from scissorcal.model.surface import Cylinder, HeightField, Sphere
 
 RESPONSE = Response("power", 2.0, 1.5, 3e-4)

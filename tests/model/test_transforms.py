@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.model.transforms import IDENTITY, LOG, LOGIT
+from scissorcal.model.terms import IDENTITY, LOG, LOGIT
 
 EVERY = pytest.mark.parametrize("transform", [IDENTITY, LOG, LOGIT], ids=attrgetter("name"))
 

@@ -18,13 +18,13 @@ from scissorcal.render.admission_rule import (
     allowed_stiffness,
     delayed_stiffness,
 )
-from scissorcal.render.cures import stated_cures
 from scissorcal.render.derating import needs_of, softened
-from scissorcal.render.felt_cost import FeltTorque, felt_change, felt_rates
-from scissorcal.render.felt_cures import Asked
+from scissorcal.render.felt_cost import FeltTorque, felt_rates
+from scissorcal.render.felt_cures import Asked, stated_cures
 from scissorcal.render.result import _admitted
 from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts, with_probe
 from tests.kernel.zoo import make_tables
+from tests.render.felt import felt_change
 from tests.render.test_engine import rig
 
 RIG = LoopFacts(

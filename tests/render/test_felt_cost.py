@@ -11,10 +11,11 @@ from scissorcal.errors import InputError
 from scissorcal.kernel import ModelTables, Piece, PiecesModel, Strip
 from scissorcal.render.admission import admit, rendered_tables
 from scissorcal.render.derating import softened
-from scissorcal.render.felt_cost import FeltTorque, felt_change, felt_rates, plate_strokes
+from scissorcal.render.felt_cost import FeltTorque, felt_rates, plate_strokes
 from scissorcal.render.result import felt_verdict
 from scissorcal.verdicts import TORQUE
 from tests.kernel.zoo import make_tables
+from tests.render.felt import felt_change
 from tests.render.test_admission import ASKED, LIMIT, RIG
 
 FACE, ENERGY = 5e-5, 0.6

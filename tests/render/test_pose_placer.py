@@ -24,8 +24,7 @@ from scissorcal.render.pose_placer import (
     plate_config,
     pose_placer,
 )
-from scissorcal.render.pose_section import pose_section
-from scissorcal.render.pose_torque import PoseTorque
+from scissorcal.render.pose_section import PoseTorque, pose_section
 from scissorcal.tracking import PlatePose
 from tests.kernel.zoo import make_tables
 from tests.render.plate_motion import FLAT, turned

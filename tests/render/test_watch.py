@@ -7,7 +7,7 @@ from scissorcal.device import Samples
 from scissorcal.kernel import SAMPLE_DTYPE, SampleFlag, StateFlag
 from scissorcal.recording import label_strokes
 from scissorcal.render import latency_of
-from scissorcal.render.watch import Watch
+from scissorcal.render.result import Watch
 
 
 def motion(seconds: float, rate_Hz: float = 1000.0, stroke_s: float = 2.0) -> Samples:

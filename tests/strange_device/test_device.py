@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scissorcal.device import Reference
-from scissorcal.device.open_motion import open_motion
+from scissorcal.device.port_motion import open_motion
 from scissorcal.kernel import ServoConfig, StopReason
 
 from . import FAULTS, StrangeDevice, VirtualPort, wire

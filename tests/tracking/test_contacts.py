@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from scissorcal.model import AxisLaw, BladePoint, FrictionLaw, Plane
-from scissorcal.tracking.contacts import EVERY_S, TipContact, TipContacts
-from scissorcal.tracking.rows import CameraPose
+from scissorcal.tracking.rows import EVERY_S, CameraPose, TipContact, TipContacts
 from scissorcal.tracking.tracker import Outcome, PoseTracker
 
 TIP = BladePoint(station_m=0.075, offset_m=-0.005, moving_blades=2)

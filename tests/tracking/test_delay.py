@@ -7,9 +7,8 @@ from benchmarks.control.world import Scenario, circle, make_world, plane
 from scipy.stats import chi2
 
 from scissorcal.model import Plane
-from scissorcal.tracking.contacts import TipContact
-from scissorcal.tracking.delay import DelayFit, _last, measure_delay
-from scissorcal.tracking.rows import CameraPose
+from scissorcal.tracking.judge import DelayFit, _last, measure_delay
+from scissorcal.tracking.rows import CameraPose, TipContact
 
 
 def measured(scenario: Scenario, seed: int, late_s: float) -> DelayFit:

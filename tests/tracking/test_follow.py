@@ -14,10 +14,9 @@ from scipy.spatial.transform import Rotation
 from scissorcal.aliases import Array
 from scissorcal.errors import DeviceError
 from scissorcal.model import Plane
-from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PoseFollower
-from scissorcal.tracking.rotation import pose_error
-from scissorcal.tracking.rows import CameraPose
+from scissorcal.tracking.plate_pose import pose_error
+from scissorcal.tracking.rows import CameraPose, TipContact
 from scissorcal.tracking.tracker import Outcome
 
 SHORTEST_S = 0.06

@@ -9,10 +9,9 @@ from benchmarks.control.pose_run import settings_for
 from benchmarks.control.world import Scenario
 
 from scissorcal.model import Plane
-from scissorcal.tracking.contacts import TipContact
 from scissorcal.tracking.follow import PoseFollower
 from scissorcal.tracking.judge import RowCounts, TrackFigures, track_figures, track_verdicts
-from scissorcal.tracking.rows import CameraPose
+from scissorcal.tracking.rows import CameraPose, TipContact
 
 COUNTS = RowCounts(used=100, refused=2, late=0, waiting=0, mean_nis=6.1, freedom=6)
 NONE = RowCounts(used=0, refused=0, late=0, waiting=0, mean_nis=math.nan, freedom=1)

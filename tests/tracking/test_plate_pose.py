@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from scissorcal.tracking.plate_pose import PLAY_SDS, PlatePose, SteadyPose
-from scissorcal.tracking.rotation import rotation_of, rotation_vector
+from scissorcal.tracking.plate_pose import (
+    PLAY_SDS,
+    PlatePose,
+    SteadyPose,
+    rotation_of,
+    rotation_vector,
+)
 
 NOISE = np.diag([1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]) ** 2
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from scissorcal.tracking.rotation import (
+from scissorcal.tracking.plate_pose import (
     cross,
     cross_matrix,
     nearest_rotation,

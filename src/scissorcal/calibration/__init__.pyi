@@ -8,15 +8,15 @@ from .caveats import NEXT_RECORDING as NEXT_RECORDING
 from .caveats import ON_RECORD as ON_RECORD
 from .checks import HOLD_OUT as HOLD_OUT
 from .checks import K_HAT as K_HAT
-from .cut import CutExperiment as CutExperiment
-from .cut import cut_experiment as cut_experiment
-from .cut import cutting_from as cutting_from
-from .cut import fit_cut as fit_cut
 from .cut.curves import EdgePlace as EdgePlace
 from .cut.curves import force_along_edge as force_along_edge
 from .cut.curves import fracture_work as fracture_work
 from .cut.curves import response_curve as response_curve
-from .cut.laws import allowed_laws as allowed_laws
+from .cut.fit import cut_experiment as cut_experiment
+from .cut.fit import fit_cut as fit_cut
+from .cut.model import CutExperiment as CutExperiment
+from .cut.structure import allowed_laws as allowed_laws
+from .cut.structure import cutting_from as cutting_from
 from .cut.unknowns import SceneMean as SceneMean
 from .design.band import expected_band as expected_band
 from .design.choice import CaptureList as CaptureList
@@ -40,6 +40,7 @@ from .friction.fit import fit_friction as fit_friction
 from .friction.fit import friction_experiment as friction_experiment
 from .friction.layout import at_typical as at_typical
 from .friction.model import FrictionExperiment as FrictionExperiment
+from .parameters import FittedParameter as FittedParameter
 from .plate.checks import HALVES as HALVES
 from .plate.checks import RESIDUALS as RESIDUALS
 from .plate.fit import plate_target as plate_target
@@ -52,16 +53,14 @@ from .plate.track_lines import TrackRow as TrackRow
 from .plate.track_lines import read_track_lines as read_track_lines
 from .result import FitResult as FitResult
 from .result import FitSeries as FitSeries
-from .result import FittedParameter as FittedParameter
 from .result import Proposal as Proposal
 from .result import ReplayComparison as ReplayComparison
 from .result import ReplayRow as ReplayRow
 from .result import StrokeError as StrokeError
 from .signals.sensors import channels_of as channels_of
-from .signals.steadiness import steadiness as steadiness
+from .signals.soundness import steadiness as steadiness
 from .signals.survey import survey as survey
 from .store import load as load
-from .store import load_any_fit as load_any_fit
 from .store import load_fit as load_fit
 from .store import read_header as read_header
 from .store import save as save
@@ -96,7 +95,6 @@ __all__ = [
     "fit_friction",
     "friction_experiment",
     "load",
-    "load_any_fit",
     "load_fit",
     "read_header",
     "save",

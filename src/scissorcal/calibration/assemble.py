@@ -1,7 +1,7 @@
 """Put a posterior and the compared candidates into the result that people read."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
 
@@ -31,22 +31,17 @@ PRIOR_DRAWS = 1000
 
 @dataclass(frozen=True)
 class Particulars:
-    """What only the fit itself can say; it follows what is common to all fits."""
+    """What only the fit itself can say; it follows what is common to all fits.
 
-    verdicts: tuple[Verdict, ...] = ()
-    notes: tuple[str, ...] = ()
-    diagnostics: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class CriticRequest:
-    """Whether the residuals are searched for what the law lacks.
-
-    It is judged by the ``tolerance`` of torque, a share, where there is one, but for terms that are
-    ``known`` by name from elsewhere.
+    ``critic`` says whether the residuals are searched for what the law lacks. That is judged by the
+    ``tolerance`` of torque, a share, where there is one, but for terms that are ``known`` by name
+    from elsewhere.
     """
 
-    asked: bool
+    verdicts: tuple[Verdict, ...]
+    notes: tuple[str, ...]
+    diagnostics: Mapping[str, Any]
+    critic: bool
     tolerance: float | None = None
     known: tuple[str, ...] = ()
 
@@ -56,7 +51,6 @@ def assemble(
     recordings: tuple[Recording, ...],
     usage: Usage,
     particulars: Particulars,
-    critic: CriticRequest,
     rng: np.random.Generator,
 ) -> FitResult:
     """Put a finished fit into the form that reports, packages and files read.
@@ -74,14 +68,14 @@ def assemble(
     rows = candidate_rows(compared, chosen)
     diagnostics = _diagnostics(outcome) | dict(particulars.diagnostics)
     critique = Critique((), NOT_ASKED)
-    if critic.asked:
-        critique = criticise(design, chosen, joint, rng, critic.known)
+    if particulars.critic:
+        critique = criticise(design, chosen, joint, rng, particulars.known)
     tables = _parameters(outcome, rng)
     diagnostics["critic"] = critique.sentence
     trust = trust_verdicts(outcome, diagnostics, held_out)
-    if critic.tolerance is not None:
+    if particulars.tolerance is not None:
         drive, unit = float(np.sqrt(np.mean(measured**2))), joint.effort_unit
-        verdict = structure_verdict(critique, drive, unit, critic.tolerance)
+        verdict = structure_verdict(critique, drive, unit, particulars.tolerance)
         trust += (verdict.of(f"fit.{what}"),)
     for_people: dict[str, Any] = {}
     if not outcome.simulated:
@@ -93,7 +87,7 @@ def assemble(
             tuple(recording.source for recording in recordings),
             refit=what == "cut" and outcome.effort != "draft",
         )
-        for_people["predictive"] = predictive_of(
+        for_people["predictive"] = _predictive_of(
             compared, chosen, predictions, thin, outcome.effort, rng.spawn(1)[0]
         )
     return FitResult(
@@ -215,8 +209,8 @@ def _predictions(outcome: Outcome, thin: slice) -> Array:
     """Means (draws, k) by draws of the posterior, at the points that ``thin`` selects."""
     posterior, measured = outcome.posterior, outcome.design.observed
     residuals = outcome.chosen.candidate.likelihood.residuals
-    every = max(1, len(posterior.draws) // BAND_DRAWS)
-    return np.stack([(measured - residuals(u))[thin] for u in posterior.draws[::every]])
+    step = max(1, len(posterior.draws) // BAND_DRAWS)
+    return np.stack([(measured - residuals(u))[thin] for u in posterior.draws[::step]])
 
 
 def _series(outcome: Outcome, predictions: Array, thin: slice) -> FitSeries:
@@ -247,7 +241,7 @@ MANTISSA_BITS = 10
 """Bits of a replicated value's mantissa, which compresses it to a third: within 0.05 %."""
 
 
-def predictive_of(
+def _predictive_of(
     compared: Sequence[FittedCandidate],
     chosen: FittedCandidate,
     predictions: Array,

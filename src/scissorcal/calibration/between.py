@@ -18,7 +18,7 @@ from scissorcal.calibration.friction.search import search, search_from
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference import Posterior, infer
 from scissorcal.inference.between import BROAD, between_groups, one_normal
-from scissorcal.model.transforms import LOG
+from scissorcal.model.terms import LOG
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import TORQUE, Check, Verdict
 
@@ -62,17 +62,6 @@ class RecordingError:
 
 
 @dataclass(frozen=True)
-class FitsApart:
-    """How a law is fitted to the bins ``here`` (n,) of one recording, and to all the others.
-
-    ``own`` gives the posterior by one recording, ``others`` the optimum (p,) without it.
-    """
-
-    own: Callable[[Mask], Posterior]
-    others: Callable[[Mask], Array]
-
-
-@dataclass(frozen=True)
 class BetweenRecordings:
     """What a law's parameters differ by from recording to recording.
 
@@ -102,7 +91,7 @@ class BetweenRecordings:
         are, whatever shape the posterior has. The centre stays the pooled one: where recordings say
         little by themselves, their own estimates would move it farther than they know.
         """
-        pooled, typical = self._given(np.stack([np.zeros(len(self.prior)), self.typical_sd]))
+        pooled, typical = self._given(np.stack([np.zeros(len(self.prior)), self._typical_sd]))
         wanted = one_normal(np.diagonal(self._given(self.sd), axis1=1, axis2=2))
         stretch = wanted / np.sqrt(np.diag(typical))
         values, vectors = np.linalg.eigh(typical * np.outer(stretch, stretch) - pooled)
@@ -110,21 +99,21 @@ class BetweenRecordings:
         return np.asarray(draws + rng.standard_normal(draws.shape) @ root.T)
 
     @property
-    def typical_sd(self) -> Array:
+    def _typical_sd(self) -> Array:
         """Median (p,) of the standard deviation between recordings."""
         return np.asarray(np.median(self.sd, axis=0))
 
     def _given(self, tau: Array) -> Array:
         """Covariance (k, p, p) of the mean over recordings given scatters ``tau`` (k, p)."""
         spread = tau[:, None, :, None] ** 2 * np.eye(tau.shape[1])
-        own = np.linalg.inv(self.precisions + BROAD * self.prior)
-        return np.linalg.inv(np.linalg.inv(own + spread).sum(axis=1) + self.prior)
+        covariances = np.linalg.inv(self.precisions + BROAD * self.prior)
+        return np.linalg.inv(np.linalg.inv(covariances + spread).sum(axis=1) + self.prior)
 
     def diagnostics(self) -> dict[str, Any]:
         """Plain numbers by parameter and by recording, for the fit's file."""
         names = self.layout.names
         return {
-            "between_recordings_sd": dict(zip(names, self.typical_sd.tolist(), strict=True)),
+            "between_recordings_sd": dict(zip(names, self._typical_sd.tolist(), strict=True)),
             NEXT_RECORDING: dict(zip(names, self._natural_sd().tolist(), strict=True)),
             "between_recordings_z": dict(zip(names, self.largest_z.tolist(), strict=True)),
             "left_out_recordings": [vars(error) for error in self.errors],
@@ -133,7 +122,7 @@ class BetweenRecordings:
     def _natural_sd(self) -> Array:
         """The median sd between recordings (p,) in the parameters' units."""
         centre = self.points.mean(axis=0)
-        ends = self.layout.columns(np.stack([centre - self.typical_sd, centre + self.typical_sd]))
+        ends = self.layout.columns(np.stack([centre - self._typical_sd, centre + self._typical_sd]))
         return np.asarray(0.5 * (ends[1] - ends[0]))
 
     def notes(self, nuisance: tuple[str, ...]) -> tuple[str, ...]:
@@ -195,31 +184,32 @@ def compare_recordings(
     """
     candidate = design.candidate(design.observed)
     law, problem = candidate.reduced, candidate.problem(design.series)
-    if not isinstance(law, ReducedLaw):
+    if law is None:
         return None
 
-    def own(here: Mask) -> Posterior:
+    def alone(here: Mask) -> Posterior:
         return _inferred(design, law, here, point, rng)
 
     def others(here: Mask) -> Array:
         left = law.without(np.unique(design.strokes[here]))
-        return np.asarray(search_from(replace(problem, reduced=left), point).point)
+        return np.asarray(search_from(replace(problem, reduced=left), point)[0].point)
 
-    return gather_recordings(design, point, recordings, FitsApart(own, others), usual, rng)
+    return gather_recordings(design, point, recordings, (alone, others), usual, rng)
 
 
 def gather_recordings(
     design: Design,
     point: Array,
     recordings: tuple[Recording, ...],
-    fits: FitsApart,
+    fits: tuple[Callable[[Mask], Posterior], Callable[[Mask], Array]],
     usual: float,
     rng: np.random.Generator,
 ) -> BetweenRecordings | None:
     """Compare a law's fits to single recordings; None where fewer than two can be fitted.
 
     ``point`` (p,) is the optimum over all of them, ``usual`` the share by which recordings usually
-    differ.
+    differ. ``fits`` give, for the bins (n,) of one recording, the posterior by it alone and the
+    optimum (p,) without it.
     """
     index = design.bins.recording
     labels = [
@@ -229,16 +219,17 @@ def gather_recordings(
         return None
     candidate = design.candidate(design.observed)
     prior = candidate.prior_precision
+    alone, others = fits
     points, covariances, precisions, estimates, errors = [], [], [], [], []
     for label in labels:
         here = index == label
-        own = fits.own(here)
-        likelihood = _less_prior(np.asarray(np.linalg.inv(own.covariance), float), prior)
-        points.append(own.optimum.point)
-        covariances.append(own.covariance)
+        posterior = alone(here)
+        likelihood = _less_prior(np.asarray(np.linalg.inv(posterior.covariance), float), prior)
+        points.append(posterior.optimum.point)
+        covariances.append(posterior.covariance)
         precisions.append(likelihood)
-        estimates.append(_without_prior(own, likelihood, prior, candidate.prior_mean))
-        reached = (fits.others(here), point, own.optimum.point)
+        estimates.append(_without_prior(posterior, likelihood, prior, candidate.prior_mean))
+        reached = (others(here), point, posterior.optimum.point)
         errors.append(_error(design, recordings[label].source, here, reached))
     scatter = between_groups(
         np.stack(estimates), np.stack(precisions), usual_sd(design.layout, usual), prior, rng
@@ -278,7 +269,7 @@ def jackknife(
     """
     candidate = design.candidate(design.observed)
     law, problem = candidate.reduced, candidate.problem(design.series)
-    if not isinstance(law, ReducedLaw) or len(law.moments.labels) < 3:
+    if law is None or len(law.moments.labels) < 3:
         return {}
     full, information = design.layout.columns(point), np.diag(law.information(point))
     left, repeated = [], np.ones(len(point), dtype=bool)
@@ -287,8 +278,8 @@ def jackknife(
     for group in groups:
         rest = law.without(labels[group])
         repeated &= np.diag(rest.information(point)) > REPEATED * information
-        seen = replace(problem, reduced=rest)
-        left.append(design.layout.columns(search_from(seen, point).point))
+        others = replace(problem, reduced=rest)
+        left.append(design.layout.columns(search_from(others, point)[0].point))
     size = np.array([[law.counted / counts[group].sum()] for group in groups])
     pseudo = size * full - (size - 1.0) * np.stack(left)
     centre = np.sum(pseudo / size, axis=0)

@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from scissorcal.calibration.result import FitResult, FittedParameter
+from scissorcal.calibration.parameters import FittedParameter
+from scissorcal.calibration.result import FitResult
 
 FEW_COUNTS = 1.0
 """Encoder counts per sample of a closing stroke (median) below which an encoder is coarse."""
@@ -48,23 +49,14 @@ class Caveat:
     sentence: str
 
 
-@dataclass(frozen=True)
-class _Row:
-    """One kind of data: when a fit is of it, which parameters it concerns, the sentence."""
-
-    holds: Callable[[FitResult], bool]
-    parameters: tuple[str, ...]
-    sentence: Callable[[FitResult], str]
-
-
 def caveats_of(fit: FitResult) -> tuple[Caveat, ...]:
     """The rows of the table that hold for a fit, with the parameters that they concern."""
     names = [parameter.name for parameter in (*fit.parameters, *fit.derived)]
     caveats = []
-    for row in _ROWS:
-        concerned = tuple(name for name in names if _concerns(row, name))
-        if concerned and row.holds(fit):
-            caveats.append(Caveat(concerned, row.sentence(fit)))
+    for holds, parameters, sentence in _ROWS:
+        concerned = tuple(name for name in names if _concerns(parameters, name))
+        if concerned and holds(fit):
+            caveats.append(Caveat(concerned, sentence(fit)))
     return tuple(caveats)
 
 
@@ -103,10 +95,10 @@ def next_recording_sentence(fit: FitResult) -> str:
     return EARLIER if fit.diagnostics.get(ON_RECORD) else ONE_RECORDING
 
 
-def _concerns(row: _Row, name: str) -> bool:
+def _concerns(parameters: tuple[str, ...], name: str) -> bool:
     return any(
         name == parameter or (parameter.endswith("*") and name.startswith(parameter[:-1]))
-        for parameter in row.parameters
+        for parameter in parameters
     )
 
 
@@ -163,13 +155,12 @@ def _spline_words(fit: FitResult) -> str:
     )
 
 
-_ROWS = (
-    _Row(_coarse, (*RESPONSE, "fracture_energy", "toughness", "kappa"), _coarse_words),
-    _Row(_long_windows, ("inertia",), _long_windows_words),
-    _Row(_no_line, ("kappa", "fracture_energy", "toughness"), _no_line_words),
-    _Row(
-        lambda fit: fit.structure.get("response") == "spline",
-        ("response_*",),
-        _spline_words,
-    ),
+_ROWS: tuple[
+    tuple[Callable[[FitResult], bool], tuple[str, ...], Callable[[FitResult], str]], ...
+] = (
+    (_coarse, (*RESPONSE, "fracture_energy", "toughness", "kappa"), _coarse_words),
+    (_long_windows, ("inertia",), _long_windows_words),
+    (_no_line, ("kappa", "fracture_energy", "toughness"), _no_line_words),
+    (lambda fit: fit.structure.get("response") == "spline", ("response_*",), _spline_words),
 )
+"""Of each kind of data: when a fit is of it, which parameters it concerns, the sentence."""

@@ -13,7 +13,7 @@ from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference import Posterior, SearchStatus
 from scissorcal.inference.importance import ADAPTED_LIMIT, K_HAT_LIMIT
-from scissorcal.inference.status import SamplingStatus
+from scissorcal.inference.problem import SamplingStatus
 from scissorcal.model.friction_terms import NEAR_REST
 from scissorcal.verdicts import INTERVALS, STATED, TORQUE, Check, Status, Verdict
 

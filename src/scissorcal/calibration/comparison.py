@@ -56,7 +56,7 @@ def best_of(fitted: Sequence[FittedCandidate]) -> FittedCandidate:
 
 
 def contenders(fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
-    """The candidates that come near the best (:func:`is_near`), the best among them.
+    """The candidates that come near the best (:func:`_is_near`), the best among them.
 
     PSIS-LOO could speak for these alone.
     """
@@ -66,7 +66,7 @@ def contenders(fitted: Sequence[FittedCandidate]) -> list[FittedCandidate]:
     return [
         candidate
         for candidate, nats in zip(fitted, behind, strict=True)
-        if candidate is best or is_near(nats, len(candidate.optimum.point), most)
+        if candidate is best or _is_near(nats, len(candidate.optimum.point), most)
     ]
 
 
@@ -80,11 +80,11 @@ def names_of_contenders(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
         str(row["name"])
         for row in rows
         if row["equivalent"]
-        or is_near(float(row["behind"]), int(row["parameters"]), int(best["parameters"]))
+        or _is_near(float(row["behind"]), int(row["parameters"]), int(best["parameters"]))
     )
 
 
-def is_near(behind: float, parameters: int, of_best: int) -> bool:
+def _is_near(behind: float, parameters: int, of_best: int) -> bool:
     """Whether another estimate of hold-out densities could reverse that of fits without strokes.
 
     The log density of unseen strokes lies about a nat a parameter below that of strokes that were
@@ -158,11 +158,11 @@ def candidate_rows(
 def _loo(candidate: FittedCandidate, share: float) -> dict[str, float]:
     if not np.isfinite(share):
         return {"loo": share, "loo_se": share, "loo_k_hat": share}
-    found = candidate.left_out
+    left_out = candidate.left_out
     return {
-        "loo": float(found.scores.sum()) * share,
-        "loo_se": standard_error(found.scores * share),
-        "loo_k_hat": float(found.k_hats.max()),
+        "loo": float(left_out.scores.sum()) * share,
+        "loo_se": standard_error(left_out.scores * share),
+        "loo_k_hat": float(left_out.k_hats.max()),
     }
 
 
@@ -195,8 +195,8 @@ def comparison_text(
     ]
     if not others:
         return text + doubt
-    found = max((_apart(chosen, other, bins, contact) for other in others), key=lambda p: p.nats)
-    return f"{text} {_advice(found, chosen, bins, joint)}{doubt}"
+    place = max((_apart(chosen, other, bins, contact) for other in others), key=lambda p: p.nats)
+    return f"{text} {_advice(place, chosen, bins, joint)}{doubt}"
 
 
 @dataclass(frozen=True)

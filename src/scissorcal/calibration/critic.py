@@ -138,18 +138,18 @@ def structure_verdict(critique: Critique, drive: float, unit: str, tolerance: fl
     ``drive`` is the drive's rms. It fails where the structure's lower limit exceeds the tolerance,
     and is not determined where only its upper one does.
     """
-    found = critique.structure
-    if found is None:
+    left = critique.structure
+    if left is None:
         asked = critique.sentence != NOT_ASKED
         why = critique.sentence if asked else "The critic was not asked; --critic asks it."
         return STRUCTURE_LEFT.not_evaluated(why, threshold=tolerance)
-    low, size, high = (value / drive for value in (found.low, found.size, found.high))
+    low, size, high = (value / drive for value in (left.low, left.size, left.high))
     names = ", ".join(proposal.name for proposal in critique.proposals)
-    most = f"{found.high:.2g} {unit} ({high:.1%} of the drive)"
+    most = f"{left.high:.2g} {unit} ({high:.1%} of the drive)"
     said = f"No term of the critic's library stands out; it could hide {most} at most."
     if names:
         said = (
-            f"What the law lacks recurs over strokes with {found.size:.2g} {unit} ({size:.1%} of "
+            f"What the law lacks recurs over strokes with {left.size:.2g} {unit} ({size:.1%} of "
             f"the drive, {low:.1%} to {high:.1%}; twice the rms): {names}."
         )
     if low > tolerance:
@@ -194,15 +194,15 @@ class _Finding:
 def _accepted(left: Leftover) -> list[_Finding]:
     """What is found, recurs, stands out of chance and helps on unseen strokes, in order."""
     folds = split_strokes(np.unique(left.stroke))
-    seen = [(~np.isin(left.stroke, fold)).astype(np.float64) for fold in folds]
-    every, *without = (
-        list(dict.fromkeys(left.terms[i].part or left.terms[i].name for i in _search(left, one)))
-        for one in (np.ones(len(left.bins)), *seen)
+    weights = [(~np.isin(left.stroke, fold)).astype(np.float64) for fold in folds]
+    names, *without = (
+        list(dict.fromkeys(left.terms[i].part or left.terms[i].name for i in _search(left, each)))
+        for each in (np.ones(len(left.bins)), *weights)
     )
     twins = left.twins(TWINS)
-    found: list[_Finding] = []
-    for name in every:
-        within = [index for finding in found for index in finding.terms]
+    accepted: list[_Finding] = []
+    for name in names:
+        within = [index for finding in accepted for index in finding.terms]
         terms = left.findings[name]
         recurs = float(np.mean([bool(twins[name] & set(others)) for others in without]))
         gain, nats = left.held_out(within, terms)
@@ -211,8 +211,8 @@ def _accepted(left: Leftover) -> list[_Finding]:
         if left.chances(within).get(name, 1.0) >= FALSE_ALARM:
             continue
         others = tuple(sorted(twins[name] - {name}))
-        found.append(_Finding(name, tuple(terms), recurs, gain, float(nats.sum()), others))
-    return found
+        accepted.append(_Finding(name, tuple(terms), recurs, gain, float(nats.sum()), others))
+    return accepted
 
 
 def _search(left: Leftover, weights: Array) -> tuple[int, ...]:
@@ -267,17 +267,19 @@ def _propose(
     The coefficient of a wave is its amplitude.
     """
     finding = found[-1]
-    own = list(finding.terms)
-    every, covariances = left.refitted([index for one in found for index in one.terms])
-    coefficients = every[-len(own) :] / left.scale[own]
-    covariance = covariances[-len(own) :, -len(own) :] / np.outer(left.scale[own], left.scale[own])
-    coefficient = float(coefficients[0] if len(own) == 1 else np.linalg.norm(coefficients))
+    terms = list(finding.terms)
+    refitted, covariances = left.refitted([index for other in found for index in other.terms])
+    coefficients = refitted[-len(terms) :] / left.scale[terms]
+    covariance = covariances[-len(terms) :, -len(terms) :] / np.outer(
+        left.scale[terms], left.scale[terms]
+    )
+    coefficient = float(coefficients[0] if len(terms) == 1 else np.linalg.norm(coefficients))
     along = coefficients / np.linalg.norm(coefficients)
-    size = float(left.sizes(own, every[None, -len(own) :])[0])
-    term = left.terms[own[0]]
+    size = float(left.sizes(terms, refitted[None, -len(terms) :])[0])
+    term = left.terms[terms[0]]
     unit = term.unit(joint.position_unit, joint.effort_unit)
     adopted = [str(name) for name in chosen.candidate.key.get("adopt", ())]
-    adopted += [one.name for one in found if left.terms[one.terms[0]].adoptable]
+    adopted += [other.name for other in found if left.terms[other.terms[0]].adoptable]
     adoptable = what == "friction" and term.adoptable
     line = f"fit.friction.adopt = {json.dumps(adopted)}" if adoptable else ""
     how = f"adopt it by {line}" if line else f"no {what} candidate has it"

@@ -3,13 +3,14 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.candidates import LeftOut, leave_strokes_out
+from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.segments import by_label
 from scissorcal.inference.autocorrelation import ljung_box
@@ -21,32 +22,6 @@ from scissorcal.inference.problem import Counter, Problem, Stop
 FOLDS = 4
 SEARCH_REACH = 8.0
 """Half-width of the search, in prior standard deviations."""
-
-
-class StrokeSums(Protocol):
-    """A likelihood from sums by stroke, whose cost does not depend on how much was recorded."""
-
-    @property
-    def counted(self) -> float:
-        """Bins that count."""
-
-    def log_likelihood(self, u: Array) -> float:
-        """Log-likelihood at ``u`` (p,)."""
-
-    def log_likelihoods(self, points: Array) -> Array:
-        """Log-likelihoods (k,) at points (k, p)."""
-
-    def slope(self, u: Array) -> Array:
-        """Its derivative (p,)."""
-
-    def information(self, u: Array) -> Array:
-        """Fisher's information (p, p)."""
-
-    def by_stroke(self, draws: Array) -> Array:
-        """Log-likelihood (k, strokes) of each stroke at draws (k, p)."""
-
-    def without(self, labels: Integers) -> "StrokeSums":
-        """The same over all strokes but those of ``labels``."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +56,7 @@ class CandidateProblem(Problem):
 
     prior_mean: Array = field(default_factory=lambda: np.zeros(0))
     prior_precision: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    reduced: StrokeSums | None = None
+    reduced: ReducedLaw | None = None
 
     def log_priors(self, points: Array) -> Array:
         """Log-priors of points (k, p), shape (k,)."""
@@ -127,7 +102,7 @@ class Candidate:
     prior_precision: Array
     blocks: Integers | None = None
     populations: Integers | None = None
-    reduced: StrokeSums | None = None
+    reduced: ReducedLaw | None = None
     search: Callable[[CandidateProblem], Optimum] | None = None
     share: float | None = None
     curved: tuple[int, ...] = ()
@@ -140,8 +115,8 @@ class Candidate:
             return -0.5 * float(away @ self.prior_precision @ away)
 
         def terms(u: Array) -> Array:
-            every = self.likelihood.terms(u)
-            return every if keep is None else every[keep]
+            all_terms = self.likelihood.terms(u)
+            return all_terms if keep is None else all_terms[keep]
 
         def normal(u: Array) -> tuple[Array, Array]:
             z, log_sd = self.likelihood.normal(u)
@@ -326,9 +301,9 @@ class _Refits:
             share, slope = rest.counted / candidate.reduced.counted, rest.slope(point)
             others: Problem = replace(candidate.problem(self.problem.series), reduced=rest)
         else:
-            seen = ~np.isin(self.strokes, fold)
-            share, slope = float(np.mean(seen)), self._scores[seen].sum(axis=0)
-            others = self.counter.over(candidate.problem(self.problem.series, seen))
+            kept = ~np.isin(self.strokes, fold)
+            share, slope = float(np.mean(kept)), self._scores[kept].sum(axis=0)
+            others = self.counter.over(candidate.problem(self.problem.series, kept))
         slope = self.problem.share * slope
         slope = slope - candidate.prior_precision @ (point - candidate.prior_mean)
         precision = share * self.problem.share * self.information + candidate.prior_precision

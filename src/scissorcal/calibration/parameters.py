@@ -1,13 +1,12 @@
 """Parameters of a fit: names, units, transforms, priors, and summaries of their draws."""
 
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.result import FittedParameter
-from scissorcal.model.transforms import Transform
+from scissorcal.model.terms import Transform
 
 
 @dataclass(frozen=True)
@@ -25,6 +24,90 @@ class Parameter:
     sd: float
     meaning: str
     measured_prior: bool = False
+
+
+NEAREST, FARTHEST = 1.2816, 1.9600
+"""Distances from a normal's mean, in standard deviations, beyond which 10 % and 2.5 % lie: twice
+and half of what lies beyond an end of a 90 % interval."""
+
+
+def moments_agree(mean: float, sd: float, q05: float, q95: float) -> bool:
+    """Whether mean and sd say of a posterior what its 5 and 95 % quantiles say.
+
+    They do where a normal of these moments has between half and twice of 5 % beyond each quantile.
+    Long tails and skewed posteriors fail, as an sd then follows draws that no interval reaches.
+
+    >>> moments_agree(0.0, 1.0, -1.64, 1.64), moments_agree(0.0, 1.0, -0.5, 0.5)
+    (True, False)
+    """
+    return all(NEAREST * sd <= end <= FARTHEST * sd for end in (mean - q05, q95 - mean))
+
+
+def in_words(mean: float, sd: float, q05: float, q50: float, q95: float) -> str:
+    """Mean and sd for a sentence; the quantiles alone where moments do not agree with them.
+
+    >>> in_words(0.09, 0.01, 0.075, 0.09, 0.105), in_words(0.09, 0.03, 0.075, 0.081, 0.105)
+    ('0.09 (sd 0.01)', '0.081 (0.075 to 0.1)')
+    """
+    if moments_agree(mean, sd, q05, q95):
+        return f"{mean:.2g} (sd {sd:.1g})"
+    return f"{q50:.2g} ({q05:.2g} to {q95:.2g})"
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One parameter with its marginal posterior, in ``unit``.
+
+    ``measured_prior`` marks a prior from another measurement, such as photographs of the edge.
+    ``identifiability`` is the ratio of posterior to prior standard deviation: near 0 the data
+    determine the parameter, near 1 the prior does.
+    """
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    q05: float
+    q50: float
+    q95: float
+    identifiability: float
+    meaning: str = ""
+    measured_prior: bool = False
+
+    @staticmethod
+    def summary_of(draws: Array) -> dict[str, Any]:
+        """The fields that posterior draws (n,) in the parameter's unit give."""
+        q05, q50, q95 = (float(value) for value in np.quantile(draws, [0.05, 0.5, 0.95]))
+        mean, sd = float(draws.mean()), float(draws.std(ddof=1))
+        return {"mean": mean, "sd": sd, "q05": q05, "q50": q50, "q95": q95}
+
+    @property
+    def moments(self) -> tuple[float, float] | None:
+        """Mean and sd for people to read; None where they do not agree with the quantiles."""
+        agree = moments_agree(self.mean, self.sd, self.q05, self.q95)
+        return (self.mean, self.sd) if agree else None
+
+    @property
+    def words(self) -> str:
+        """The value for a sentence, without its unit; see :func:`in_words`."""
+        return in_words(self.mean, self.sd, self.q05, self.q50, self.q95)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give the parameter as the plain object that ``--json`` prints.
+
+        ``mean`` and ``sd`` are None where they do not agree with the quantiles.
+        """
+        mean, sd = self.moments or (None, None)
+        return {
+            "name": self.name,
+            "unit": self.unit,
+            "mean": mean,
+            "sd": sd,
+            "q05": self.q05,
+            "q50": self.q50,
+            "q95": self.q95,
+            "identifiability": self.identifiability,
+        }
 
 
 @dataclass(frozen=True)

@@ -142,36 +142,36 @@ def _left_in_others(
     What is not known of the others, NaN, counts for nothing; a replay of which nothing is known
     leaves infinitely much.
     """
-    every = np.concatenate(strokes)
-    opening, measured = opening[every], measured[every]
+    places = np.concatenate(strokes)
+    opening, measured = opening[places], measured[places]
     ends = np.cumsum([0, *(len(here) for here in strokes)])
-    found = []
+    sums = []
     for replay, k in zip(replays, own, strict=True):
         squares = (measured - replay(opening)) ** 2
         squares[ends[k] : ends[k + 1]] = 0.0
         known = bool(np.any(np.isfinite(replay.torque)))
-        found.append(float(np.nansum(squares)) if known else np.inf)
-    return found
+        sums.append(float(np.nansum(squares)) if known else np.inf)
+    return sums
 
 
 def _one_stroke(chosen: FittedCandidate, label: int) -> Array:
     """Residuals (n,) of the law fitted to one stroke alone."""
     problem = chosen.candidate.problem(chosen.series, chosen.strokes == label)
-    found = find_optimum(problem, chosen.optimum.point[None, :])
-    return chosen.candidate.likelihood.residuals(found.point)
+    optimum = find_optimum(problem, chosen.optimum.point[None, :])
+    return chosen.candidate.likelihood.residuals(optimum.point)
 
 
 def _novelty(bins: Bins, contact: Array, base: NDArray[np.intp], here: NDArray[np.intp]) -> str:
     """In what a stroke differs from the replayed one."""
     speeds = _speed(bins, base), _speed(bins, here)
-    found = ["speed"] if abs(speeds[1] / speeds[0] - 1.0) > OTHER_SPEED else []
+    differences = ["speed"] if abs(speeds[1] / speeds[0] - 1.0) > OTHER_SPEED else []
     met = contact[base[0]], contact[here[0]]
     if abs(met[1] - met[0]) > OTHER_PLACE_M:
-        found.append("contact")
+        differences.append("contact")
     moved = abs(float(np.median(bins.advance[here]) - np.median(bins.advance[base])))
     if moved > OTHER_PLACE_M or bins.sheet[here[0]] != bins.sheet[base[0]]:
-        found.append("place")
-    return " + ".join(found) or "none"
+        differences.append("place")
+    return " + ".join(differences) or "none"
 
 
 def _speed(bins: Bins, here: NDArray[np.intp]) -> float:

@@ -10,7 +10,7 @@ bytes. A result without arrays may be kept as plain JSON, in a file that ends in
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from dataclasses import asdict, fields, is_dataclass, replace
 from functools import cache
 from io import BytesIO
 from operator import attrgetter
@@ -32,7 +32,7 @@ from typing import (
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.result import FitResult, Result, Stored
+from scissorcal.calibration.result import FitResult, Header, Result, Stored
 from scissorcal.errors import InputError, OtherKindError, ScissorcalError
 from scissorcal.files import replacing
 from scissorcal.foreign import Format, parse_isolated, read_foreign, read_json
@@ -44,11 +44,10 @@ from scissorcal.recipe.requirements import command_words
 if TYPE_CHECKING:
     import h5netcdf
 
-    from scissorcal.calibration.camera.result import CameraFit
-    from scissorcal.calibration.edge.result import BladeResult
-    from scissorcal.calibration.plate.result import PlateFit
-
 R = TypeVar("R", bound=Result)
+_Variable = tuple[tuple[str, ...], NDArray[Any], Mapping[str, str]]
+"""Dimensions, values and attributes."""
+_Variables = Mapping[str, NDArray[Any]]
 
 FORMAT = "scissorcal-result/1"
 EARLIER = ("scissorcal-fit/1", "scissorcal-fit/2")
@@ -64,26 +63,8 @@ COMPRESSED_BYTES = 4096
 """Size from which an array is compressed."""
 FITS = ("friction", "friction-advance", "cut", "camera", "blade", "plate")
 """Names of the files that fits have in a workspace, without ".nc"."""
-_VERIFY = "scissorcal verify"
 _LOAD = "scissorcal.calibration.store_contents:load_contents"
-_SEAL = FIT_SEAL
-_SEAL_SIZE = len(_SEAL) + 64 + 1
-
-
-@dataclass(frozen=True)
-class Header:
-    """What a stored result is of: enough for its state, without its arrays.
-
-    ``model`` is the chosen candidate model in words, ``failed`` names the checks that failed,
-    ``origin`` is "fitted" or "imported"; ``effort`` is empty where a result has none.
-    """
-
-    what: str
-    effort: str
-    model: str
-    inputs_hash: str
-    failed: tuple[str, ...]
-    origin: str = "fitted"
+_SEAL_SIZE = len(FIT_SEAL) + 64 + 1
 
 
 def save(result: Result, path: Path) -> None:
@@ -109,10 +90,10 @@ def load(path: Path, kind: type[R]) -> R:
     with _reported(path, kind):
         if path.suffix == ".json":
             return cast(R, _built(kind, read_json(path, _format_of(path, kind)), None))
-        file = _opened(path, kind)
-        if file.attributes["kind"] != kind.__name__:
-            raise OtherKindError(path, fit_name(_header(file).what), f"a {kind.title}")
-        return cast(R, _built(kind, json.loads(file.attributes["scissorcal"]), file))
+        texts, variables = _opened(path, kind)
+        if texts["kind"] != kind.__name__:
+            raise OtherKindError(path, fit_name(_header(texts).what), f"a {kind.title}")
+        return cast(R, _built(kind, json.loads(texts["scissorcal"]), variables))
 
 
 def load_fit(path: Path) -> FitResult:
@@ -120,24 +101,14 @@ def load_fit(path: Path) -> FitResult:
     return load(path, FitResult)
 
 
-def load_any_fit(path: Path) -> "FitResult | CameraFit | BladeResult | PlateFit":
-    """Read a fit of any kind, as the one that it is; see :func:`load`."""
-    from scissorcal.calibration.camera.result import CameraFit
-    from scissorcal.calibration.edge.result import BladeResult
-    from scissorcal.calibration.plate.result import PlateFit
-
-    kinds = {"camera": CameraFit, "blade": BladeResult, "plate": PlateFit}
-    return load(path, kinds.get(read_header(path).what, FitResult))
-
-
 def read_header(path: Path) -> Header:
     """Read what a stored result is of; raises InputError as :func:`load` does."""
     with _reported(path, Result):
-        return _header(_opened(path, Result, with_variables=False))
+        return _header(_opened(path, Result, with_variables=False)[0])
 
 
-def _header(file: "_Contents") -> Header:
-    return cast(Header, _built(Header, json.loads(file.attributes["header"]), None))
+def _header(texts: Mapping[str, str]) -> Header:
+    return cast(Header, _built(Header, json.loads(texts["header"]), None))
 
 
 @contextmanager
@@ -168,23 +139,16 @@ def _format_of(path: Path, kind: type[Result]) -> Format:
         FIT,
         name=f"a {kind.title} of scissorcal",
         remedy=f"{again[0].upper()}{again[1:]}.",
-        holds=("verify", "json", "text") if kind.command.startswith(_VERIFY) else FIT.holds,
+        holds=("verify", "json", "text")
+        if kind.command.startswith("scissorcal verify")
+        else FIT.holds,
     )
 
 
-@dataclass(frozen=True)
-class _Contents:
-    """The netCDF data of a file: its root's texts, and its variables by path."""
-
-    attributes: Mapping[str, str]
-    variables: Mapping[str, NDArray[Any]]
-
-    def __getitem__(self, at: str) -> NDArray[Any]:
-        return self.variables[at.strip("/")]
-
-
-def _opened(path: Path, kind: type[Result], *, with_variables: bool = True) -> _Contents:
-    """The netCDF data of a file whose hash and version are right."""
+def _opened(
+    path: Path, kind: type[Result], *, with_variables: bool = True
+) -> tuple[Mapping[str, str], _Variables]:
+    """The root's texts of a file whose hash and version are right, and its variables by path."""
     if not path.exists():
         raise FileNotFoundError("No such file")
     form = _format_of(path, kind)
@@ -199,30 +163,26 @@ def _opened(path: Path, kind: type[Result], *, with_variables: bool = True) -> _
                 )
         if is_unknown(content):
             raise OtherKindError(path, UNKNOWN, form.name)
-        if OF_SCISSORCAL not in content and _opens_as_hdf5(content, path, form):
-            raise OtherKindError(path, "an HDF5 file of another program", form.name)
-        raise ValueError("its SHA-256 does not match its content")
-    found = parse_isolated(_LOAD, data, path, form, with_variables=with_variables)
-    file = _Contents(found["attributes"], found["variables"])
-    if file.attributes["format"] != FORMAT:
-        raise ValueError(f"its format is {file.attributes['format']}, and this reads {FORMAT}")
-    return file
-
-
-def _opens_as_hdf5(content: bytes, path: Path, form: Format) -> bool:
-    """Whether a file without a seal is whole, as one that was cut off is not."""
-    try:
-        parse_isolated(_LOAD, content, path, form, with_variables=False)
-    except InputError:
-        return False
-    return True
+        damaged = ValueError("its SHA-256 does not match its content")
+        if OF_SCISSORCAL in content:
+            raise damaged
+        try:
+            parse_isolated(_LOAD, content, path, form, with_variables=False)
+        except InputError:  # as of a file that was cut off
+            raise damaged from None
+        raise OtherKindError(path, "an HDF5 file of another program", form.name)
+    contents = parse_isolated(_LOAD, data, path, form, with_variables=with_variables)
+    texts: Mapping[str, str] = contents["attributes"]
+    if texts["format"] != FORMAT:
+        raise ValueError(f"its format is {texts['format']}, and this reads {FORMAT}")
+    return texts, contents["variables"]
 
 
 def _seal(data: bytes) -> bytes:
-    return _SEAL + bytes_digest(data).encode() + b"\n"
+    return FIT_SEAL + bytes_digest(data).encode() + b"\n"
 
 
-def _netcdf(result: Result, tree: Any, variables: "Mapping[str, _Variable]") -> bytes:
+def _netcdf(result: Result, tree: Any, variables: Mapping[str, _Variable]) -> bytes:
     import h5netcdf
 
     header = Header(
@@ -236,7 +196,7 @@ def _netcdf(result: Result, tree: Any, variables: "Mapping[str, _Variable]") -> 
     stream = BytesIO()
     with h5netcdf.File(stream, "w") as file:
         for at, variable in variables.items():
-            _write(file, at, variable)
+            _write(file, at, *variable)
         file.attrs.update(
             format=FORMAT,
             kind=type(result).__name__,
@@ -247,30 +207,29 @@ def _netcdf(result: Result, tree: Any, variables: "Mapping[str, _Variable]") -> 
     return stream.getvalue()
 
 
-@dataclass(frozen=True)
-class _Variable:
-    dims: tuple[str, ...]
-    values: NDArray[Any]
-    attributes: Mapping[str, str]
-
-
-def _write(file: "h5netcdf.File", at: str, variable: _Variable) -> None:
+def _write(
+    file: "h5netcdf.File",
+    at: str,
+    dims: tuple[str, ...],
+    values: NDArray[Any],
+    attributes: Mapping[str, str],
+) -> None:
     """Write a variable; a dimension is taken from the nearest group that has it in this size."""
     path, _, name = at.rpartition("/")
     group: h5netcdf.Group = file
     for part in filter(None, path.split("/")):
         group = group.groups[part] if part in group.groups else group.create_group(part)
-    for dimension, size in zip(variable.dims, variable.values.shape, strict=True):
+    for dimension, size in zip(dims, values.shape, strict=True):
         known = group.dimensions.get(dimension)
         if known is None or known.size != size:
             group.dimensions[dimension] = size
             if dimension == "draw":
-                _write(file, f"{path}/chain", _Variable(("chain",), np.zeros(1, int), {}))
-                _write(file, f"{path}/draw", _Variable(("draw",), np.arange(size), {}))
-    packed = variable.values.nbytes >= COMPRESSED_BYTES
+                _write(file, f"{path}/chain", ("chain",), np.zeros(1, int), {})
+                _write(file, f"{path}/draw", ("draw",), np.arange(size), {})
+    packed = values.nbytes >= COMPRESSED_BYTES
     options: dict[str, Any] = {"compression": "gzip", "shuffle": True} if packed else {}
-    written = group.create_variable(name, variable.dims, data=variable.values, **options)
-    written.attrs.update(variable.attributes)
+    written = group.create_variable(name, dims, data=values, **options)
+    written.attrs.update(attributes)
 
 
 class _Writer:
@@ -295,8 +254,8 @@ class _Writer:
 
     def _object(self, value: Any, path: str, stored: Stored | None) -> dict[str, Any]:
         tree, kind = {}, cast(Any, type(value))
-        for name, (_, own) in _fields(kind).items():
-            item, here = getattr(value, name), own or stored
+        for name, (_, annotation) in _fields(kind).items():
+            item, here = getattr(value, name), annotation or stored
             if isinstance(item, np.ndarray):
                 tree[name] = self._array(item, f"{path}/{name}", here, value)
             else:
@@ -339,7 +298,7 @@ class _Writer:
     ) -> str:
         if values.dtype == np.bool_:
             values = values.astype(np.int8)
-        self.variables[at] = _Variable(dims, values, attributes)
+        self.variables[at] = (dims, values, attributes)
         return at
 
 
@@ -347,24 +306,26 @@ class _Writer:
 def _fields(kind: Any) -> Mapping[str, tuple[Any, Stored | None]]:
     """Type and storage of each field that a dataclass is made of."""
     hints = get_type_hints(kind, include_extras=True)
-    found = {}
-    for one in fields(kind):
-        if one.init:
-            hint, stored = hints[one.name], None
+    storage = {}
+    for field in fields(kind):
+        if field.init:
+            hint, stored = hints[field.name], None
             if get_origin(hint) is Annotated:
                 hint, *extras = get_args(hint)
                 stored = next((extra for extra in extras if isinstance(extra, Stored)), None)
-            found[one.name] = (hint, stored)
-    return found
+            storage[field.name] = (hint, stored)
+    return storage
 
 
-def _built(hint: Any, value: Any, file: _Contents | None, stored: Stored | None = None) -> Any:
+def _built(hint: Any, value: Any, file: _Variables | None, stored: Stored | None = None) -> Any:
     """A value of type ``hint`` from its JSON. Raises ValueError where it is of another type."""
     origin, arguments = get_origin(hint), get_args(hint)
     if hint is Any:
         return value
     if origin in (Union, UnionType):
-        return _one_of(arguments, value, file, stored)
+        if value is None and NoneType in arguments:
+            return None
+        return _first_that_fits(arguments, value, file, stored)
     if origin is Literal:
         return value if value in arguments else _refuse(hint, value)
     if origin is np.ndarray:
@@ -381,11 +342,9 @@ def _built(hint: Any, value: Any, file: _Contents | None, stored: Stored | None 
     return value if type(value) is wanted else _refuse(hint, value)
 
 
-def _one_of(
-    kinds: tuple[Any, ...], value: Any, file: _Contents | None, stored: Stored | None
+def _first_that_fits(
+    kinds: tuple[Any, ...], value: Any, file: _Variables | None, stored: Stored | None
 ) -> Any:
-    if value is None and NoneType in kinds:
-        return None
     for kind in kinds:
         if kind is not NoneType:
             try:
@@ -396,23 +355,23 @@ def _one_of(
 
 
 def _object_of(
-    kind: Any, value: dict[str, Any], file: _Contents | None, stored: Stored | None
+    kind: Any, value: dict[str, Any], file: _Variables | None, stored: Stored | None
 ) -> Any:
     known = _fields(kind)
     value = {EARLIER_FIELDS.get(name, name): item for name, item in value.items()}
-    every = {one.name for one in fields(kind)} | set(getattr(kind, "also_written", ()))
-    if unknown := value.keys() - every:
+    names = {field.name for field in fields(kind)} | set(getattr(kind, "also_written", ()))
+    if unknown := value.keys() - names:
         raise ValueError(f"{kind.__name__} has the unknown {', '.join(sorted(unknown))}")
     given = {
-        name: _built(hint, value[name], file, own or stored)
-        for name, (hint, own) in known.items()
+        name: _built(hint, value[name], file, annotation or stored)
+        for name, (hint, annotation) in known.items()
         if name in value
     }
     return kind(**given)
 
 
 def _array_of(
-    dtype: Any, value: Any, file: _Contents | None, stored: Stored | None
+    dtype: Any, value: Any, file: _Variables | None, stored: Stored | None
 ) -> NDArray[Any]:
     if not isinstance(value, dict) or len(value) != 1:
         _refuse(np.ndarray, value)
@@ -420,9 +379,9 @@ def _array_of(
         return np.zeros(value["empty"], dtype)
     assert file is not None
     if "variable" in value:
-        values = file[value["variable"]]
+        values = file[value["variable"].strip("/")]
     else:
-        values = np.stack([file[at] for at in value["variables"]], axis=-1)
+        values = np.stack([file[at.strip("/")] for at in value["variables"]], axis=-1)
     chained = stored is not None and stored.dims[:1] == ("chain",)
     return np.asarray(values[0] if chained else values, dtype=dtype)
 

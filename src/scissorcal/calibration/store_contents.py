@@ -13,14 +13,14 @@ def load_contents(data: bytes, with_variables: bool) -> dict[str, Any]:
     """
     import h5py
 
-    found: dict[str, Any] = {}
+    variables: dict[str, Any] = {}
 
     def take(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.dtype.kind in _NUMERIC:
-            found[name] = item[...]
+            variables[name] = item[...]
 
     with h5py.File(h5py.h5f.open_file_image(data), "r") as file:
         if with_variables:
             file.visititems(take)
         texts = {name: value for name, value in file.attrs.items() if isinstance(value, str)}
-    return {"attributes": texts, "variables": found}
+    return {"attributes": texts, "variables": variables}

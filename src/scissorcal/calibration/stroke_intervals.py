@@ -1,12 +1,15 @@
-"""Intervals over strokes, and the plateau of a log."""
+"""Strokes of a log on one grid, intervals over them, and the plateau of their mean."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from scissorcal.aliases import Array
+from scissorcal.recording.recording import Recording, StrokeKind
 
 LEVEL = 0.90
 FEWEST = 3
@@ -115,8 +118,10 @@ def find_plateau(
     height = level(slice(*place))
     if drawn is None:
         return Plateau(first, last, height)
-    found = [plateau_of(drawn(), places) for _ in range(RESAMPLES)]
-    ends = np.array([(places[one[0]], places[one[1] - 1]) for one in found if one is not None])
+    plateaus = [plateau_of(drawn(), places) for _ in range(RESAMPLES)]
+    ends = np.array(
+        [(places[span[0]], places[span[1] - 1]) for span in plateaus if span is not None]
+    )
     if not len(ends):
         return Plateau(first, last, height, share=0.0)
     (low, high), (low_, high_) = np.quantile(ends, [0.05, 0.95], axis=0).T
@@ -148,3 +153,109 @@ def plateau_of(curve: Array, places: Array) -> tuple[int, int] | None:
             if size >= least and level and (best is None or size > best[1] - best[0]):
                 best = (first, after)
     return best
+
+
+BINS = 60
+ENVELOPE = (0.1, 0.9)
+EDGE = 0.05
+"""Share of a stroke's travel at either end that is left out: there the joint speeds up or stops."""
+SPEED_CLASS = 1.4
+"""Speeds further apart than this factor are different classes."""
+
+
+@dataclass(frozen=True)
+class Curves:
+    """The strokes of one direction: ``values`` (n, BINS) at the places of the grid.
+
+    ``speeds`` (n,) [rad/s, or m/s], ``work`` (n,) is the integral over the grid's range.
+    """
+
+    kind: StrokeKind
+    values: Array
+    speeds: Array
+    work: Array
+
+    @property
+    def mean(self) -> Array:
+        return np.asarray(self.values.mean(axis=0))
+
+    @property
+    def envelope(self) -> tuple[Array, Array]:
+        """The 10 % and 90 % quantiles over strokes, (BINS,) each."""
+        low, high = np.quantile(self.values, ENVELOPE, axis=0)
+        return low, high
+
+
+@dataclass(frozen=True)
+class SpeedClass:
+    """Strokes of one direction and of about one speed, and their mean over the range."""
+
+    kind: StrokeKind
+    speed: float
+    level: Interval
+
+
+def stroke_curves(
+    recording: Recording,
+    values: Array,
+    usable: NDArray[np.bool_],
+    places: Array,
+    kind: StrokeKind,
+) -> tuple[Curves | None, int, int]:
+    """The strokes of one direction over the grid; how many do not reach, how many have holes."""
+    opening = np.asarray(recording.samples["opening"], dtype=np.float64)
+    half = 0.5 * (places[1] - places[0])
+    edges = np.append(places - half, places[-1] + half)
+    rows, speeds, left_out, holed = [], [], 0, 0
+    for stroke in recording.strokes:
+        if stroke.kind != kind:
+            continue
+        own = usable & (recording.samples["stroke"] == stroke.index)
+        curve = _binned(opening[own], values[own], edges)
+        if isinstance(curve, str):
+            left_out, holed = left_out + (curve == "short"), holed + (curve == "holed")
+            continue
+        rows.append(curve)
+        speeds.append(stroke.speed)
+    if not rows:
+        return None, left_out, holed
+    table = np.array(rows)
+    work = table.mean(axis=1) * (edges[-1] - edges[0])
+    return Curves(kind, table, np.array(speeds), work), left_out, holed
+
+
+def _binned(opening: Array, values: Array, edges: Array) -> Array | Literal["short", "holed"]:
+    """Mean in each bin, between neighbours where a bin is empty.
+
+    "short" where the ends are empty, "holed" where so many bins in a row are that a plateau would
+    fit in: a line drawn across would be taken for a measurement.
+    """
+    inside = (opening >= edges[0]) & (opening < edges[-1])
+    index = np.clip(np.searchsorted(edges, opening[inside], side="right") - 1, 0, len(edges) - 2)
+    counts = np.bincount(index, minlength=len(edges) - 1)
+    seen = np.flatnonzero(counts)
+    reach = max(1, round(EDGE * len(counts)))
+    if len(seen) < 2 or seen[0] > reach or seen[-1] < len(counts) - 1 - reach:
+        return "short"
+    if np.diff(seen).max() > LEAST_PLATEAU * len(counts):
+        return "holed"
+    sums = np.bincount(index, values[inside], minlength=len(edges) - 1)
+    return np.asarray(np.interp(np.arange(len(counts)), seen, sums[seen] / counts[seen]))
+
+
+def speed_classes(curves: Curves) -> list[SpeedClass]:
+    """Strokes grouped by speed, slow ones first."""
+    order = np.argsort(curves.speeds)
+    speeds, means = curves.speeds[order], curves.values.mean(axis=1)[order]
+    first = [0]
+    for index, speed in enumerate(speeds):
+        if speed > SPEED_CLASS * speeds[first[-1]]:
+            first.append(index)
+    return [
+        SpeedClass(curves.kind, float(np.median(own)), mean_interval(level))
+        for own, level in zip(np.split(speeds, first[1:]), np.split(means, first[1:]), strict=True)
+    ]
+
+
+def negated(curves: Curves) -> Curves:
+    return Curves(curves.kind, -curves.values, curves.speeds, -curves.work)

@@ -14,62 +14,31 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.calibration.signals.sensors import channels_of
 from scissorcal.calibration.stroke_intervals import (
+    BINS,
+    EDGE,
     FEWEST,
     LEAST_PLATEAU,
+    Curves,
     Interval,
     Plateau,
+    SpeedClass,
     difference_interval,
     drawn_strokes,
     find_plateau,
     mean_interval,
+    negated,
+    speed_classes,
+    stroke_curves,
     trend_interval,
 )
 from scissorcal.errors import InputError
-from scissorcal.recording.recording import Recording, StrokeKind
+from scissorcal.recording.recording import Recording
 
 Effort = Literal["motor_torque", "handle_force"]
 
-BINS = 60
-ENVELOPE = (0.1, 0.9)
-EDGE = 0.05
-"""Share of a stroke's travel at either end that is left out: there the joint speeds up or stops."""
-SPEED_CLASS = 1.4
-"""Speeds further apart than this factor are different classes."""
 FULL_TURN_RAD = 2.0 * np.pi
 SIGN_LEVEL = 0.998
 """Of the interval that decides a sign: chance changes a right one in 1 of 1,000 logs."""
-
-
-@dataclass(frozen=True)
-class Curves:
-    """The strokes of one direction: ``values`` (n, BINS) at the places of the grid.
-
-    ``speeds`` (n,) [rad/s, or m/s], ``work`` (n,) is the integral over the grid's range.
-    """
-
-    kind: StrokeKind
-    values: Array
-    speeds: Array
-    work: Array
-
-    @property
-    def mean(self) -> Array:
-        return np.asarray(self.values.mean(axis=0))
-
-    @property
-    def envelope(self) -> tuple[Array, Array]:
-        """The 10 % and 90 % quantiles over strokes, (BINS,) each."""
-        low, high = np.quantile(self.values, ENVELOPE, axis=0)
-        return low, high
-
-
-@dataclass(frozen=True)
-class SpeedClass:
-    """Strokes of one direction and of about one speed, and their mean over the range."""
-
-    kind: StrokeKind
-    speed: float
-    level: Interval
 
 
 @dataclass(frozen=True)
@@ -154,14 +123,16 @@ def summarise(logs: Sequence[tuple[Recording, Effort]], places: Array) -> tuple[
     overflow are left out. Raises InputError where a channel is constant or too few strokes reach
     over the range.
     """
-    seen = [_Strokes.of(recording, effort, places) for recording, effort in logs]
+    measured = [_Strokes.of(recording, effort, places) for recording, effort in logs]
     signs = {
-        effort: {one.sign.sign for one, log in zip(seen, logs, strict=True) if log[1] == effort}
+        effort: {
+            part.sign.sign for part, log in zip(measured, logs, strict=True) if log[1] == effort
+        }
         for _, effort in logs
     }
     return tuple(
         _summary(recording, strokes, places, signs[effort] - {0})
-        for strokes, (recording, effort) in zip(seen, logs, strict=True)
+        for strokes, (recording, effort) in zip(measured, logs, strict=True)
     )
 
 
@@ -230,14 +201,14 @@ def friction_of(blank: LogSummary) -> Interval | None:
     return difference_interval(0.5 * closing, 0.5 * opening)
 
 
-def effort_of(recording: Recording, effort: Effort) -> Array:
+def _effort_of(recording: Recording, effort: Effort) -> Array:
     """The channel (N,): of a rotary joint, a force becomes a torque where its lever is known."""
     values = np.asarray(recording.samples[effort], dtype=np.float64)
     return values * recording.handle_radius_m if _has_lever(recording, effort) else values
 
 
 def effort_unit(recording: Recording, effort: Effort) -> str:
-    """Unit of :func:`effort_of`."""
+    """Unit of :func:`_effort_of`."""
     if effort == "handle_force" and not _has_lever(recording, effort):
         return "N"
     return recording.joint.effort_unit
@@ -268,7 +239,7 @@ class _Strokes:
 
     @classmethod
     def of(cls, recording: Recording, effort: Effort, places: Array) -> "_Strokes":
-        values = effort_of(recording, effort)
+        values = _effort_of(recording, effort)
         if float(np.ptp(values)) == 0.0:
             raise InputError(
                 f"{recording.source}: {effort} is constant at {values[0]:.4g}: name its column, or "
@@ -276,8 +247,8 @@ class _Strokes:
             )
         (channel,) = channels_of(recording, (effort,))
         usable = ~np.isin(recording.samples[effort], channel.marks)
-        closing, left_out, holed = _curves(recording, values, usable, places, "closing")
-        opening, *others = _curves(recording, values, usable, places, "opening")
+        closing, left_out, holed = stroke_curves(recording, values, usable, places, "closing")
+        opening, *others = stroke_curves(recording, values, usable, places, "opening")
         if closing is None and holed:
             raise InputError(
                 f"{recording.source}: every closing stroke has a hole of {LEAST_PLATEAU:.0%} of "
@@ -310,16 +281,16 @@ def _summary(recording: Recording, strokes: _Strokes, places: Array, signs: set[
     """One log; ``signs`` are those that logs of its channel determine."""
     closing, opening, turned = strokes.closing, strokes.opening, signs == {-1}
     if turned:
-        closing = _negated(closing)
-        opening = None if opening is None else _negated(opening)
-    every = (closing, *((opening,) if opening else ()))
+        closing = negated(closing)
+        opening = None if opening is None else negated(opening)
+    ways = (closing, *((opening,) if opening else ()))
     width = float(places[-1] - places[0]) * len(places) / (len(places) - 1)
     return LogSummary(
         source=recording.source,
         places=places,
         closing=closing,
         opening=opening,
-        speeds=tuple(one for curves in every for one in _classes(curves)),
+        speeds=tuple(speed_class for curves in ways for speed_class in speed_classes(curves)),
         mean=mean_interval(closing.values.mean(axis=1)),
         work=mean_interval(closing.work),
         drift=trend_interval(closing.values.mean(axis=1)),
@@ -361,73 +332,7 @@ def _ends_of(recording: Recording) -> tuple[float, float]:
     return low, high
 
 
-def _curves(
-    recording: Recording,
-    values: Array,
-    usable: NDArray[np.bool_],
-    places: Array,
-    kind: StrokeKind,
-) -> tuple[Curves | None, int, int]:
-    """The strokes of one direction over the grid; how many do not reach, how many have holes."""
-    opening = np.asarray(recording.samples["opening"], dtype=np.float64)
-    half = 0.5 * (places[1] - places[0])
-    edges = np.append(places - half, places[-1] + half)
-    rows, speeds, left_out, holed = [], [], 0, 0
-    for stroke in recording.strokes:
-        if stroke.kind != kind:
-            continue
-        own = usable & (recording.samples["stroke"] == stroke.index)
-        curve = _binned(opening[own], values[own], edges)
-        if isinstance(curve, str):
-            left_out, holed = left_out + (curve == "short"), holed + (curve == "holed")
-            continue
-        rows.append(curve)
-        speeds.append(stroke.speed)
-    if not rows:
-        return None, left_out, holed
-    table = np.array(rows)
-    work = table.mean(axis=1) * (edges[-1] - edges[0])
-    return Curves(kind, table, np.array(speeds), work), left_out, holed
-
-
-def _binned(opening: Array, values: Array, edges: Array) -> Array | Literal["short", "holed"]:
-    """Mean in each bin, between neighbours where a bin is empty.
-
-    "short" where the ends are empty, "holed" where so many bins in a row are that a plateau would
-    fit in: a line drawn across would be taken for a measurement.
-    """
-    inside = (opening >= edges[0]) & (opening < edges[-1])
-    index = np.clip(np.searchsorted(edges, opening[inside], side="right") - 1, 0, len(edges) - 2)
-    counts = np.bincount(index, minlength=len(edges) - 1)
-    seen = np.flatnonzero(counts)
-    reach = max(1, round(EDGE * len(counts)))
-    if len(seen) < 2 or seen[0] > reach or seen[-1] < len(counts) - 1 - reach:
-        return "short"
-    if np.diff(seen).max() > LEAST_PLATEAU * len(counts):
-        return "holed"
-    sums = np.bincount(index, values[inside], minlength=len(edges) - 1)
-    return np.asarray(np.interp(np.arange(len(counts)), seen, sums[seen] / counts[seen]))
-
-
-def _classes(curves: Curves) -> list[SpeedClass]:
-    """Strokes grouped by speed, slow ones first."""
-    order = np.argsort(curves.speeds)
-    speeds, means = curves.speeds[order], curves.values.mean(axis=1)[order]
-    first = [0]
-    for index, speed in enumerate(speeds):
-        if speed > SPEED_CLASS * speeds[first[-1]]:
-            first.append(index)
-    return [
-        SpeedClass(curves.kind, float(np.median(own)), mean_interval(level))
-        for own, level in zip(np.split(speeds, first[1:]), np.split(means, first[1:]), strict=True)
-    ]
-
-
 def _slopes(values: Array, places: Array) -> Array:
     """Least-squares slope of each row of values (n, BINS) over the places."""
     away = places - places.mean()
     return np.asarray(values @ away / (away @ away))
-
-
-def _negated(curves: Curves) -> Curves:
-    return Curves(curves.kind, -curves.values, curves.speeds, -curves.work)

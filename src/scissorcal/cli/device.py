@@ -113,7 +113,7 @@ def simulate(
       $ scissorcal device simulate office-paper --seed 1
       /dev/pts/0
     """
-    from scissorcal.device.sim.faults import parse_faults
+    from scissorcal.device.sim.sensors import parse_faults
     from scissorcal.device.sim.server import serve
     from scissorcal.device.sim.specimen import load_specimen
 

@@ -7,7 +7,8 @@ from scissorcal.cli.output import table
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from scissorcal.calibration.result import FitResult, FittedParameter
+    from scissorcal.calibration.parameters import FittedParameter
+    from scissorcal.calibration.result import FitResult
     from scissorcal.workday.runs.fit import FitOutcome
 
 

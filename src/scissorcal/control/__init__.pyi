@@ -7,7 +7,7 @@ from .gains import choose_gains as choose_gains
 from .gains import contact_gains as contact_gains
 from .gains import friction_rates as friction_rates
 from .path_file import read_path as read_path
-from .plate_request import REQUEST_FIRST as REQUEST_FIRST
+from .settings import REQUEST_FIRST as REQUEST_FIRST
 
 __all__ = [
     "ContactGains",

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.control.contours import Foot, contour_at, foot_of
 from scissorcal.control.control_result import (
     ControlResult,
     control_figures,
@@ -15,23 +14,31 @@ from scissorcal.control.control_result import (
 )
 from scissorcal.control.mechanics import RigMechanics
 from scissorcal.control.path_file import SurfacePoints
-from scissorcal.control.plate_request import put_plate, refuse_nobody
-from scissorcal.control.settings import LIFT_M, Material, Settings, control_settings
+from scissorcal.control.settings import (
+    LIFT_M,
+    MUST_ASK,
+    Material,
+    Settings,
+    control_settings,
+    put_plate,
+)
 from scissorcal.control.surface_path import (
     ContourMap,
+    Foot,
     TimedPath,
+    contour_at,
+    foot_of,
     map_contour,
     start_foot,
     time_path,
 )
 from scissorcal.device.capture import servo_config
 from scissorcal.device.capture_gains import Probed, capture_gains
-from scissorcal.device.loading import is_simulator
 from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import LoopTask, Motion, Samples
-from scissorcal.device.open_motion import open_motion
 from scissorcal.device.paths import PathBuilder, Reference
-from scissorcal.device.session import RigSession
+from scissorcal.device.port_motion import open_motion
+from scissorcal.device.session import RigSession, is_simulator, refuse_nobody
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import CONTROL_DTYPE, ConfigKey, ControlFlag
 from scissorcal.model.surface import Surface
@@ -85,7 +92,7 @@ def control(
     """
     link, recipe, identity = session.link, session.recipe, session.identity
     if not job.tracked:
-        refuse_nobody(session)
+        refuse_nobody(identity, session.operator.confirm, MUST_ASK)
     # Stiff ones, without material: sweeps of friction give up stiffness for damping. By the mean of
     # the delay, as the gains of contact are (decision 136).
     probed = Probed.of(session.probe)
@@ -195,7 +202,7 @@ class _Run:
             return
         self.share = foot.share
         place = self._contour.place_of(foot)
-        motion.send_contour(contour_at(foot, place, pose, lift=lift))
+        motion.send_contour(contour_at(foot, place, pose, lift))
 
     def _foot(self, motion: Motion, pose: PlatePose | None, now: float) -> Foot | None:
         """The contour below the tip, None (and a sentence) where the pose does not give it."""

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +54,7 @@ class HybridGains:
     decay_per_s: float
     phase_deg: float
 
-    def settings(self) -> dict[str, float]:
+    def settings(self) -> dict[str, Any]:
         """What `HybridConfig` takes of them."""
         reported = ("decay_per_s", "phase_deg")
         return {name: value for name, value in vars(self).items() if name not in reported}

@@ -7,11 +7,10 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.control.contact_loop import ContactLoop
-from scissorcal.control.contours import Foot
+from scissorcal.control.surface_path import Foot
 from scissorcal.kernel import AxisFriction, Identity
 from scissorcal.model.blade_point import BladePoint
-from scissorcal.model.friction import FrictionLaw, angle_slope, friction_level
-from scissorcal.model.mechanism import AxisLaw
+from scissorcal.model.friction import AxisLaw, FrictionLaw, angle_slope, friction_level
 
 FASTEST_rad_per_s = 10.0
 FASTEST_m_per_s = 0.5

@@ -1,12 +1,12 @@
 """The servo's configuration of CONTROL: gains at every place of the path, limits, refusals."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from scissorcal.control.contact_loop import ContactGains, ContactLoop, contact_decays
-from scissorcal.control.contours import Foot
 from scissorcal.control.gains import HybridGains, choose_gains, friction_rates
 from scissorcal.control.mechanics import (
     FASTEST_m_per_s,
@@ -15,9 +15,11 @@ from scissorcal.control.mechanics import (
     axis_friction,
     contact_loop,
 )
-from scissorcal.control.surface_path import TimedPath
+from scissorcal.control.surface_path import Foot, TimedPath
+from scissorcal.device.motion import Motion
+from scissorcal.device.session import Confirm, RigSession, is_simulator, refuse_nobody
 from scissorcal.errors import InputError
-from scissorcal.kernel import ControlConfig, HybridConfig, Identity
+from scissorcal.kernel import ConfigKey, ControlConfig, HybridConfig, Identity
 from scissorcal.recipe.schema import Limits
 
 FORCE_CUTOFF_HZ = 30.0
@@ -42,8 +44,7 @@ COUNTS = 4
 FORCE_STOP_FACTOR, FORCE_STOP_N = 2.0, 2.0
 
 
-@dataclass(frozen=True)
-class Material:
+class Material(NamedTuple):
     """What the tip presses on: its stiffness (N/m), its friction against the tip, and the most that
     a touch may peak at (N)."""
 
@@ -52,8 +53,7 @@ class Material:
     peak_N: float
 
 
-@dataclass(frozen=True)
-class Settings:
+class Settings(NamedTuple):
     """What a run of CONTROL is configured with, and the least and largest mass (kg) on its path."""
 
     config: ControlConfig
@@ -142,17 +142,10 @@ def _config(
     lever = rig.tip.station_m / rig.tip.moving_blades
     held = opening.largest / lever
     noise = math.hypot(rig.friction_sd, 0.3 * rig.torque_sd)
+    approach_speed = min(gains.approach_speed, FASTEST_APPROACH_M_PER_S)
     law = HybridConfig(
         axes=2,
-        contact_kd=gains.contact_kd,
-        force_kp=gains.force_kp,
-        force_ki=gains.force_ki,
-        normal_kp=gains.normal_kp,
-        normal_kd=gains.normal_kd,
-        path_kp=gains.path_kp,
-        path_kd=gains.path_kd,
-        path_ki=gains.path_ki,
-        approach_speed=min(gains.approach_speed, FASTEST_APPROACH_M_PER_S),
+        **replace(gains, approach_speed=approach_speed).settings(),
         force_most=1.05 * largest,
         force_slew=FORCE_SLEW_N_PER_S,
         integral_most=2.0 * held + 1.0,
@@ -258,3 +251,37 @@ def _largest_force(
         dry = axis_friction(axis.friction, fastest).largest + abs(axis.offset)
         found.append((SHARE_OF_LIMIT * limit - dry) / by if by > 0.0 else math.inf)
     return min(found)
+
+
+PLATE = 2.0
+"""MATERIAL that puts a virtual rig's plate in."""
+MUST_ASK = "A person must be asked to put the plate in its place"
+REQUEST_FIRST = (
+    "Put the plate in its place, below the blades, and keep hands off the handles and away from "
+    "the blades: once the plate's pose is known, they open, move over the plate and press on it."
+)
+REQUEST = (
+    "Put the plate in its place, and keep hands off the handles and away from the blades: they "
+    "open, move over the plate and press on it."
+)
+
+
+def ask_for_plate(session: RigSession) -> None:
+    """Have a person put the plate in before a camera looks for it; a simulator does so by itself.
+
+    Nothing moves meanwhile. InputError where nobody can be asked.
+    """
+    refuse_nobody(session.identity, session.operator.confirm, MUST_ASK)
+    if not session.simulated:
+        assert session.operator.confirm is not None
+        session.operator.confirm(REQUEST_FIRST)
+
+
+def put_plate(motion: Motion, confirm: Confirm | None) -> None:
+    """Have the plate put in while a motion waits with its motors off."""
+    if is_simulator(motion.identity):
+        motion.configure(ConfigKey.MATERIAL, PLATE)
+        return
+    assert confirm is not None
+    with motion.paused():
+        confirm(REQUEST)

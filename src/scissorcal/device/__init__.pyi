@@ -1,4 +1,3 @@
-from .advance_trajectory import advance_plan as advance_plan
 from .capture import open_writer as open_writer
 from .control import Axis as Axis
 from .control import Gains as Gains
@@ -8,10 +7,10 @@ from .control_design import design_gains as design_gains
 from .counting import count_recorded as count_recorded
 from .coverage import OPENING as OPENING
 from .coverage import CoverageGrid as CoverageGrid
-from .crossing import Blade as Blade
+from .cut_trajectory import Blade as Blade
 from .cut_trajectory import cut_plan as cut_plan
-from .diagnosis import diagnose as diagnose
 from .doctor import Examination as Examination
+from .doctor import diagnose as diagnose
 from .hand import hand_travel as hand_travel
 from .link import PortLink as PortLink
 from .link import check_echo as check_echo
@@ -25,17 +24,17 @@ from .paths import Reference as Reference
 from .probe.probe import ProbeRefusedError as ProbeRefusedError
 from .recorder import Recorder as Recorder
 from .recorder import unloaded_sentence as unloaded_sentence
-from .rig_record import identity_facts as identity_facts
 from .session import Operator as Operator
 from .session import RigSession as RigSession
+from .session import identity_facts as identity_facts
+from .sim.blade import Sheet as Sheet
 from .sim.blade import blade_on as blade_on
 from .sim.cutting import Cut as Cut
-from .sim.faults import Faults as Faults
-from .sim.material import Sheet as Sheet
 from .sim.plate_contact import plate_pose as plate_pose
 from .sim.process import SimProcess as SimProcess
 from .sim.rig import TICK_S as TICK_S
 from .sim.rig import VirtualRig as VirtualRig
+from .sim.sensors import Faults as Faults
 from .sim.server import CATCH_UP_TICKS as CATCH_UP_TICKS
 from .sim.specimen import Specimen as Specimen
 from .sim.specimen import TouchedPlate as TouchedPlate
@@ -43,4 +42,5 @@ from .sim.specimen import load_specimen as load_specimen
 from .sim.truth import average_torque as average_torque
 from .sim.truth import true_parameters as true_parameters
 from .trajectory import Plan as Plan
+from .trajectory import advance_plan as advance_plan
 from .trajectory import friction_plan as friction_plan

@@ -1,9 +1,14 @@
 """Capture friction and cuts: drive the rig, or record while a hand moves it."""
 
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from scissorcal.device.advance_trajectory import advance_plan, refuse_without_motor
+import numpy as np
+from numpy.typing import NDArray
+
 from scissorcal.device.capture_gains import (
     ADVANCE_ERROR_M,
     OPENING_ERROR_RAD,
@@ -15,19 +20,21 @@ from scissorcal.device.coverage import CoverageGrid, coverage_of
 from scissorcal.device.cut_trajectory import cut_plan
 from scissorcal.device.drive import Drive
 from scissorcal.device.hand import hand_strokes, hand_travel
-from scissorcal.device.loading import Loader
+from scissorcal.device.link import Link
+from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import STOP_MARGIN_RAD, LoopTask, Motion, MotionReport
-from scissorcal.device.open_motion import open_motion
+from scissorcal.device.parts import Part
+from scissorcal.device.port_motion import open_motion
 from scissorcal.device.recorder import Recorder, Tally
-from scissorcal.device.rig_record import rig_facts
-from scissorcal.device.session import RigSession
-from scissorcal.device.trajectory import Plan, friction_plan
+from scissorcal.device.session import Loader, RigSession, rig_facts
+from scissorcal.device.trajectory import Plan, advance_plan, friction_plan, refuse_without_motor
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.kernel import Identity, ServoConfig
-from scissorcal.recipe.requirements import CaptureKind
+from scissorcal.recipe.requirements import CaptureKind, DesignedKind
 from scissorcal.recipe.schema import Recipe
-from scissorcal.recording import Joint, RecordingFacts, RecordingWriter, Stroke
+from scissorcal.recording import Joint, Recording, RecordingFacts, RecordingWriter, Stroke
 from scissorcal.recording.probe import UNKNOWN_REST, RestFacts
+from scissorcal.recording.recording import UNLOADED_MARK
 
 SUPERVISOR_S = 0.3
 """Without heartbeat, which ends where this process takes no block for a second: see Heartbeat."""
@@ -100,13 +107,13 @@ def capture(
     if kind == "friction-advance":
         refuse_without_motor(session.identity)
     plan = None if hand else planned(session.recipe, session.identity, kind)
-    recorder = Recorder(writer, coverage_of(session.recipe, session.identity, kind, hand=hand))
+    recorder = Recorder(writer, coverage_of(session.recipe, session.identity, kind, hand))
     operator = session.operator
-    with motion_for(session, plan, gains_for(session, kind, writer)) as motion:
+    with _motion_for(session, plan, _gains_for(session, kind, writer)) as motion:
         loader = Loader(motion, recorder, operator.confirm)
         if plan is None:
             hand_strokes(motion, session.recipe, recorder, loader, operator.progress)
-            return finish(recorder, motion)
+            return _finish(recorder, motion)
         if not session.cleared:
             loader.clear(CLEAR_REQUEST if kind == "cut" else plan.segments[0].request)
         if kind == "friction":
@@ -120,7 +127,7 @@ def capture(
                 loader.load(drive.warning() + segment.request)
             drive.follow(segment)
         drive.idle()
-        return finish(recorder, motion)
+        return _finish(recorder, motion)
 
 
 def planned(recipe: Recipe, identity: Identity, kind: CaptureKind) -> Plan:
@@ -177,7 +184,7 @@ def servo_config(
     )
 
 
-def gains_for(session: RigSession, kind: CaptureKind, writer: RecordingWriter) -> CaptureGains:
+def _gains_for(session: RigSession, kind: CaptureKind, writer: RecordingWriter) -> CaptureGains:
     """Gains by what the probe found; what is said of them is noted."""
     gains = capture_gains(session.recipe, session.identity, kind, Probed.of(session.probe))
     for verdict in gains.verdicts if session.probe else ():
@@ -185,7 +192,7 @@ def gains_for(session: RigSession, kind: CaptureKind, writer: RecordingWriter) -
     return gains
 
 
-def motion_for(
+def _motion_for(
     session: RigSession, plan: Plan | None, gains: CaptureGains, *, duration_s: float = 0.0
 ) -> Motion:
     """Start the servo for a plan, or for references of ``duration_s`` if that is longer."""
@@ -197,7 +204,7 @@ def motion_for(
     return open_motion(session.link, config, LoopTask(longest_reference=longest))
 
 
-def finish(recorder: Recorder, motion: Motion) -> CaptureReport:
+def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     """Note how the servo ran and what was lost, and report."""
     report = motion.report()
     recorder.writer.note(report.lag.sentence)
@@ -211,3 +218,124 @@ def finish(recorder: Recorder, motion: Motion) -> CaptureReport:
 
 def _ticks(plan: Plan) -> int:
     return sum(len(segment.reference) for segment in plan.segments)
+
+
+NextPart = Callable[[Recording, float], Part | None]
+"""Chooses what comes next from what was recorded so far and where the carriage stands (m); None
+ends the capture. It runs in a second thread while the rig idles, in virtual time between
+two ticks."""
+
+CHOOSING_S = 1.0
+"""Least time with the motors off between two parts: the zeros of the sensors are measured anew. In
+virtual time the choice takes exactly so long."""
+CHOOSING = "motors off, the fit is brought up to date"
+
+
+def capture_by_parts(
+    session: RigSession,
+    kind: DesignedKind,
+    writer: RecordingWriter,
+    next_part: NextPart,
+    *,
+    longest_s: float,
+    chosen: Callable[[], None] | None = None,
+) -> CaptureReport:
+    """Drive one part after the other until ``next_part`` has none.
+
+    Between two parts the motors are off, the blades rest open, and samples are recorded while
+    ``next_part`` works; the material stays where it is unless the next part asks for a fresh piece.
+    ``chosen`` is called after each choice, in this thread, between the samples before and after.
+    ``longest_s`` bounds the capture, for the faults that it may clear. ``writer`` was opened
+    without strokes. Raises as `capture` does, and what ``next_part`` raises; whatever was
+    recorded stays in the writer.
+    """
+    recipe, identity, operator = session.recipe, session.identity, session.operator
+    recorder = _KeepingRecorder(writer, coverage_of(recipe, identity, kind))
+    gains = _gains_for(session, kind, writer)
+    plan = friction_plan(recipe, identity)
+    with _motion_for(session, plan, gains, duration_s=longest_s) as motion:
+        loader = Loader(motion, recorder, operator.confirm)
+        if not session.cleared:
+            loader.clear(CLEAR_REQUEST if kind == "cut" else plan.segments[0].request)
+        strokes: list[Stroke] = []
+        drive = Drive(motion, recorder, strokes, operator.progress, 1, cuts=kind == "cut")
+        facts = rig_facts(identity, recipe.rig.motor_sign, session.probe)
+
+        def recorded() -> Recording:
+            return Recording(
+                kind=kind,
+                samples=recorder.samples,
+                strokes=tuple(strokes),
+                joint=Joint(recipe.rig.joint),
+                handle_radius_m=identity.handle_radius,
+                device=facts,
+                source=str(writer.path),
+                marks=tuple((UNLOADED_MARK, str(stroke.index)) for stroke in recorder.empty),
+            )
+
+        drive.idle()
+        notify = chosen or (lambda: None)
+        with _chooser(session.link, motion, drive) as choose:
+            while True:
+                part = choose(next_part, recorded())
+                notify()
+                if part is None:
+                    break
+                strokes += part.strokes
+                writer.state_strokes(tuple(strokes))
+                drive.expect(len(part.segment.reference) + round(part.then_s / motion.tick_s))
+                if part.fresh:
+                    loader.retract()
+                    drive.go_to_start(part.segment)
+                    loader.load(drive.warning() + part.segment.request)
+                drive.follow(part.segment)
+        drive.idle()
+        return _finish(recorder, motion)
+
+
+class _KeepingRecorder(Recorder):
+    """A recorder that keeps the samples, so that they can be fitted while the capture runs."""
+
+    def __init__(self, writer: RecordingWriter, coverage: CoverageGrid) -> None:
+        super().__init__(writer, coverage)
+        self._blocks: list[NDArray[np.void]] = []
+
+    def take(self, samples: NDArray[np.void], garbled: int = 0) -> None:
+        super().take(samples, garbled)
+        if len(samples):
+            self._blocks.append(samples.copy())
+
+    @property
+    def samples(self) -> NDArray[np.void]:
+        """All samples so far, (N,)."""
+        return np.concatenate(self._blocks)
+
+
+_Choose = Callable[[NextPart, Recording], Part | None]
+
+
+@contextmanager
+def _chooser(link: Link, motion: Motion, drive: Drive) -> Iterator[_Choose]:
+    """How the next part is chosen while the rig idles; a choice that is not over is left behind."""
+    if isinstance(link, Exchanging):
+
+        def at_once(next_part: NextPart, recording: Recording) -> Part | None:
+            part = next_part(recording, motion.position[1])
+            drive.idle(CHOOSING_S, CHOOSING)
+            return part
+
+        yield at_once
+        return
+    pool = ThreadPoolExecutor(1)
+
+    def meanwhile(next_part: NextPart, recording: Recording) -> Part | None:
+        chosen = pool.submit(next_part, recording, motion.position[1])
+        drive.idle(CHOOSING_S, CHOOSING)
+        while not chosen.done():
+            drive.idle(0.1, CHOOSING)
+        return chosen.result()
+
+    try:
+        yield meanwhile
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)

@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 
-from scissorcal.device.advance_trajectory import largest_acceleration, sliding_speeds
 from scissorcal.device.control import (
     Axis,
     Gains,
@@ -12,9 +11,8 @@ from scissorcal.device.control import (
     greatest_fall,
     loop_margins,
 )
-from scissorcal.device.control_design import Demand, Design, design_gains
-from scissorcal.device.slow_sliding import StribeckFall
-from scissorcal.device.trajectory import SWING_ACCELERATION
+from scissorcal.device.control_design import Demand, Design, StribeckFall, design_gains
+from scissorcal.device.trajectory import SWING_ACCELERATION, largest_acceleration, sliding_speeds
 from scissorcal.device.watching import STILL_RAD
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Identity
@@ -323,7 +321,7 @@ def _designed(
     axis: Axis, demand: Demand, cutoffs: tuple[float, ...], name: str, lack: str, fall: float
 ) -> Design:
     try:
-        return design_gains(axis, demand, cutoffs, name, fall=fall)
+        return design_gains(axis, demand, cutoffs, name, fall)
     except DeviceError as error:
         raise DeviceError(f"{error} {lack}".rstrip()) from None
 

@@ -12,6 +12,7 @@ and Wittenmark, Computer-Controlled Systems, 1997, sections 2.3 and 3.2).
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +39,7 @@ INTEGRAL = 4
 """Place of the integral among the loop's states."""
 
 
-@dataclass(frozen=True)
-class Gains:
+class Gains(NamedTuple):
     """PID of one axis: effort per error, per rate error, per error and second."""
 
     kp: float
@@ -72,8 +72,7 @@ class Axis:
         return replace(self, rate_cutoff_Hz=rate_cutoff_Hz)
 
 
-@dataclass(frozen=True)
-class Margins:
+class Margins(NamedTuple):
     """How far a loop is from oscillation, at the worst inertia within its factor.
 
     ``gain`` is the least factor by which the loop's gain may change either way. Both are 0 where

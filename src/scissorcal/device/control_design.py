@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 from scissorcal.device.control import (
     GAIN_MARGIN,
@@ -41,8 +42,7 @@ INTEGRALS = (1.25, 2.0, 4.0)
 LEAST_DELAY_S = 1e-4
 
 
-@dataclass(frozen=True)
-class Demand:
+class Demand(NamedTuple):
     """What a capture asks of an axis: it must not fall behind by ``error_limit``.
 
     ``rate`` and ``acceleration`` are the plan's largest, ``load`` is the effort that material may
@@ -55,8 +55,7 @@ class Demand:
     error_limit: float
 
 
-@dataclass(frozen=True)
-class Design:
+class Design(NamedTuple):
     """Gains for an axis, with its rate filter, and the margins that they leave."""
 
     axis: Axis
@@ -69,7 +68,6 @@ def design_gains(
     demand: Demand,
     cutoffs_Hz: tuple[float, ...],
     name: str = "opening",
-    *,
     fall: float = 0.0,
 ) -> Design:
     """The gains, and one of ``cutoffs_Hz`` for the rate, that follow best with the stated margins.
@@ -93,7 +91,7 @@ def design_gains(
     raise DeviceError(_refusal(axis, demand, cutoffs_Hz, name, found))
 
 
-def largest_deviation(axis: Axis, gains: Gains, demand: Demand) -> float:
+def _largest_deviation(axis: Axis, gains: Gains, demand: Demand) -> float:
     """How far the axis may fall behind: at a reversal, accelerating, as the load sets in.
 
     All of it at once, as a step: simulated captures fall behind by about half of it.
@@ -108,7 +106,7 @@ def largest_deviation(axis: Axis, gains: Gains, demand: Demand) -> float:
 
 
 def _strong_enough(found: Design, demand: Demand) -> bool:
-    return largest_deviation(found.axis, found.gains, demand) <= demand.error_limit
+    return _largest_deviation(found.axis, found.gains, demand) <= demand.error_limit
 
 
 def _best(axis: Axis, cutoffs_Hz: tuple[float, ...]) -> Design | None:
@@ -175,7 +173,7 @@ def _refusal(
     enough = _enough_delay(axis, demand, cutoffs_Hz)
     behind = "and no gains keep that margin"
     if found is not None:
-        far = largest_deviation(found.axis, found.gains, demand)
+        far = _largest_deviation(found.axis, found.gains, demand)
         unit = "m" if name == "advance" else "rad"
         behind = (
             f"and the {name} would fall behind by up to {far:.2g} {unit}, beyond the "
@@ -208,3 +206,58 @@ def _enough_delay(axis: Axis, demand: Demand, cutoffs_Hz: tuple[float, ...]) -> 
         else:
             high = middle
     return enough
+
+
+STEEPEST = math.sqrt(2.0 / math.e)
+"""Greatest fall, in S / ws."""
+ANY_RATE = 2.0 / math.e
+"""Greatest fall at a rate v over all ws, in S / v: that of ws = v."""
+LARGEST_SHARE = 0.6
+"""Largest share of Stribeck friction in what breaks blades away: of the metals in a textbook's
+table lubricated ones lose most, from 0.15 at rest to 0.06 (Serway and Jewett, Physics for
+Scientists and Engineers, table of coefficients of friction, ISBN 978-1-133-95405-7)."""
+
+
+@dataclass(frozen=True)
+class StribeckFall:
+    """How friction falls with speed: ``level`` S (N m) and ``rate`` ws (rad/s).
+
+    ``rate`` is None where nobody knows it: ``level`` is then an upper bound, and so are the falls.
+    """
+
+    level: float
+    rate: float | None
+
+    @classmethod
+    def within(cls, breakaway: float) -> "StribeckFall":
+        """What can be said where only the torque is known that breaks the blades away."""
+        return cls(LARGEST_SHARE * breakaway, None)
+
+    @property
+    def steepest(self) -> float:
+        """Greatest fall at any speed, N m s/rad; infinite where the rate is not known."""
+        return math.inf if self.rate is None else STEEPEST * self.level / self.rate
+
+    def steady_from(self, stood: float) -> float:
+        """Slowest rate (rad/s) from which on friction falls by no more than ``stood``.
+
+        0 where it never does. In y = (v / ws)^2 the edge is y exp(-2 y) = (stood ws / S)^2 / 4,
+        whose larger root is that of Lambert's W on its lower branch. Without ``rate`` it is the
+        largest over all rates.
+
+        >>> known = StribeckFall(4.1e-3, 0.075)
+        >>> round(known.steepest, 4), known.steady_from(0.05), round(known.steady_from(0.03), 3)
+        (0.0469, 0.0, 0.092)
+        >>> round(StribeckFall(4.1e-3, None).steady_from(0.03), 3)
+        0.101
+        """
+        if self.level <= 0.0 or self.steepest <= stood:
+            return 0.0
+        if stood <= 0.0:
+            return math.inf
+        if self.rate is None:
+            return ANY_RATE * self.level / stood
+        from scipy.special import lambertw
+
+        share = stood * self.rate / self.level
+        return self.rate * math.sqrt(-0.5 * float(lambertw(-0.5 * share * share, -1).real))

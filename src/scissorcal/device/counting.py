@@ -9,7 +9,7 @@ from scissorcal.aliases import Mask
 from scissorcal.device.capture import planned
 from scissorcal.device.completeness import planned_excitation_s
 from scissorcal.device.coverage import NEEDED_S, CoverageGrid, coverage_of
-from scissorcal.device.rig_record import identity_of
+from scissorcal.device.session import identity_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity
 from scissorcal.recipe.load import parse_recipe
@@ -55,12 +55,12 @@ def count_recorded(recording: Recording, recipe: Recipe, kind: CaptureKind) -> d
         "sheets": _sheets(recording, whole),
         "excitation_s": _excitation(recording, label),
         "planned_excitation_s": planned_excitation_s(recipe, kind),
-        "designed": designed_capture(recording) is not None,
+        "designed": _designed_capture(recording) is not None,
         "until": until.as_dict() if until else None,
     }
 
 
-def designed_capture(recording: Recording) -> Capture | None:
+def _designed_capture(recording: Recording) -> Capture | None:
     """The list that a recording was designed with; None for one that the recipe lists."""
     if not recording.recipe_toml:
         return None
@@ -101,7 +101,7 @@ def _as_planned(recording: Recording, recipe: Recipe) -> Recipe:
     """The recipe with the captures that this recording was planned with."""
     if UntilMark.last_of(recording.marks) is not None:
         return _with_chosen(recording, recipe)
-    designed = designed_capture(recording)
+    designed = _designed_capture(recording)
     return recipe if designed is None else recipe.model_copy(update={"capture": designed})
 
 

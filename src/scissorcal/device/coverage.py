@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.device.advance_trajectory import advance_range, sliding_speeds
 from scissorcal.device.cut_trajectory import cut_openings, press_openings
-from scissorcal.device.trajectory import opening_range
+from scissorcal.device.trajectory import advance_range, opening_range, sliding_speeds
 from scissorcal.kernel import Identity
 from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe
@@ -211,7 +210,7 @@ def even_cells(opening: Range, count: int = ANGLE_CELLS) -> tuple[Range, ...]:
 
 
 def coverage_of(
-    recipe: Recipe, identity: Identity, kind: CaptureKind, *, hand: bool = False
+    recipe: Recipe, identity: Identity, kind: CaptureKind, hand: bool = False
 ) -> CoverageGrid:
     """Grid of a capture: its speeds over the openings of the scene, or the travel of the carriage.
 

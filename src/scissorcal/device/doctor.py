@@ -6,17 +6,18 @@ import select
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from scissorcal.aliases import Array, Integers, Progress
-from scissorcal.device.diagnosis import Measurements, adapter_timer_path, brake_after_ms, diagnose
 from scissorcal.device.link import PortLink
+from scissorcal.device.motion import LOOP
 from scissorcal.device.timing import Percentiles
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, State
 from scissorcal.recording.summarising import missing_frames
-from scissorcal.verdicts import Verdict
+from scissorcal.verdicts import STATED, Check, Verdict
 
 ROUND_TRIPS = 100
 SLEEPS = 500
@@ -26,7 +27,31 @@ KEEP_STREAMING_S = 0.5
 
 
 @dataclass(frozen=True)
-class Examination:
+class Measurements:
+    """What the doctor measured; times in ms unless the name says otherwise.
+
+    ``drift_ppm`` is how much faster the device's clock runs than the host's, with its standard
+    error ``drift_se_ppm``. ``adapter_timer_ms`` is None where there is no such adapter.
+    """
+
+    simulated: bool
+    tick_ms: float
+    round_trip: Percentiles
+    round_trips: int
+    unanswered: int
+    interval: Percentiles
+    frames: int
+    lost: int
+    garbled: int
+    drift_ppm: float
+    drift_se_ppm: float
+    adapter_timer_ms: float | None
+    lateness: Percentiles
+    timer_resolution_ns: float
+    realtime_priority: int
+
+
+class Examination(NamedTuple):
     """Measurements and the verdicts on them."""
 
     measurements: Measurements
@@ -96,7 +121,7 @@ def clock_drift(arrival_s: Array, device_us: Integers) -> tuple[float, float]:
 
 def adapter_timer_ms(port: str, sys_root: Path = Path("/sys")) -> float | None:
     """Latency timer (ms) of the USB adapter behind a port, None where there is none."""
-    path = adapter_timer_path(port, sys_root)
+    path = _adapter_timer_path(port, sys_root)
     try:
         return float(path.read_text(encoding="ascii"))
     except (OSError, ValueError):
@@ -157,3 +182,168 @@ def _realtime_priority() -> int:
     limit = resource.getrlimit(resource.RLIMIT_RTPRIO)[1]
     unlimited = os.geteuid() == 0 or limit == resource.RLIM_INFINITY
     return highest if unlimited else min(limit, highest)
+
+
+ROUND_TRIP_LIMIT_TICKS = 4.0
+INTERVAL_LIMIT_TICKS = 3.0
+LEAST_BRAKE_MS, MOST_BRAKE_MS = 10.0, 1000.0
+ROUND_TRIP = Check("device.port round trip", f"{LOOP}: 99 % of the answers, ms", at_most=STATED)
+FRAME_INTERVALS = Check(
+    "device.port frame intervals", f"{LOOP}: 99 % of the intervals, ms", at_most=STATED
+)
+LOST_FRAMES = Check("device.port lost frames", f"{LOOP}: frames lost, %", at_most=0.1)
+LATENCY_TIMER = Check(
+    "device.port latency timer", f"{LOOP}: ms that the adapter holds data back", at_most=1.0
+)
+DRIFT = Check(
+    "device.clock drift",
+    "rates and accelerations: error of the device's clock beyond two standard errors, ppm",
+    at_most=500.0,
+)
+RESOLUTION = Check(
+    "host.timer resolution", f"{LOOP}: steps of this computer's clock, ns", at_most=1000.0
+)
+LATENESS = Check("host.scheduler wake-up lateness", f"{LOOP}: 99 % of the delays, ms", at_most=0.5)
+RIGHTS = Check("host.scheduler real-time rights", f"{LOOP}: priority that is granted", at_least=1.0)
+
+
+def diagnose(m: Measurements, port: str) -> tuple[Verdict, ...]:
+    """Turn measurements into verdicts; ``why`` of a failed one names the remedy."""
+    return (
+        _round_trip(m),
+        _intervals(m),
+        _losses(m, port),
+        _adapter(m, port),
+        _drift(m),
+        _timer(m),
+        _scheduler(m),
+        _rights(m),
+    )
+
+
+def brake_after_ms(m: Measurements) -> float:
+    """Shortest BRAKE_AFTER_MS that this computer, as loaded as now, is unlikely to miss.
+
+    Twice the worst wake-up and round trip that were measured, since a longer run meets worse ones
+    than 500 waits do, and a tick; rounded up to 5 ms, between 10 (below which a desktop system
+    brakes for nothing) and 1000.
+    """
+    late = [value for value in (m.lateness.worst, m.round_trip.worst) if math.isfinite(value)]
+    needed = 2.0 * sum(late) + m.tick_ms
+    return min(max(5.0 * math.ceil(needed / 5.0), LEAST_BRAKE_MS), MOST_BRAKE_MS)
+
+
+def _adapter_timer_path(port: str, sys_root: Path = Path("/sys")) -> Path:
+    """Return the file in which Linux keeps the latency timer of a USB serial adapter."""
+    return sys_root / "bus/usb-serial/devices" / Path(port).resolve().name / "latency_timer"
+
+
+def _round_trip(m: Measurements) -> Verdict:
+    limit = ROUND_TRIP_LIMIT_TICKS * m.tick_ms
+    found = (
+        f"Round trip: median {m.round_trip.p50:.2f} ms, 99 % within {m.round_trip.p99:.2f} ms; "
+        f"{m.unanswered} of {m.round_trips} unanswered."
+    )
+    bad = (
+        f"{found} Connect the device directly (no hub){_timer_too(m)}, and close programs that "
+        "load the processor."
+    )
+    if m.unanswered:
+        return ROUND_TRIP.verdict("fail", m.round_trip.p99, bad, threshold=limit)
+    return ROUND_TRIP.judge(m.round_trip.p99, found, bad, threshold=limit)
+
+
+def _timer_too(m: Measurements) -> str:
+    """The remedy of an adapter that collects bytes, where there is one."""
+    return "" if m.adapter_timer_ms is None else ", set the adapter's latency timer to 1 ms"
+
+
+def _intervals(m: Measurements) -> Verdict:
+    found = (
+        f"{m.frames} frames: median interval {m.interval.p50:.2f} ms, 99 % within "
+        f"{m.interval.p99:.2f} ms, 99.9 % within {m.interval.p999:.2f} ms, longest "
+        f"{m.interval.worst:.1f} ms."
+    )
+    return FRAME_INTERVALS.judge(
+        m.interval.p99,
+        found,
+        f"{found} Frames arrive in batches{_timer_too(m)}: close programs that load the processor.",
+        threshold=INTERVAL_LIMIT_TICKS * m.tick_ms,
+    )
+
+
+def _losses(m: Measurements, port: str) -> Verdict:
+    share = 100.0 * m.lost / max(m.lost + m.frames, 1)
+    found = f"{m.lost} frames lost ({share:.2g} %) and {m.garbled} garbled on {port}."
+    bad = f"{found} Use a shorter, shielded cable, and the baud rate that the device is built for."
+    if m.garbled:
+        return LOST_FRAMES.verdict("fail", share, bad)
+    return LOST_FRAMES.judge(share, found, bad)
+
+
+def _adapter(m: Measurements, port: str) -> Verdict:
+    delay_ms = m.adapter_timer_ms
+    if delay_ms is None:
+        why = f"{port} has no USB adapter with a latency timer."
+        return LATENCY_TIMER.not_evaluated(why)
+    found = f"The adapter delays data by up to {delay_ms:g} ms."
+    bad = f"{found} Run: echo 1 | sudo tee {_adapter_timer_path(port)}"
+    return LATENCY_TIMER.judge(delay_ms, found, bad)
+
+
+def _drift(m: Measurements) -> Verdict:
+    """Judge what of the drift two standard errors do not explain."""
+    if not math.isfinite(m.drift_ppm):
+        why = "Too few frames arrived to compare the clocks."
+        return DRIFT.not_evaluated(why)
+    if m.simulated:
+        why = (
+            f"The clock of a virtual rig stops while this computer is busy "
+            f"({m.drift_ppm:.0f} ppm now), so its drift is not judged."
+        )
+        return DRIFT.not_evaluated(why, m.drift_ppm)
+    direction = "faster" if m.drift_ppm > 0 else "slower"
+    found = (
+        f"The device's clock runs {abs(m.drift_ppm):.0f} ppm {direction} than this computer's "
+        f"(standard error {m.drift_se_ppm:.0f} ppm)."
+    )
+    return DRIFT.judge(
+        max(abs(m.drift_ppm) - 2.0 * m.drift_se_ppm, 0.0),
+        found,
+        f"{found} Check the device's oscillator, and that its microseconds are microseconds: "
+        "rates and accelerations are computed from them.",
+    )
+
+
+def _timer(m: Measurements) -> Verdict:
+    found = f"This computer's clock counts in steps of {m.timer_resolution_ns:g} ns."
+    return RESOLUTION.judge(
+        m.timer_resolution_ns,
+        found,
+        f"{found} Use a kernel with high-resolution timers (CONFIG_HIGH_RES_TIMERS).",
+    )
+
+
+def _scheduler(m: Measurements) -> Verdict:
+    found = (
+        f"A wait of 1 ms ends {m.lateness.p50:.2f} ms late in the middle, 99 % within "
+        f"{m.lateness.p99:.2f} ms, at worst {m.lateness.worst:.1f} ms."
+    )
+    return LATENESS.judge(
+        m.lateness.p99,
+        found,
+        f"{found} Close other programs, choose the processor's performance governor, and grant "
+        "real-time priority (see there).",
+    )
+
+
+def _rights(m: Measurements) -> Verdict:
+    if m.realtime_priority > 0:
+        why = f"Real-time priority up to {m.realtime_priority} is granted."
+        return RIGHTS.judge(m.realtime_priority, why)
+    why = (
+        "Real-time priority is not granted; it is only needed where other programs load the "
+        "processor. To grant it, put '@dialout - rtprio 50' into "
+        "/etc/security/limits.d/scissorcal.conf and log in again."
+    )
+    return RIGHTS.not_evaluated(why, 0.0)

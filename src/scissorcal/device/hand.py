@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.cut_trajectory import cut_plan, hand_requests, press_openings
-from scissorcal.device.loading import Loader
 from scissorcal.device.motion import Motion, Samples
 from scissorcal.device.recorder import Recorder
-from scissorcal.device.session import ShowProgress
+from scissorcal.device.session import Loader, ShowProgress
 from scissorcal.device.trajectory import opening_range
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, Identity

@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 
 from scissorcal.device.link import check_echo, check_identity
-from scissorcal.device.sim.faults import Faults
 from scissorcal.device.sim.protocol import RigProtocol
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
+from scissorcal.device.sim.sensors import Faults
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
@@ -61,7 +61,7 @@ class LockstepLink:
         self._nonce = 0
         self._closed = False
         answer = self._ask(
-            lambda nonce: Hello(nonce=nonce),
+            Hello,
             lambda reply, nonce: isinstance(reply, Identity) and reply.nonce_echo == nonce,
         )
         if not isinstance(answer, Identity):
@@ -155,7 +155,7 @@ class LockstepLink:
             raise DeviceError("The link to the virtual rig is closed: open a new one.")
 
 
-_STATE_TYPE = FrameDecoder().feed(encode(State(0, 0, 0, 0.0, 0.0, 0.0, 0.0)))[0][0]
+_STATE_TYPE = FrameDecoder().feed(encode(State(0, 0, 0)))[0][0]
 
 
 def _is_state(payload: bytes) -> bool:

@@ -18,7 +18,6 @@ from scissorcal.device.motion import (
     Samples,
     Stages,
 )
-from scissorcal.device.paths import Reference
 from scissorcal.device.timing import FeltLag
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
@@ -28,7 +27,6 @@ from scissorcal.kernel import (
     Contour,
     ControlTask,
     Mode,
-    Section,
     Servo,
     ServoConfig,
     StopReason,
@@ -60,7 +58,7 @@ class LockstepMotion(Motion):
     ) -> None:
         super().__init__(link.identity, every_s)
         self._link = link
-        self._servo = Servo(task.tables, config, task.control, task.pieces)
+        self._servo: Servo = Servo(task.tables, config, task.control, task.pieces)
         self._control_rows: list[bytes] = []
         self._frame: bytes | None = None
         self._ticks = max(1, round(every_s / self.tick_s))
@@ -75,14 +73,6 @@ class LockstepMotion(Motion):
         self.step()
 
     @property
-    def mode(self) -> Mode:
-        return self._servo.mode
-
-    @property
-    def track_index(self) -> int:
-        return self._servo.track_index
-
-    @property
     def stop_reason(self) -> StopReason:
         return StopReason.HANGUP if self._failure else self._servo.stop_reason
 
@@ -90,17 +80,8 @@ class LockstepMotion(Motion):
     def garbled(self) -> int:
         return self._link.garbled - self._garbled_before
 
-    def engage(self, mode: Mode) -> None:
-        self._servo.engage(mode)
-
-    def set_reference(self, reference: Reference) -> None:
-        self._leave_path()
-        self._servo.set_reference(
-            reference.opening, reference.opening_rate, reference.advance, reference.stroke
-        )
-
     def set_path(self, place: Array, rate: Array, force: Array, stage: Stages) -> None:
-        self._leave_path()
+        self._stop_following()
         self._task().set_path(place, rate, force, stage)
 
     def send_contour(self, contour: Contour) -> None:
@@ -109,12 +90,6 @@ class LockstepMotion(Motion):
     def control_samples(self) -> Samples:
         rows, self._control_rows = b"".join(self._control_rows), []
         return np.frombuffer(rows, dtype=CONTROL_DTYPE)
-
-    def fresh_sheet(self, crack: float = 0.0) -> None:
-        self._servo.fresh_sheet(crack)
-
-    def place(self, section: Section, usable: bool, age_s: float) -> None:
-        self._servo.place(section, usable, age_s)
 
     @property
     def now_s(self) -> float:
@@ -126,8 +101,7 @@ class LockstepMotion(Motion):
     @contextmanager
     def paused(self) -> Iterator[None]:
         """Virtual time stops during a pause."""
-        self.engage(Mode.IDLE)
-        self.step()
+        self._go_idle()
         yield
 
     def report(self) -> MotionReport:
@@ -201,10 +175,9 @@ class LockstepMotion(Motion):
     def _why_lost(self) -> DeviceError | None:
         return self._failure
 
-    def _leave_path(self) -> None:
-        if self.mode in (Mode.TRACK, Mode.CONTROL):
-            self.engage(Mode.IDLE)
-            self.step()
+    def _go_idle(self) -> None:
+        self.engage(Mode.IDLE)
+        self.step()
 
     def _task(self) -> ControlTask:
         if self._servo.control is None:

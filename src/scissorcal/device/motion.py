@@ -22,13 +22,16 @@ from scissorcal.kernel import (
     ControlConfig,
     EnergyLedger,
     Identity,
+    LoopBlock,
     Mode,
     ModelTables,
     Piece,
     Section,
+    Servo,
     ServoCounters,
     StopReason,
 )
+from scissorcal.verdicts import STATED, Check, Verdict
 
 Samples = NDArray[np.void]
 Stages = NDArray[np.int32]
@@ -99,6 +102,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
     """
 
     identity: Identity
+    _servo: Servo | LoopBlock
 
     def __init__(self, identity: Identity, every_s: float = BLOCK_S) -> None:
         self.identity = identity
@@ -184,13 +188,16 @@ class Motion(AbstractContextManager["Motion"], ABC):
             raise self._stopped()
         return samples
 
-    @abstractmethod
     def engage(self, mode: Mode) -> None:
         """Request a mode; it takes effect with the next frame."""
+        self._servo.engage(mode)
 
-    @abstractmethod
     def set_reference(self, reference: Reference) -> None:
-        """Set what TRACK follows; not while TRACK is engaged."""
+        """Set what TRACK follows; motors off first where one is followed now."""
+        self._stop_following()
+        self._servo.set_reference(
+            reference.opening, reference.opening_rate, reference.advance, reference.stroke
+        )
 
     @abstractmethod
     def set_path(self, place: Array, rate: Array, force: Array, stage: Stages) -> None:
@@ -204,18 +211,18 @@ class Motion(AbstractContextManager["Motion"], ABC):
     def control_samples(self) -> Samples:
         """Samples of CONTROL since the last call, shape (n,) with CONTROL_DTYPE."""
 
-    @abstractmethod
     def fresh_sheet(self, crack: float = 0.0) -> None:
         """Put the rendered crack at ``crack`` (m)."""
+        self._servo.fresh_sheet(crack)
 
     @property
     @abstractmethod
     def now_s(self) -> float:
         """The clock of this process, by which an estimate's age counts: the host's, or virtual."""
 
-    @abstractmethod
     def place(self, section: Section, usable: bool, age_s: float) -> None:
         """Take an estimate of where the plate stands, ``age_s`` old; not usable: force falls."""
+        self._servo.place(section, usable, age_s)
 
     @abstractmethod
     def configure(self, key: int, value: float) -> float:
@@ -234,14 +241,14 @@ class Motion(AbstractContextManager["Motion"], ABC):
         """Motors off, streaming off; the link stays open."""
 
     @property
-    @abstractmethod
     def mode(self) -> Mode:
         """The mode in force."""
+        return self._servo.mode
 
     @property
-    @abstractmethod
     def track_index(self) -> int:
         """Ticks of the reference that have passed."""
+        return self._servo.track_index
 
     @property
     @abstractmethod
@@ -252,6 +259,14 @@ class Motion(AbstractContextManager["Motion"], ABC):
     @abstractmethod
     def garbled(self) -> int:
         """Frames discarded so far."""
+
+    @abstractmethod
+    def _go_idle(self) -> None:
+        """Switch the motors off and wait for the mode to change."""
+
+    def _stop_following(self) -> None:
+        if self.mode in (Mode.TRACK, Mode.CONTROL):
+            self._go_idle()
 
     @abstractmethod
     def _why_lost(self) -> DeviceError | None:
@@ -281,3 +296,80 @@ class Motion(AbstractContextManager["Motion"], ABC):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+MOST_FAULTS_PER_S = 0.1
+LOOP = "whether commands reach the motors in time"
+DEADLINE, MISSES, FAULTS, SUPERVISION = (
+    {
+        scope: Check(f"{scope} {name}", f"{LOOP}: {what}", at_most=limit)
+        for scope in ("render", "control")
+    }
+    for name, what, limit in (
+        ("deadline", "99 % of the latencies, us", STATED),
+        ("misses", "share of lost frames", 0.01),
+        ("faults", "faults that the device latched", STATED),
+        ("supervision", "frames with damping only", 0.0),
+    )
+)
+
+
+def loop_verdicts(
+    scope: str, report: MotionReport, latency: Percentiles | None, tick_us: int
+) -> tuple[Verdict, ...]:
+    """Judge how a loop ran; ``latency`` is in microseconds, None in virtual time."""
+    return (
+        _deadline(scope, latency, tick_us),
+        _complete(scope, report, tick_us),
+        _faultless(scope, report, tick_us),
+        _supervised(scope, report),
+    )
+
+
+def _deadline(scope: str, latency: Percentiles | None, tick_us: int) -> Verdict:
+    if latency is None:
+        why = "Virtual time has no latency."
+        return DEADLINE[scope].not_evaluated(why, threshold=float(tick_us))
+    why = f"99 % of the commands left within {latency.p99:.0f} us of their frame (tick {tick_us})."
+    remedy = f"{why} Run 'scissorcal device doctor' to find what is slow."
+    return DEADLINE[scope].judge(latency.p99, why, remedy, threshold=tick_us)
+
+
+def _complete(scope: str, report: MotionReport, tick_us: int) -> Verdict:
+    counters = report.counters
+    share = counters.misses / max(1, counters.frames + counters.misses)
+    why = f"{counters.misses} of {counters.frames + counters.misses} frames were lost."
+    remedy = (
+        f"{why} Check the cable and the baud rate; 'scissorcal device doctor' measures the port."
+    )
+    worst_us = report.interval.worst if report.interval else 0.0
+    if report.stalls and report.stalls * worst_us >= counters.misses * tick_us:
+        remedy = (
+            f"{why} The loop was without frames {report.stalls} times, for up to "
+            f"{1e-3 * worst_us:.0f} ms: this computer was held up by other work, and what was sent "
+            "meanwhile was lost, or the device paused. Close programs that load this computer."
+        )
+    return MISSES[scope].judge(share, why, remedy)
+
+
+def _faultless(scope: str, report: MotionReport, tick_us: int) -> Verdict:
+    """Whether the device braked by itself too often."""
+    counters = report.counters
+    allowed = 1.0 + MOST_FAULTS_PER_S * counters.frames * tick_us * 1e-6
+    why = f"The device latched a fault {counters.faults} times ({allowed:.3g} allowed)."
+    if counters.faults:
+        why += (
+            " After each the force was ramped up from zero. If nothing else caused them, commands "
+            "were too late: run 'scissorcal device doctor'."
+        )
+    return FAULTS[scope].judge(counters.faults, why, threshold=allowed)
+
+
+def _supervised(scope: str, report: MotionReport) -> Verdict:
+    count = report.counters.fallback_frames
+    never = "The supervising process never missed its heartbeat."
+    missed = (
+        f"{count} frames had damping only, because the supervising process missed its "
+        "heartbeat: close programs that load the processor."
+    )
+    return SUPERVISION[scope].judge(count, never, missed)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,8 +138,7 @@ def glide(distance: float, speed: float, acceleration: float, tick_s: float) -> 
     return np.sign(distance) * way, np.sign(distance) * rate
 
 
-@dataclass(frozen=True)
-class SwingLimits:
+class SwingLimits(NamedTuple):
     """Bounds of an excitation: amplitude (rad or m), rate and acceleration per s and s^2."""
 
     amplitude: float

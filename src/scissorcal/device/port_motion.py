@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from scissorcal.aliases import Array
-from scissorcal.device.link import PortLink, check_echo
-from scissorcal.device.motion import BLOCK_S, LoopTask, Motion, MotionReport, Samples, Stages
-from scissorcal.device.paths import Reference
+from scissorcal.device.link import Link, PortLink, check_echo
+from scissorcal.device.lockstep_motion import Exchanging, LockstepMotion
+from scissorcal.device.motion import BLOCK_S, IDLE, LoopTask, Motion, MotionReport, Samples, Stages
 from scissorcal.device.servo_process import ServoProcess
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.errors import DeviceError
@@ -17,10 +17,34 @@ from scissorcal.kernel import (
     Contour,
     LoopBlock,
     Mode,
-    Section,
     ServoConfig,
     StopReason,
 )
+
+
+def open_motion(
+    link: Link, config: ServoConfig, task: LoopTask = IDLE, every_s: float = BLOCK_S
+) -> Motion:
+    """Start the servo on a link: in a separate process on a port, in this process in virtual time.
+
+    Samples come in blocks of about ``every_s``. It starts idle, with the rig's position known. A
+    fault that the device has latched is cleared.
+
+    >>> import numpy as np
+    >>> from scissorcal.device.lockstep import LockstepLink
+    >>> link = LockstepLink("office-paper", np.random.default_rng(1))
+    >>> limits = ServoConfig(torque_limit=1, torque_slew=200, force_limit=0, force_slew=0)
+    >>> with open_motion(link, limits) as motion:
+    ...     samples = np.concatenate(list(motion.idle(0.2)))
+    >>> len(samples), bool(samples["torque_command"].any())
+    (200, False)
+    """
+    if isinstance(link, Exchanging):
+        return LockstepMotion(link, config, task, every_s)
+    if not isinstance(link, PortLink):
+        raise TypeError(f"A {type(link).__name__} is neither a port nor a lockstep link.")
+    return PortMotion(link, config, task, every_s)
+
 
 CONFIGURE_ATTEMPTS = 3
 IDLE_TIMEOUT_S = 2.0
@@ -44,7 +68,7 @@ class PortMotion(Motion):
     ) -> None:
         super().__init__(link.identity, every_s)
         self._link = link
-        self._block = LoopBlock.create(
+        self._servo = self._block = LoopBlock.create(
             config,
             task.tables,
             control=task.control,
@@ -69,14 +93,6 @@ class PortMotion(Motion):
         return self._process.pid
 
     @property
-    def mode(self) -> Mode:
-        return self._block.mode
-
-    @property
-    def track_index(self) -> int:
-        return self._block.track_index
-
-    @property
     def stop_reason(self) -> StopReason:
         """As the loop reports it, HANGUP where its process died."""
         if not self._process.alive and self._block.stop_reason is StopReason.NONE:
@@ -87,19 +103,8 @@ class PortMotion(Motion):
     def garbled(self) -> int:
         return self._block.line.garbled
 
-    def engage(self, mode: Mode) -> None:
-        self._block.engage(mode)
-
-    def set_reference(self, reference: Reference) -> None:
-        if self.mode in (Mode.TRACK, Mode.CONTROL):
-            self._go_idle()
-        self._block.set_reference(
-            reference.opening, reference.opening_rate, reference.advance, reference.stroke
-        )
-
     def set_path(self, place: Array, rate: Array, force: Array, stage: Stages) -> None:
-        if self.mode in (Mode.TRACK, Mode.CONTROL):
-            self._go_idle()
+        self._stop_following()
         self._block.set_path(place, rate, force, stage)
 
     def send_contour(self, contour: Contour) -> None:
@@ -107,12 +112,6 @@ class PortMotion(Motion):
 
     def control_samples(self) -> Samples:
         return self._block.control.read()
-
-    def fresh_sheet(self, crack: float = 0.0) -> None:
-        self._block.fresh_sheet(crack)
-
-    def place(self, section: Section, usable: bool, age_s: float) -> None:
-        self._block.place(section, usable, age_s)
 
     @property
     def now_s(self) -> float:
@@ -188,7 +187,6 @@ class PortMotion(Motion):
         return None
 
     def _go_idle(self) -> None:
-        """Switch the motors off and wait for the mode to change."""
         self.engage(Mode.IDLE)
         until = time.monotonic() + IDLE_TIMEOUT_S
         while self.mode is not Mode.IDLE:

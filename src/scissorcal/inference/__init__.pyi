@@ -19,11 +19,11 @@ from .posterior import Effort as Effort
 from .posterior import InferOptions as InferOptions
 from .posterior import Posterior as Posterior
 from .problem import Counter as Counter
+from .problem import NotFiniteError as NotFiniteError
 from .problem import Problem as Problem
+from .problem import SamplingStatus as SamplingStatus
+from .problem import SearchStatus as SearchStatus
 from .problem import Stop as Stop
-from .status import NotFiniteError as NotFiniteError
-from .status import SamplingStatus as SamplingStatus
-from .status import SearchStatus as SearchStatus
 
 __all__ = [
     "ArNoise",

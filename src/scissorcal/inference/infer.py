@@ -21,8 +21,16 @@ from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.nested import nested_mixture
 from scissorcal.inference.optimise import Optimum, find_optimum
 from scissorcal.inference.posterior import Effort, InferOptions, Posterior
-from scissorcal.inference.problem import Counter, Problem, TimeUsedUpError
-from scissorcal.inference.status import NotFiniteError, SamplingStatus, SearchStatus, about, picked
+from scissorcal.inference.problem import (
+    Counter,
+    NotFiniteError,
+    Problem,
+    SamplingStatus,
+    SearchStatus,
+    TimeUsedUpError,
+    about,
+    picked,
+)
 from scissorcal.inference.thorough import ENSEMBLES, Chains, fewest_evaluations, run_ensembles
 
 BUDGET = {"draft": 0, "standard": 200_000, "thorough": 2_000_000}
@@ -100,7 +108,30 @@ def infer(
         local = laplace(counter.over(problem, stop), shape, spread)
     beside = 0 if options.budget else FOLLOWING
     limits = replace(options, budget=options.budget or BUDGET[effort], progress=tell)
-    run = _Run(problem, local, proposal, counter, rng, count, limits, beside)
+    nothing = np.full(len(problem.names), np.nan)
+    start = Posterior(
+        names=problem.names,
+        optimum=best,
+        draws=np.zeros((0, len(nothing))),
+        covariance=local.covariance,
+        k_hat=float("nan"),
+        effective=float(count),
+        inflation=local.inflation,
+        null=local.null,
+        effort=effort,
+        effort_reached="draft",
+        status=SamplingStatus.APPROXIMATED,
+        sentence="",
+        evaluations=0,
+        r_hat=nothing,
+        tau=nothing,
+        ensembles=0,
+        acceptance=float("nan"),
+        log_posterior=laplace(problem, shape, spread).log_posterior,
+        noise_orders=worth.orders if worth else (),
+        dispersion=worth.dispersion if worth else 1.0,
+    )
+    run = _Run(problem, start, local, proposal, counter, rng, count, limits, beside)
     try:
         outcome = run.at(effort)
     except NotFiniteError as error:
@@ -108,28 +139,7 @@ def infer(
             raise
         raise NotFiniteError(f"{best.sentence} So nothing could be sampled: {error}") from None
     tell(1.0, outcome.sentence)
-    return Posterior(
-        names=problem.names,
-        optimum=best,
-        draws=outcome.draws,
-        covariance=local.covariance,
-        k_hat=outcome.k_hat,
-        effective=outcome.effective,
-        inflation=local.inflation,
-        null=local.null,
-        effort=effort,
-        effort_reached=outcome.reached,
-        status=outcome.status,
-        sentence=outcome.sentence,
-        evaluations=best.evaluations + counter.calls,
-        r_hat=outcome.r_hat,
-        tau=outcome.tau,
-        ensembles=outcome.ensembles,
-        acceptance=outcome.acceptance,
-        log_posterior=laplace(problem, shape, spread).log_posterior,
-        noise_orders=worth.orders if worth else (),
-        dispersion=worth.dispersion if worth else 1.0,
-    )
+    return replace(outcome, evaluations=best.evaluations + counter.calls)
 
 
 def _held(problem: Problem, best: Optimum, shape: Shape) -> Optimum:
@@ -190,24 +200,10 @@ def _following(
 
 
 @dataclass(frozen=True)
-class _Found:
-    """What one effort ended with."""
-
-    draws: Array
-    reached: Effort
-    status: SamplingStatus
-    sentence: str
-    effective: float
-    k_hat: float
-    r_hat: Array
-    tau: Array
-    ensembles: int = 0
-    acceptance: float = float("nan")
-
-
-@dataclass(frozen=True)
 class _Run:
     problem: Problem
+    start: Posterior
+    """The posterior without draws, as of the normal approximation."""
     local: Laplace
     proposal: Mixture
     counter: Counter
@@ -225,7 +221,7 @@ class _Run:
         if self.limits.progress:
             self.limits.progress(done, sentence)
 
-    def at(self, effort: Effort) -> _Found:
+    def at(self, effort: Effort) -> Posterior:
         try:
             if effort == "draft":
                 return self.draft()
@@ -235,7 +231,7 @@ class _Run:
         except TimeUsedUpError:
             return self.out_of_time()
 
-    def draft(self) -> _Found:
+    def draft(self) -> Posterior:
         draws = self.rng.multivariate_normal(
             self.local.centre, self.local.covariance, size=self.count, method="cholesky"
         )
@@ -244,15 +240,14 @@ class _Run:
         sentence = status.value
         if self.local.null:
             sentence += f" It concerns {'; '.join(self.local.null)}."
-        nothing = np.full(len(self.problem.names), np.nan)
-        return _Found(draws, "draft", status, sentence, float(self.count), np.nan, nothing, nothing)
+        return replace(self.start, draws=draws, status=status, sentence=sentence)
 
-    def out_of_time(self) -> _Found:
+    def out_of_time(self) -> Posterior:
         status = SamplingStatus.BUDGET_USED_UP
         sentence = f"{status.value} The time ended first: the draws are the normal approximation's."
         return replace(self.draft(), status=status, sentence=sentence)
 
-    def standard(self) -> _Found:
+    def standard(self) -> Posterior:
         self.tell(0.4, "sampling")
         proposal, first, escalate = self.proposal, self.counter.calls, self.limits.escalate
         many, beside = self.local.log_posteriors, self.beside
@@ -296,29 +291,27 @@ class _Run:
         self.tell(0.6, f"{said}: running ensembles")
         return self._walked(left(), sampled, f"Escalated from standard ({said}). ")
 
-    def thorough(self) -> _Found:
+    def thorough(self) -> Posterior:
         self.tell(0.4, "checking the approximation")
         many = self.local.log_posteriors
         sampled = sample_by_importance(many, self.proposal, self.count, self.rng, rounds=1)
         return self._walked(self.budget, sampled, "")
 
-    def _weighed(self, sampled: Sampled, said: str) -> _Found:
+    def _weighed(self, sampled: Sampled, said: str) -> Posterior:
         status = SamplingStatus.WEIGHED if sampled.trusted else SamplingStatus.HEAVY_WEIGHTS
         if not sampled.trusted and sampled.k_hat <= sampled.limit:
             status = SamplingStatus.TOO_FEW
-        nothing = np.full(len(self.problem.names), np.nan)
-        return _Found(
+        return replace(
+            self.start,
             draws=sampled.resample(self.count, self.rng),
-            reached="standard",
+            effort_reached="standard",
             status=status,
             sentence=f"{status.value} ({said}.)",
             effective=sampled.effective,
             k_hat=sampled.k_hat,
-            r_hat=nothing,
-            tau=nothing,
         )
 
-    def _walked(self, budget: int, sampled: Sampled, before: str) -> _Found:
+    def _walked(self, budget: int, sampled: Sampled, before: str) -> Posterior:
         limits = replace(
             self.limits,
             budget=budget,
@@ -328,9 +321,10 @@ class _Run:
         chains = run_ensembles(
             local.log_posterior, self.proposal, self.rng, limits, local.log_posteriors
         )
-        return _Found(
+        return replace(
+            self.start,
             draws=_thinned(chains, self.count, self.rng),
-            reached="thorough",
+            effort_reached="thorough",
             status=chains.status,
             sentence=before + _said(chains, self.problem.names),
             effective=chains.effective,

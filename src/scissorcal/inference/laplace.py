@@ -16,8 +16,7 @@ from scissorcal.inference.curvature import (
     slopes_at,
 )
 from scissorcal.inference.optimise import Optimum, move_optimum
-from scissorcal.inference.problem import Problem
-from scissorcal.inference.status import NotFiniteError, picked
+from scissorcal.inference.problem import NotFiniteError, Problem, picked
 
 RIDGE = 1e-3
 """Information, in units of the prior's, that keeps directions without data well defined."""

@@ -7,9 +7,16 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.inference.ascent import ascend
-from scissorcal.inference.problem import Counter, Problem, Stop
-from scissorcal.inference.squares import descend, has_squares
-from scissorcal.inference.status import NotFiniteError, SearchStatus, about, picked
+from scissorcal.inference.problem import (
+    Counter,
+    NotFiniteError,
+    Problem,
+    SearchStatus,
+    Stop,
+    about,
+    picked,
+)
+from scissorcal.inference.squares import Descent, descend, has_squares
 
 WORST = 1e300
 """Stands for a log-posterior of -inf: finite, because BOBYQA calls a NaN or an infinity solved."""
@@ -153,31 +160,21 @@ def move_optimum(optimum: Optimum, point: Array, value: float) -> Optimum:
     )
 
 
-@dataclass(frozen=True)
-class _Climb:
-    point: Array
-    value: float
-    gained: float
-    root: Array
-
-
-def _begin(problem: Problem, start: Array, stop: Stop | None) -> _Climb:
+def _begin(problem: Problem, start: Array, stop: Stop | None) -> Descent:
     point = np.clip(np.array(start, dtype=np.float64), problem.lower, problem.upper)
     value = problem.log_posterior(point)
     unknown = np.diag(problem.prior_sd)
     if not np.isfinite(value) or (stop is not None and stop()):
-        return _Climb(point, value, np.inf, unknown)
+        return Descent(point, value, np.inf, unknown)
     if has_squares(problem):
-        descent = descend(problem, point, stop)
-        return _Climb(descent.point, descent.value, descent.promised, descent.root)
+        return descend(problem, point, stop)
     if problem.smooth:
-        ascent = ascend(problem, point, _rounding, stop)
-        return _Climb(ascent.point, ascent.value, ascent.promised, ascent.root)
-    return _Climb(point, value, np.inf, _rounding(problem, point))
+        return ascend(problem, point, _rounding, stop)
+    return Descent(point, value, np.inf, _rounding(problem, point))
 
 
-def _climb(problem: Problem, climb: _Climb, rounds: int, stop: Stop | None) -> _Climb:
-    point, value, gained, root = climb.point, climb.value, climb.gained, climb.root
+def _climb(problem: Problem, climb: Descent, rounds: int, stop: Stop | None) -> Descent:
+    point, value, gained, root = climb.point, climb.value, climb.promised, climb.root
     for _ in range(rounds):
         if not np.isfinite(value) or gained < SETTLED or (stop is not None and stop()):
             break
@@ -185,10 +182,10 @@ def _climb(problem: Problem, climb: _Climb, rounds: int, stop: Stop | None) -> _
         gained, point, value = height - value, reached, height
         if gained >= SETTLED:
             root = _rounding(problem, point)
-    return _Climb(point, value, gained, root)
+    return Descent(point, value, gained, root)
 
 
-def _confirmed(problem: Problem, climb: _Climb, stop: Stop | None) -> tuple[_Climb, Array]:
+def _confirmed(problem: Problem, climb: Descent, stop: Stop | None) -> tuple[Descent, Array]:
     """Look beside an end along the axes of its covariance, and go on from what is higher there.
 
     Returns the end that was reached and what the log-posterior loses on both sides, (axes, 2).
@@ -202,21 +199,21 @@ def _confirmed(problem: Problem, climb: _Climb, stop: Stop | None) -> tuple[_Cli
         if higher is not None and not used_up:
             climb = _climb(problem, _begin(problem, higher, stop), ROUNDS, stop)
             continue
-        if used_up or climb.gained >= SETTLED:
+        if used_up or climb.promised >= SETTLED:
             break
         if has_squares(problem) or problem.smooth:
             if polished or _promised_from_afar(lost) < ROUGH:
                 break
             polished = True
-            rough = replace(climb, gained=np.inf, root=_rounding(problem, climb.point))
+            rough = replace(climb, promised=np.inf, root=_rounding(problem, climb.point))
             climb = _climb(problem, rough, ROUNDS, stop)
             continue
         again = _climb(problem, _begin(problem, _perturbed(problem, climb), stop), 1, stop)
         if again.value < climb.value + SETTLED:
             break
         climb = _climb(problem, again, ROUNDS, stop)
-        if climb.gained < SETTLED:
-            climb = replace(climb, gained=np.inf)
+        if climb.promised < SETTLED:
+            climb = replace(climb, promised=np.inf)
     return climb, lost
 
 
@@ -228,7 +225,7 @@ def _promised_from_afar(lost: Array) -> float:
     return float(0.5 * np.sum(slope**2 / curvature))
 
 
-def _perturbed(problem: Problem, climb: _Climb) -> Array:
+def _perturbed(problem: Problem, climb: Descent) -> Array:
     """A point half a standard deviation along every axis away, where it can be evaluated."""
     signs = np.where(np.arange(len(climb.point)) % 2 == 0, 1.0, -1.0)
     for share in (0.5, -0.5, 0.05, -0.05):
@@ -238,7 +235,7 @@ def _perturbed(problem: Problem, climb: _Climb) -> Array:
     return climb.point
 
 
-def _beside_axes(problem: Problem, climb: _Climb) -> tuple[Array, Array | None]:
+def _beside_axes(problem: Problem, climb: Descent) -> tuple[Array, Array | None]:
     """What is lost a standard deviation beside an end, (axes, 2), and the best point if higher.
 
     Where rounding hides a fall, farther away counts, up to ``FARTHEST_LOOK`` prior widths.
@@ -311,7 +308,7 @@ def _rounding(problem: Problem, point: Array) -> Array:
     return np.asarray(problem.prior_sd[:, None] * vectors / np.sqrt(values))
 
 
-def _clusters(problem: Problem, ended: list[_Climb]) -> tuple[Cluster, ...]:
+def _clusters(problem: Problem, ended: list[Descent]) -> tuple[Cluster, ...]:
     """Distinct optima, highest first."""
     clusters: list[Cluster] = []
     for climb in sorted(ended, key=lambda climb: -climb.value):
@@ -319,15 +316,15 @@ def _clusters(problem: Problem, ended: list[_Climb]) -> tuple[Cluster, ...]:
             continue
         for index, known in enumerate(clusters):
             if _same(problem, climb, known):
-                settled = known.settled or climb.gained < SETTLED
+                settled = known.settled or climb.promised < SETTLED
                 clusters[index] = replace(known, starts=known.starts + 1, settled=settled)
                 break
         else:
-            clusters.append(Cluster(climb.point, climb.value, 1, climb.gained < SETTLED))
+            clusters.append(Cluster(climb.point, climb.value, 1, climb.promised < SETTLED))
     return tuple(clusters)
 
 
-def _same(problem: Problem, climb: _Climb, known: Cluster) -> bool:
+def _same(problem: Problem, climb: Descent, known: Cluster) -> bool:
     """Whether two ends are near one another, or joined by a straight ridge without a dip."""
     away = climb.point - known.point
     if float(np.linalg.norm(np.linalg.solve(climb.root, away))) < 0.1:
@@ -339,7 +336,7 @@ def _same(problem: Problem, climb: _Climb, known: Cluster) -> bool:
 
 
 def _status(
-    problem: Problem, best: _Climb, lost: Array, stop: Stop | None
+    problem: Problem, best: Descent, lost: Array, stop: Stop | None
 ) -> tuple[SearchStatus, tuple[str, ...]]:
     """How the best ascent ended, and the names of the parameters that it concerns.
 
@@ -351,7 +348,7 @@ def _status(
     at_bound = np.minimum(best.point - problem.lower, problem.upper - best.point) < AT_BOUND * scale
     if np.any(at_bound):
         return SearchStatus.AT_BOUNDS, picked(problem.names, at_bound)
-    settled = best.gained < SETTLED and bool(np.all(lost > -SETTLED))
+    settled = best.promised < SETTLED and bool(np.all(lost > -SETTLED))
     if not settled and stop is not None and stop():
         return SearchStatus.TIME_USED_UP, ()
     width = np.sqrt(np.diag(best.root @ best.root.T))

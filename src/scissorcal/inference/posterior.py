@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 from scissorcal.aliases import Array, Progress
-from scissorcal.inference.optimise import Cluster, Optimum
-from scissorcal.inference.problem import Stop
-from scissorcal.inference.status import SamplingStatus
+from scissorcal.inference.optimise import Optimum
+from scissorcal.inference.problem import SamplingStatus, Stop
 
 Effort = Literal["draft", "standard", "thorough"]
 
@@ -68,8 +67,3 @@ class Posterior:
     log_posterior: Callable[[Array], float]
     noise_orders: tuple[int, ...] = ()
     dispersion: float = 1.0
-
-    @property
-    def optima(self) -> tuple[Cluster, ...]:
-        """Distinct optima that the search found, highest first."""
-        return self.optimum.optima

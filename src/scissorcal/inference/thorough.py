@@ -10,8 +10,7 @@ from scissorcal.aliases import Array
 from scissorcal.inference.checkpoint import RandomState, Walk, load_walks, save_walks
 from scissorcal.inference.mixture import Mixture
 from scissorcal.inference.posterior import InferOptions
-from scissorcal.inference.problem import TimeUsedUpError
-from scissorcal.inference.status import NotFiniteError, SamplingStatus
+from scissorcal.inference.problem import NotFiniteError, SamplingStatus, TimeUsedUpError
 
 ENSEMBLES = 4
 LONG = 100.0
@@ -67,14 +66,14 @@ class Chains:
     status: SamplingStatus
 
 
-def walkers_for(size: int) -> int:
+def _walkers_for(size: int) -> int:
     """Walkers of one ensemble over ``size`` parameters; even, and more than twice as many."""
     return max(16, 2 * size + 4)
 
 
 def fewest_evaluations(size: int) -> int:
     """Evaluations below which ensembles over ``size`` parameters come to no end that counts."""
-    return ENSEMBLES * walkers_for(size) * 6 * BLOCK
+    return ENSEMBLES * _walkers_for(size) * 6 * BLOCK
 
 
 def run_ensembles(
@@ -223,7 +222,7 @@ def _begin(
     log_posterior: Callable[[Array], float], proposal: Mixture, rng: np.random.Generator
 ) -> Walk:
     """Walkers spread as the proposal says, each where the posterior is finite."""
-    wanted = walkers_for(proposal.centres.shape[1])
+    wanted = _walkers_for(proposal.centres.shape[1])
     coords: list[Array] = []
     heights: list[float] = []
     for _ in range(50 * wanted):

@@ -18,12 +18,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.errors import needs_unix
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.control import ControlBlock, ControlConfig, path_arrays
+from scissorcal.kernel.control import (
+    ControlBlock,
+    ControlConfig,
+    Mode,
+    path_arrays,
+    reference_arrays,
+    refuse_change,
+    refuse_mode,
+)
 from scissorcal.kernel.layout import fill_struct
 from scissorcal.kernel.messages import ConfigEcho
-from scissorcal.kernel.modes import Mode, reference_arrays, refuse_change, refuse_mode
-from scissorcal.kernel.pieces import Piece, fill_pieces, refuse_pieces
-from scissorcal.kernel.plate import Section, placing
+from scissorcal.kernel.plate import Piece, Section, fill_pieces, placing, refuse_pieces
 from scissorcal.kernel.servo import SAMPLE_DTYPE, ServoConfig, ServoView
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import TABLE_NAMES, ModelTables, Table, fill_numbers

@@ -68,10 +68,10 @@ class State(NamedTuple):
     flags: int
     sequence: int
     device_us: int
-    opening: float
-    advance: float
-    motor_torque: float
-    handle_force: float
+    opening: float = 0.0
+    advance: float = 0.0
+    motor_torque: float = 0.0
+    handle_force: float = 0.0
 
 
 class Command(NamedTuple):

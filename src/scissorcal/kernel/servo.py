@@ -9,16 +9,37 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.kernel._kernel import ffi, lib
-from scissorcal.kernel.control import ControlConfig, ControlTask, control_sample
+from scissorcal.kernel.control import (
+    ControlConfig,
+    ControlTask,
+    Mode,
+    control_sample,
+    reference_arrays,
+    refuse_change,
+    refuse_mode,
+)
 from scissorcal.kernel.layout import dtype_of, fill_struct
 from scissorcal.kernel.messages import Command, State
-from scissorcal.kernel.modes import Mode, reference_arrays, refuse_change, refuse_mode
-from scissorcal.kernel.passivity import UNWATCHED_ENERGY, EnergyLedger, PassivityConfig
-from scissorcal.kernel.pieces import Piece, fill_pieces, refuse_pieces
-from scissorcal.kernel.plate import KNOWN_PLATE, PlateConfig, Section, placing
+from scissorcal.kernel.plate import (
+    KNOWN_PLATE,
+    Piece,
+    PlateConfig,
+    Section,
+    fill_pieces,
+    placing,
+    refuse_pieces,
+)
 from scissorcal.kernel.stop_reason import StopReason
 from scissorcal.kernel.tables import ModelTables, model_struct
-from scissorcal.kernel.watching import NO_WATCHES, LagCounts, WatchConfig, largest_seen
+from scissorcal.kernel.watching import (
+    NO_WATCHES,
+    UNWATCHED_ENERGY,
+    EnergyLedger,
+    LagCounts,
+    PassivityConfig,
+    WatchConfig,
+    largest_seen,
+)
 from scissorcal.kernel.wire import encode_frame
 
 SAMPLE_DTYPE = dtype_of("sc_sample")
@@ -312,10 +333,8 @@ class Servo(ServoView):
         of time passes with the first of them (or ``passed_us``), and slews and clearings of faults
         count by commands that are sent.
         """
-        c = self._state
-        c.flags, c.sequence, c.device_us = state.flags, state.sequence, state.device_us
-        c.opening, c.advance = state.opening, state.advance
-        c.motor_torque, c.handle_force = state.motor_torque, state.handle_force
+        for name, value in zip(State._fields, state, strict=True):
+            setattr(self._state, name, value)
         self._step(heartbeat, host_time_ns, answered, passed_us)
         command = self._command
         return Command(command.flags, command.echo_sequence, command.torque, command.force)

@@ -108,7 +108,7 @@ class Kernel:
         Raises ValueError for arguments that are not finite. NaN where a step would be
         StepFlag.INVALID: beyond half a turn, or where the edge leans back.
         """
-        inputs = float32_columns(opening, rate, contact)
+        inputs = _float32_columns(opening, rate, contact)
         if not all(np.isfinite(column).all() for column in inputs):
             raise ValueError("Torque is asked for at an opening, rate or contact not finite.")
         shape = np.broadcast_shapes(*(np.shape(a) for a in (opening, rate, contact)))
@@ -129,7 +129,7 @@ def step_many(
 
     ``stepped`` is what it takes first; the inputs broadcast to shape (N,).
     """
-    inputs = float32_columns(opening, rate, advance)
+    inputs = _float32_columns(opening, rate, advance)
     out = np.zeros(inputs[0].size, dtype=STEP_DTYPE)
     function(
         *stepped,
@@ -157,7 +157,7 @@ def step_output(out: Any) -> StepOutput:
     )
 
 
-def float32_columns(*arguments: ArrayLike) -> list[NDArray[np.float32]]:
+def _float32_columns(*arguments: ArrayLike) -> list[NDArray[np.float32]]:
     """Columns of one length, as the C core takes them, from arguments that broadcast."""
     with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinite and is refused
         arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float32) for a in arguments))

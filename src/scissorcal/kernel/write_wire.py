@@ -147,6 +147,8 @@ def _module(wire: Mapping[str, Any]) -> Iterator[str]:
         yield '    """\n\n'
         for field in fields:
             value = f" = {defaults[field['name']]}" if field["name"] in defaults else ""
+            if name == "STATE" and field["type"] == "f32":
+                value = " = 0.0"  # what a device does not measure
             kind = {"f": "float", "c": "str"}.get(field["type"][0], "int")
             yield f"    {field['name']}: {kind}{value}\n"
     classes = [_class_name(name) for name in wire["messages"]]

@@ -18,6 +18,7 @@ from .edge import EdgeView as EdgeView
 from .edge import draw_edges as draw_edges
 from .edge import edge_height as edge_height
 from .edge_points import edge_through as edge_through
+from .friction import AxisLaw as AxisLaw
 from .friction import FrictionLaw as FrictionLaw
 from .friction import angle_factor as angle_factor
 from .friction import friction_level as friction_level
@@ -27,7 +28,6 @@ from .friction_terms import CANDIDATES as CANDIDATES
 from .friction_terms import TERMS as TERMS
 from .friction_terms import law_names as law_names
 from .friction_terms import terms_of as terms_of
-from .mechanism import AxisLaw as AxisLaw
 from .plate_pieces import Layer as Layer
 from .plate_pieces import Outline as Outline
 from .plate_pieces import spans_on_line as spans_on_line
@@ -37,11 +37,13 @@ from .surface.protocol import Cylinder as Cylinder
 from .surface.protocol import Plane as Plane
 from .surface.protocol import Sphere as Sphere
 from .surface.protocol import Surface as Surface
-from .transforms import IDENTITY as IDENTITY
-from .transforms import LOG as LOG
-from .transforms import LOGIT as LOGIT
+from .terms import IDENTITY as IDENTITY
+from .terms import LOG as LOG
+from .terms import LOGIT as LOGIT
 
 __all__ = [
+    "AxisLaw",
+    "BladePoint",
     "Cutting",
     "Edge",
     "EdgeDistribution",

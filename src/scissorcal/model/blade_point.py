@@ -21,9 +21,9 @@ class BladePoint:
     across it; ``moving_blades`` m is 1 or 2. The blade's tip is the station of the blade's length
     (:meth:`on_edge`).
 
-    ``q`` and ``rates`` are (..., 2), in rad and m, rad/s and m/s. Complex values pass through, for
-    derivatives by a complex step (doi:10.1137/S003614459631241X). ModelError for a number of moving
-    blades other than 1 or 2, and for a place that is not finite.
+    ``q`` is (..., 2), in rad and m. Complex values pass through, for derivatives by a complex step
+    (doi:10.1137/S003614459631241X). ModelError for a number of moving blades other than 1 or 2, and
+    for a place that is not finite.
 
     >>> tip = BladePoint(station_m=0.07, offset_m=-0.008, moving_blades=1)
     >>> tip.place([0.0, -0.06])
@@ -63,19 +63,6 @@ class BladePoint:
         zero, one = np.zeros_like(up), np.ones_like(up)
         rows = [[-up / self.moving_blades, one], [along / self.moving_blades, zero], [zero, zero]]
         return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-    def velocity(self, q: ArrayLike, rates: ArrayLike) -> Array:
-        """Velocity J qd in m/s, shape (..., 3)."""
-        return np.asarray(np.einsum("...ij,...j->...i", self.jacobian(q), np.asarray(rates)))
-
-    def acceleration_bias(self, q: ArrayLike, rates: ArrayLike) -> Array:
-        """Acceleration Jdot qd in m/s^2 of the point while no axis accelerates, shape (..., 3).
-
-        The centripetal one towards the pivot, -(theta_dot / m)^2 (x - x_n, y, 0).
-        """
-        along, up = self._from_pivot(q)
-        pull = -((np.asarray(rates)[..., 0] / self.moving_blades) ** 2)
-        return np.stack([pull * along, pull * up, np.zeros_like(pull * up)], axis=-1)
 
     def _from_pivot(self, q: ArrayLike) -> tuple[Array, Array]:
         """The point seen from the pivot: along the cut and up, in metres."""

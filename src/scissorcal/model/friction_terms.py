@@ -9,16 +9,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Container
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from scissorcal.model.terms import Motion, Prior, Role, Term
-from scissorcal.model.transforms import LOG, LOGIT
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from scissorcal.model.terms import LOG, LOGIT, Motion, Prior, Role, Term
 
 
 def _of_speed(motion: Motion, scale: Any) -> Any:

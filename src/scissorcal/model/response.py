@@ -54,7 +54,7 @@ class LogSpline:
         above = last * t * t + 2.0 * n * mix + first * (1.0 - t) ** 2
         return np.asarray(n * n * above / (below * below))
 
-    def derivative_bounds(self, low: Array, high: Array) -> tuple[Bounds, Bounds]:
+    def _derivative_bounds(self, low: Array, high: Array) -> tuple[Bounds, Bounds]:
         """Bounds of dy/dv and of d2y/dv2 over [low, high], which have no knot inside.
 
         Between knots dy/dv = n^2 u / b^2 and d2y/dv2 = n^2 (u' b - 2 u b') / (b^3 width), where u
@@ -288,7 +288,7 @@ class Response:
 
     def log_bounds(self, low: Array, high: Array) -> tuple[Bounds, Bounds]:
         """Bounds of y' and y'' of a spline between logarithms, see :class:`LogSpline`."""
-        return self._spline.derivative_bounds(low, high)
+        return self._spline._derivative_bounds(low, high)
 
     @cached_property
     def _spline(self) -> LogSpline:

@@ -14,7 +14,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult
 from scissorcal.calibration.friction.layout import at_typical
-from scissorcal.calibration.result import FittedParameter
+from scissorcal.calibration.parameters import FittedParameter
 from scissorcal.package.friction_tables import LOAD_SHARE, share_of
 
 GROWING = ("response_force", "fracture_energy")

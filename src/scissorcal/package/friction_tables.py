@@ -8,7 +8,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult
-from scissorcal.calibration.result import FittedParameter
+from scissorcal.calibration.parameters import FittedParameter
 from scissorcal.errors import InputError
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.curvature import cubic_curvature, level_curvature

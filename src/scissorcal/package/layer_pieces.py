@@ -28,7 +28,7 @@ class StripRecord(Section):
 
 
 class PieceRecord(Section):
-    """A stretch of material without a gap: see :mod:`scissorcal.kernel.pieces`."""
+    """A stretch of material without a gap: see :mod:`scissorcal.kernel.plate`."""
 
     begin_m: Finite
     upper_face_m: Positive

@@ -8,8 +8,7 @@ import re
 from functools import cache
 from pathlib import Path
 
-from scissorcal.kernel.browser_file import browser_file
-from scissorcal.kernel.web_module import web_module
+from scissorcal.kernel.web_module import browser_file, web_module
 from scissorcal.prototype.scene import Scene
 
 TEMPLATE = Path(__file__).parent / "built" / "page.html"

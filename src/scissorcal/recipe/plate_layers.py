@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 MOST_PIECES = 16
 MOST_STRIPS = 64
-"""What the kernel holds: see :mod:`scissorcal.kernel.pieces`."""
+"""What the kernel holds: see :mod:`scissorcal.kernel.plate`."""
 
 MOST_CORNERS = 2000
 """Of all outlines that are written in a recipe; a larger drawing is a file."""

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from scissorcal.model.friction_terms import ADOPTED, PARAMETERS, ZERO
-from scissorcal.model.terms import JointKind, Prior, Term
-from scissorcal.model.transforms import IDENTITY, LOG, LOGIT, Transform
+from scissorcal.model.terms import IDENTITY, LOG, LOGIT, JointKind, Prior, Term, Transform
 
 
 class Section(BaseModel):

@@ -22,17 +22,9 @@ from scissorcal.render.admission_rule import (
     damping_share,
     friction_width,
 )
-from scissorcal.render.admission_sentences import (
-    cost_sentences,
-    damping_sentences,
-    need_sentences,
-    nothing_allowed,
-    too_stiff,
-)
-from scissorcal.render.cures import stated_cures
-from scissorcal.render.derating import Needs, derate, limited, needs_on
+from scissorcal.render.derating import LEAST_FACTOR, Needs, derate, limited, needs_on
 from scissorcal.render.felt_cost import FeltTorque, felt_rates
-from scissorcal.render.felt_cures import Asked, felt_cures
+from scissorcal.render.felt_cures import Asked, felt_cures, stated_cures
 from scissorcal.render.rig_facts import RigFacts, loop_facts, rig_facts
 
 ENERGY_RATE = 0.75
@@ -124,16 +116,17 @@ def admit(
     softest response is too stiff.
     """
     needs = needs_on(tables, asked.limit_Nm, pieces)
+    unchecked = _unchecked(needs, asked, bool(pieces))
     if facts is None:
-        return _unchecked(needs, asked, is_drawn=bool(pieces))
+        return unchecked
     rate, hand = max(asked.fastest, OSCILLATION_RATE), asked.hand_damping
     alone, held = (allowed_stiffness(facts, damping, rate) for damping in (0.0, hand))
     cures = stated_cures(facts, hand, rate, needs.stiffness)
     if not held > 0.0:
-        raise InputError(nothing_allowed(facts, cures))
+        raise InputError(_nothing_allowed(facts, cures))
     derated = derate(tables, needs.stiffness, held, asked.limit_Nm, pieces)
     if derated.is_refused(needs.stiffness, held):
-        raise InputError(too_stiff(needs, held, cures))
+        raise InputError(_too_stiff(needs, held, cures))
     steepest = derated.steepest_N_per_m
     damping = damping_share(needs.damper, facts)
     width = friction_width(needs.friction_Nm, facts, held)
@@ -143,28 +136,21 @@ def admit(
         torque = FeltTorque(tables, asked.limit_Nm, rates, plate)
         felt.append(torque.change(rendered, width))
     beyond = felt[0] > asked.tolerance
-    return Admission(
+    return replace(
+        unchecked,
         facts=facts,
-        hand_damping_Nm_s_per_rad=hand,
         allowed_alone=alone,
         allowed_in_hand=held,
-        needed=needs.stiffness,
-        needed_found=needs.found,
-        needed_at=(needs.opening, needs.contact),
         rendered=derated.stiffness,
-        drop_Nm=needs.drop_Nm,
         steepest_N_per_m=steepest,
         felt_share=felt[0],
         felt_sheet_share=felt[-1],
-        is_drawn=bool(pieces),
         damping_share=damping,
         friction_width_rad=width,
-        tolerance=asked.tolerance,
-        sources=(),
         reasons=(
-            *need_sentences(needs, facts, (alone, held), is_drawn=bool(pieces)),
-            *cost_sentences(needs, derated.stiffness, felt, is_drawn=bool(pieces)),
-            *damping_sentences(needs, damping),
+            *_need_sentences(needs, facts, (alone, held), is_drawn=bool(pieces)),
+            *_cost_sentences(needs, derated.stiffness, felt, is_drawn=bool(pieces)),
+            *_damping_sentences(needs, damping),
         ),
         cures=() if steepest is None else cures,
         felt_cures=felt_cures(tables, facts, asked, needs, pieces) if beyond else (),
@@ -219,7 +205,8 @@ def _asked(package: ModelPackage, limit: float) -> Asked:
     )
 
 
-def _unchecked(needs: Needs, asked: Asked, *, is_drawn: bool) -> Admission:
+def _unchecked(needs: Needs, asked: Asked, is_drawn: bool) -> Admission:
+    """What holds of a rig of which nothing is known; `admit` adds what it checks."""
     return Admission(
         facts=None,
         hand_damping_Nm_s_per_rad=asked.hand_damping,
@@ -245,3 +232,69 @@ def _unchecked(needs: Needs, asked: Asked, *, is_drawn: bool) -> Admission:
         cures=("Run 'scissorcal device probe', or fit friction.",),
         felt_cures=(),
     )
+
+
+def _need_sentences(
+    needs: Needs, facts: LoopFacts, allowed: tuple[float, float], *, is_drawn: bool
+) -> tuple[str, ...]:
+    """What the package needs, and what the rig renders alone and in a hand."""
+    place = f"{math.degrees(needs.opening):.0f} deg, contact {needs.contact * 1e3:.0f} mm"
+    known = f"at {place}"
+    if is_drawn:
+        known += f"; a bound over the scene's openings, {needs.found:.3g} are found in strokes"
+    return (
+        f"The package needs up to {needs.stiffness:.3g} N m/rad ({known}); this rig renders "
+        f"{allowed[0]:.2g} N m/rad stably alone and {allowed[1]:.2g} N m/rad in a hand, at "
+        f"{facts.delay_s * 1e3:.2g} ms of delay.",
+    )
+
+
+def _cost_sentences(
+    needs: Needs, left: float, felt: Sequence[float], *, is_drawn: bool
+) -> tuple[str, ...]:
+    """What derating costs; nothing where all is rendered.
+
+    ``felt`` are the changes of felt torque, of what is cut first and of the uniform sheet last.
+    """
+    if left == needs.stiffness:
+        return ()
+    begun = f"The steepest elastic slope is rendered at {left / needs.stiffness:.0%}, which changes"
+    kept = "the fracture energy is unchanged."
+    if not is_drawn:
+        said = f"the felt torque of strokes through the uniform sheet by {felt[0]:.1%}"
+        return (f"{begun} {said}; {kept}",)
+    return (
+        f"{begun} the felt torque of strokes through the drawn plate by {felt[0]:.1%}, of those "
+        f"through a uniform sheet by {felt[-1]:.1%}: ends of pieces and of stretches of another "
+        f"toughness are felt at smaller openings; {kept}",
+    )
+
+
+def _damping_sentences(needs: Needs, share: float) -> tuple[str, ...]:
+    """How much of the material's damping is rendered; nothing where all is."""
+    if share == 1.0:
+        return ()
+    return (
+        f"The material's damping of up to {needs.damper * 1e3:.2g} mN m s/rad is rendered at "
+        f"{share:.0%}, as the rate is known too late for more.",
+    )
+
+
+def _too_stiff(needs: Needs, held: float, cures: Sequence[str]) -> str:
+    """The refusal of what even the softest response does not make stable."""
+    return (
+        f"This rig cannot render the package stably: {needs.stiffness:.3g} N m/rad are needed "
+        f"and {held:.2g} N m/rad allowed in a hand, which would leave less than "
+        f"{LEAST_FACTOR:.0%} of the elastic slope. What would cure it: {' '.join(cures)}"
+    )
+
+
+def _nothing_allowed(facts: LoopFacts, cures: Sequence[str]) -> str:
+    """The refusal where no dry friction is known for sure."""
+    known = f"known to be at least {facts.coulomb_Nm * 1e3:.2g} mN m"
+    again = "Capture friction again, for longer, so that its lower end is above 0. "
+    return (
+        f"This rig cannot render the package stably: its dry friction is {known}, and without any "
+        "the blades find no rest between two counts of the encoder, however soft the material. "
+        f"What would cure it: {again}{' '.join(cures)}"
+    ).rstrip()

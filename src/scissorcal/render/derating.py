@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -87,8 +88,7 @@ def needs_of(tables: ModelTables, torque_limit: float) -> Needs:
     )
 
 
-@dataclass(frozen=True)
-class _Place:
+class _Place(NamedTuple):
     """A fresh sheet pressed at ``contact``, and what the step gave there."""
 
     opening: float
@@ -159,14 +159,13 @@ def needs_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece]) 
     friction = _friction(tables)
     slopes = LayerSlopes(tables, torque_limit + friction, pieces)
     steepest = slopes.bound("opening")
-    damper = slopes.bound("rate").value if tables.rate_damping > 0.0 else 0.0
     found = _found_on(tables, torque_limit, pieces)
     return Needs(
         stiffness=max(steepest.value, found),
         opening=steepest.opening,
         contact=steepest.contact,
         drop_Nm=largest_drop(tables, torque_limit, pieces),
-        damper=damper,
+        damper=slopes.bound("rate").value if tables.rate_damping > 0.0 else 0.0,
         friction_Nm=friction,
         found=found,
     )
@@ -196,8 +195,7 @@ def _found_on(tables: ModelTables, torque_limit: float, pieces: Sequence[Piece])
     return found
 
 
-@dataclass(frozen=True)
-class Derated:
+class Derated(NamedTuple):
     """To which slope (N/m) the response is limited, None where it is not, and what is left of the
     package's stiffness (N m/rad)."""
 

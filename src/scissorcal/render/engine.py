@@ -3,12 +3,11 @@
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
-from scissorcal.device.loading import Confirm, is_simulator
 from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, LoopTask, Motion
-from scissorcal.device.open_motion import open_motion
-from scissorcal.device.rig_record import rig_facts
-from scissorcal.device.session import RigSession
+from scissorcal.device.port_motion import open_motion
+from scissorcal.device.session import Confirm, RigSession, is_simulator, refuse_nobody, rig_facts
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, PlateConfig, ServoConfig
@@ -23,16 +22,16 @@ from scissorcal.render.admission import (
     rendered_tables,
 )
 from scissorcal.render.admission_rule import RATE_CUTOFF_HZ
-from scissorcal.render.mismatch import find_mismatch, refuse_other_rig
 from scissorcal.render.pose_placer import EVERY_S, PosePlacer, plate_config, pose_placer
 from scissorcal.render.result import (
+    LOOK_EVERY_S,
     AppliedLimits,
     RenderResult,
+    Watch,
     felt_verdict,
     render_verdicts,
 )
-from scissorcal.render.rig_facts import RigFacts
-from scissorcal.render.watch import LOOK_EVERY_S, Watch
+from scissorcal.render.rig_facts import RigFacts, find_mismatch, refuse_other_rig
 from scissorcal.tracking.plate_pose import PoseSource
 
 SUPERVISOR_S = 0.2
@@ -133,7 +132,7 @@ def render(
     watch = Watch(_travel(package), writer, operator.progress, how.seconds)
     task = LoopTask(tables, package.pieces or None)
     every_s = EVERY_S if follower else BLOCK_S
-    with open_motion(session.link, config, task, every_s=every_s) as motion:
+    with open_motion(session.link, config, task, every_s) as motion:
         watch.wanted = _prepare(motion, how.strokes, operator.confirm)
         motion.fresh_sheet(0.0)
         with follower or nullcontext():
@@ -154,8 +153,7 @@ def render(
     return result
 
 
-@dataclass(frozen=True)
-class _Start:
+class _Start(NamedTuple):
     """What is known before any force: limits, admission, whether it is accepted, warnings."""
 
     limits: AppliedLimits
@@ -170,11 +168,11 @@ def _judged(
     """Compare the package with the rig; InputError where it cannot be rendered there."""
     identity = session.identity
     limits = _applied(package, session.recipe.limits, identity)
-    mismatch = find_mismatch(package, identity)
+    other_rig, notes = find_mismatch(package, identity)
     if not how.allow_mismatch:
         refuse_other_rig(package, identity)
     admission = admit_package(package, identity, rig, limits.torque_Nm)
-    warnings = package.warnings + mismatch.other_rig + mismatch.notes + _admitted(admission)
+    warnings = package.warnings + other_rig + notes + _admitted(admission)
     return _Start(limits, admission, how.accept_derated and admission.is_felt, warnings)
 
 
@@ -186,17 +184,15 @@ def _result(
     follower: PosePlacer | None,
 ) -> RenderResult:
     """Figures of a rendering that has ended."""
-    report, admission, accepted = motion.report(), start.admission, start.accepted
+    report, tick_us = motion.report(), motion.identity.tick_us
     out_s = report.counters.plate_out_frames * motion.tick_s
-    seconds = watch.frames * motion.tick_s
-    plate = follower.report(seconds, out_s) if follower else None
-    latency = watch.latency
+    plate = follower.report(watch.frames * motion.tick_s, out_s) if follower else None
     limited = watch.limited / max(1, watch.frames)
     return RenderResult(
-        seconds=seconds,
+        seconds=watch.frames * motion.tick_s,
         frames=report.counters.frames,
         strokes=watch.strokes,
-        latency=latency,
+        latency=watch.latency,
         interval=report.interval,
         lag=report.lag,
         rights=report.rights,
@@ -211,12 +207,12 @@ def _result(
         largest_torque_Nm=watch.largest_torque,
         ledger=report.ledger,
         limits=start.limits,
-        admission=admission,
-        accepted_derated=accepted,
+        admission=start.admission,
+        accepted_derated=start.accepted,
         plate=plate,
         package_hash=package.manifest.content_hash,
         verdicts=render_verdicts(
-            report, latency, motion.identity.tick_us, admission, plate, accepted=accepted
+            report, watch.latency, tick_us, start.admission, plate, accepted=start.accepted
         ),
         warnings=start.warnings
         + _limited_warning(limited, start.limits)
@@ -252,11 +248,8 @@ def _refuse_impossible(session: RigSession, seconds: float) -> None:
         raise InputError(
             f"Rendering for {seconds:g} s is not possible: give a finite time above 0."
         )
-    if not session.simulated and session.operator.confirm is None:
-        raise InputError(
-            "Rendering must ask a person to clear the blades first: pass a confirm callback that "
-            "shows a sentence and returns when that is done."
-        )
+    why = "Rendering must ask a person to clear the blades first"
+    refuse_nobody(session.identity, session.operator.confirm, why)
 
 
 def _applied(package: ModelPackage, recipe: Limits, identity: Identity) -> AppliedLimits:

@@ -90,14 +90,6 @@ def felt_rates(tables: ModelTables, slowest: float, fastest: float) -> tuple[flo
     return tuple(float(rate) for rate in np.geomspace(low, high, 3))
 
 
-def felt_change(
-    tables: ModelTables, other: ModelTables, torque_limit: float, pieces: Sequence[Piece] = ()
-) -> float:
-    """`FeltTorque.change` at rest and without friction: what a softer response alone costs."""
-    quiet, soft = (replace(each, render_friction=False) for each in (tables, other))
-    return FeltTorque(quiet, torque_limit, pieces=pieces).change(soft)
-
-
 def _built_up(tables: ModelTables, opening: Array, rate: float, width: float) -> Array:
     """Friction (N m) of blades that opened before: it turns round over twice the width."""
     stretch = np.maximum(width - (opening[0] - opening), -width) / width

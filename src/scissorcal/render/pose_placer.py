@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -14,9 +14,19 @@ from scissorcal.kernel import ModelTables, PlateConfig, Section
 from scissorcal.package import ModelPackage
 from scissorcal.package.manifest import PoseRecord
 from scissorcal.recording import RecordingWriter
-from scissorcal.render import pose_sentences as sentences
-from scissorcal.render.pose_section import PoseSection, pose_section
-from scissorcal.render.pose_torque import PoseTorque, TorqueSpread
+from scissorcal.render.pose_section import (
+    ACROSS,
+    NONE_YET,
+    PoseSection,
+    PoseTorque,
+    TorqueSpread,
+    beside_sentence,
+    late_sentence,
+    leapt_sentence,
+    lost_sentence,
+    pose_section,
+    uncertain_sentence,
+)
 from scissorcal.tracking.plate_pose import PlatePose, PoseSource, fixed_pose
 
 EVERY_S = 0.01
@@ -135,8 +145,7 @@ class PoseReport:
         )
 
 
-@dataclass(frozen=True)
-class _Judged:
+class _Judged(NamedTuple):
     """A section and, where it is not used, the kind of reason and a sentence."""
 
     placed: PoseSection | None
@@ -196,7 +205,7 @@ class PosePlacer:
         age = now - estimate.time
         judged = self._judge(estimate)
         if not judged.kind and age > STALE_S:
-            judged = replace(judged, kind="late", sentence=sentences.late(age))
+            judged = judged._replace(kind="late", sentence=late_sentence(age))
         section = judged.placed.section if judged.placed else Section(0.0, 0.0)
         motion.place(section, not judged.kind, age)
         if judged.placed and self._record:
@@ -229,20 +238,20 @@ class PosePlacer:
 
     def _judge(self, estimate: PlatePose) -> _Judged:
         if not estimate.tracked:
-            return _Judged(None, "lost", sentences.lost(estimate.why))
+            return _Judged(None, "lost", lost_sentence(estimate.why))
         upper, blades = self._tables.upper_face, self._tables.moving_blades
         placed = pose_section(estimate.rotation, estimate.translation, upper, blades)
         if placed is None or not placed.section.is_sound(blades):
-            return _Judged(None, "unreachable", sentences.ACROSS)
+            return _Judged(None, "unreachable", ACROSS)
         height = self._height(placed)
         if abs(placed.pitch_rad) > self._most_pitch or abs(height) > MOST_HEIGHT_M:
             limits = (MOST_HEIGHT_M, MOST_PITCH_RAD)
-            far = sentences.beside(height, placed.pitch_rad, *limits)
+            far = beside_sentence(height, placed.pitch_rad, *limits)
             return _Judged(placed, "unreachable", far)
         covariance = placed.slopes @ np.asarray(estimate.covariance) @ placed.slopes.T
         by_m = self._leaps.take(estimate.time, placed.section, covariance)
         if by_m is not None:
-            return _Judged(placed, "leapt", sentences.leapt(by_m))
+            return _Judged(placed, "leapt", leapt_sentence(by_m))
         spread = self._torque.spread(placed.section, covariance, *self._state)
         allowed = self._tolerance * (BACK_SHARE if self._kind == "uncertain" else 1.0)
         if not spread.half_width <= allowed:
@@ -255,7 +264,7 @@ class PosePlacer:
             return self._warnings["uncertain"]
         worst = self._torque.largest_share(placed.section, covariance, *self._state)
         allowed = (self._confidence, self._tolerance)
-        return sentences.uncertain(covariance, spread.half_width, worst, *allowed)
+        return uncertain_sentence(covariance, spread.half_width, worst, *allowed)
 
     @property
     def _most_pitch(self) -> float:
@@ -272,9 +281,9 @@ class PosePlacer:
     def _notice_silence(self, now: float) -> None:
         if self._time == -math.inf:
             if now - self._begun_s > STALE_S:
-                self._become("none yet", sentences.NONE_YET, now)
+                self._become("none yet", NONE_YET, now)
         elif now - self._time > STALE_S:
-            self._become("late", sentences.late(now - self._time), now)
+            self._become("late", late_sentence(now - self._time), now)
 
     def _become(self, kind: str, sentence: str, now: float) -> None:
         """Count a change of state; the sentence of each kind is kept once."""

@@ -1,19 +1,22 @@
 """The section of a plate in space with the rig's plane, in which the blades meet."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import fields, replace
+from statistics import NormalDist
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from scissorcal.aliases import Array
-from scissorcal.kernel import Section
+from scissorcal.kernel import Kernel, ModelTables, PlacedModel, Section
+from scissorcal.package.grid import FELT_SHARE
 
 STEEPEST_RAD = np.radians(45.0)
 """Beyond, between the plate's axes and the rig's, a plate is not one that the blades can cut."""
 
 
-@dataclass(frozen=True, eq=False)
-class PoseSection:
+class PoseSection(NamedTuple):
     """What of a plate's pose reaches the torque.
 
     ``section`` is what the kernel takes. ``slopes`` (5, 6) are its numbers' derivatives by a
@@ -154,3 +157,167 @@ def _cross(axis: Array) -> Array:
     """Slopes (3, 3) of an axis by a rotation vector in the outer frame: d(axis) = d(phi) x axis."""
     x, y, z = axis
     return np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+
+
+OPENINGS, CONTACTS = 24, 12
+
+
+class TorqueSpread(NamedTuple):
+    """What the pose's uncertainty does to the torque at one state of the rig.
+
+    ``torque_Nm`` is the package's there, ``sd_Nm`` its standard deviation by the pose.
+    ``half_width`` is half of the interval at the scene's confidence over the torque, or over 5 % of
+    the scene's largest where that is more.
+    """
+
+    torque_Nm: float
+    sd_Nm: float
+    half_width: float
+
+
+class PoseTorque:
+    """The torque of a package as its plate's section has it.
+
+    Where the scene cuts it is that of a running crack at the opening: a place of the near edge that
+    is wrong by a constant moves crack and plate alike and leaves it as it is. Where the scene
+    presses, it is that of the pressed edge. ``limit_Nm`` is the torque limit of the rendering.
+    """
+
+    def __init__(self, tables: ModelTables, confidence: float, limit_Nm: float) -> None:
+        self._tables = tables
+        self._placed = PlacedModel(tables)
+        self._widths = NormalDist().inv_cdf(0.5 + 0.5 * confidence)
+        self._limit = limit_Nm
+        self._least = FELT_SHARE * _largest(tables, limit_Nm)
+
+    def spread(
+        self, section: Section, covariance: Array, opening: float, advance: float
+    ) -> TorqueSpread:
+        """The spread of torque by ``covariance`` (5, 5) of the section's numbers.
+
+        One standard deviation either way along each principal axis, so that bends within the
+        uncertainty count; infinite where the torque is not defined that near. ``opening`` (rad) is
+        taken within the scene's range.
+        """
+        theta = float(np.clip(opening, self._tables.opening_min, self._tables.opening_max))
+        middle = _numbers(section)
+        torque = self._torque(middle, theta, advance)
+        if not np.all(np.isfinite(covariance)):
+            return TorqueSpread(torque, np.inf, np.inf)
+        changes = self._changes(middle, _principal(covariance), theta, advance)
+        sd = float(np.sqrt(np.sum(np.square(changes))))
+        sd = sd if np.isfinite(sd) and np.isfinite(torque) else np.inf
+        size = max(abs(torque), self._least) if np.isfinite(torque) else self._least
+        width = self._widths * sd / size if size > 0.0 else (0.0 if sd == 0.0 else np.inf)
+        return TorqueSpread(torque, sd, width)
+
+    def largest_share(
+        self, section: Section, covariance: Array, opening: float, advance: float
+    ) -> int:
+        """Which of the section's numbers would spread the torque most by its own uncertainty."""
+        theta = float(np.clip(opening, self._tables.opening_min, self._tables.opening_max))
+        alone = np.diag(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+        changes = np.abs(self._changes(_numbers(section), alone, theta, advance))
+        return int(np.argmax(np.where(np.isfinite(changes), changes, np.inf)))
+
+    def _changes(self, middle: Array, ways: Array, opening: float, advance: float) -> Array:
+        """Half of the torque's change from one side of the middle to the other, (n,)."""
+        return np.array(
+            [
+                0.5
+                * (
+                    self._torque(middle + way, opening, advance)
+                    - self._torque(middle - way, opening, advance)
+                )
+                for way in ways
+            ]
+        )
+
+    def _torque(self, numbers: Array, opening: float, advance: float) -> float:
+        torque = self._placed.torque(Section(*numbers.tolist()), opening, advance, 0.0)
+        return min(max(torque, -self._limit), self._limit)  # not a number stays one
+
+
+def _largest(tables: ModelTables, limit_Nm: float) -> float:
+    """Largest torque of the material over the scene, within the limit."""
+    openings = np.linspace(tables.opening_min, tables.opening_max, OPENINGS)[:, None]
+    contacts = np.linspace(tables.contact_min, tables.contact_max, CONTACTS)[None]
+    torque = Kernel(replace(tables, render_friction=False)).torque(openings, 0.0, contacts)
+    return float(np.nanmax(np.minimum(np.abs(torque), limit_Nm), initial=0.0))
+
+
+def _numbers(section: Section) -> Array:
+    return np.array([getattr(section, field.name) for field in fields(Section)])
+
+
+def _principal(covariance: Array) -> Array:
+    """Rows: one standard deviation along each principal axis, in units of each number's own sd."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    unit = np.where(sd > 0.0, sd, 1.0)
+    values, axes = np.linalg.eigh(covariance / np.outer(unit, unit))
+    ways: Array = (axes * np.sqrt(np.maximum(values, 0.0))).T * unit
+    return ways[np.any(ways != 0.0, axis=1)]
+
+
+ACROSS = (
+    "The plate stands across the blades (more than 45 degrees from where it can be cut). Turn it "
+    "so that its cut runs along the advance, its printed face up."
+)
+NONE_YET = (
+    "No estimate of the plate's pose has come: check that the tracker runs and sees the plate's "
+    "target."
+)
+_NAMES = ("place along the cut", "height", "pitch", "direction", "roll")
+
+
+def lost_sentence(why: str) -> str:
+    """The source has lost the plate."""
+    cause = f": {why.rstrip('.')}" if why else ""
+    return (
+        f"The plate's pose was lost{cause}. Keep the plate's target in the camera's view; the "
+        "force returns with the pose."
+    )
+
+
+def late_sentence(age_s: float) -> str:
+    """The source gives nothing new."""
+    return (
+        f"No new estimate of the plate's pose came for {age_s:.2f} s. Check that the tracker runs, "
+        "and close programs that load the processor."
+    )
+
+
+def leapt_sentence(by_m: float) -> str:
+    """The pose went farther between two estimates than a plate moves."""
+    return (
+        f"The plate's pose leapt by {by_m * 1e3:.1f} mm between two estimates, farther than a "
+        "plate moves. The force returns where the pose is now. If that repeats, check the tracker "
+        "for mirrored or mistaken poses."
+    )
+
+
+def beside_sentence(
+    height_m: float, pitch_rad: float, most_height_m: float, most_pitch_rad: float
+) -> str:
+    """Two moving blades cannot be taken to hold the plate in their middle."""
+    return (
+        f"The plate's middle lies {height_m * 1e3:.1f} mm beside the blades' and is pitched by "
+        f"{math.degrees(pitch_rad):.1f} deg; two moving blades are taken to hold it in their "
+        f"middle, up to {most_height_m * 1e3:.0f} mm and {math.degrees(most_pitch_rad):.0f} deg. "
+        "Bring it back between them."
+    )
+
+
+def uncertain_sentence(
+    covariance: Array, half_width: float, worst: int, confidence: float, tolerance: float
+) -> str:
+    """The pose leaves the torque less certain than the scene allows."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return (
+        f"The plate's pose was known to {sd[0] * 1e3:.2g} mm along the cut, {sd[1] * 1e3:.2g} mm "
+        f"in height and {math.degrees(sd[2]):.2g} deg in pitch (sd), which leaves the torque "
+        f"uncertain by {half_width:.1%} ({confidence:.0%}); the scene allows "
+        f"{tolerance:.1%}. Most of it comes from its {_NAMES[worst]}. Bring the camera closer, "
+        "touch the plate with the blades so that contact narrows the pose, or raise "
+        "scene.tolerance_percent."
+    )

@@ -28,7 +28,8 @@ from scissorcal.report.panel import (
 
 if TYPE_CHECKING:
     from scissorcal.aliases import Array
-    from scissorcal.calibration.summary import Curves, Difference, LogSummary
+    from scissorcal.calibration.stroke_intervals import Curves
+    from scissorcal.calibration.summary import Difference, LogSummary
 
 PART = "summary"
 LEAST_SHARE = 0.5

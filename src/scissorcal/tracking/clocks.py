@@ -6,12 +6,13 @@ the highest one that no arrival lies below and that is nearest to all of them: a
 convex hull (Zhang, Liu and Xia 2002, doi:10.1109/INFCOM.2002.1019257; the linear program is that of
 Moon, Skelly and Towsley 1999, doi:10.1109/INFCOM.1999.749287). Late arrivals, however many, change
 nothing. The shortest delay itself looks like an offset and cannot be seen: see
-`scissorcal.tracking.delay`.
+`scissorcal.tracking.judge`.
 """
 
 import itertools
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -88,8 +89,7 @@ class ClockFit:
         return 1e6 * self.drift_sd
 
 
-@dataclass(frozen=True)
-class Jump:
+class Jump(NamedTuple):
     """At ``host_s`` the clock jumped ahead by ``by_s`` (back, if negative)."""
 
     host_s: float

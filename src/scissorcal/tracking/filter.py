@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.tracking.rotation import nearest_rotation, rotation_of
+from scissorcal.tracking.plate_pose import nearest_rotation, rotation_of
 from scissorcal.tracking.settings import PlateMotion, TrackingSettings
 
 SIZE = 30

@@ -10,8 +10,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.model.surface import Surface
 from scissorcal.tracking.clocks import ClockFit, ClockWatch
-from scissorcal.tracking.contacts import TipContact
-from scissorcal.tracking.rows import CameraPose
+from scissorcal.tracking.rows import CameraPose, TipContact
 from scissorcal.tracking.settings import TrackingSettings
 from scissorcal.tracking.tracker import Outcome, PoseEstimate, PoseTracker
 

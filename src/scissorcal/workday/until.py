@@ -30,7 +30,7 @@ from scissorcal.calibration.design.state import (
     latest_cut,
 )
 from scissorcal.calibration.friction.fit import fit_friction
-from scissorcal.device.capture_by_parts import CHOOSING_S
+from scissorcal.device.capture import CHOOSING_S
 from scissorcal.device.parts import ChosenStroke, Part, part_seconds, stroke_part, sweep_part
 from scissorcal.errors import InputError
 from scissorcal.kernel import Identity

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.camera.bundle import SHARED, SeenBoard, fit_bundle, seen
-from scissorcal.calibration.camera.checks import CameraThere
+from scissorcal.calibration.camera.checks import verdict_there
 from scissorcal.calibration.camera.fit import (
     CANDIDATES,
     CameraPhoto,
@@ -139,14 +139,14 @@ def z_scores(seed: int, **how: float) -> tuple[Array, float, float]:
     photos = photographs(np.random.default_rng(seed), 12, **how)  # type: ignore[arg-type]
     views = boards(photos)
     bundle = fit_bundle(views, BROWN, TRUE)
-    spread = camera_covariance(bundle)
+    covariance, stretch = camera_covariance(bundle)
     free = [0, 2, 3, 4, 5, 6, 7]
     off = (bundle.camera - TRUE[:9])[free]
-    camera = Camera.of(bundle.camera, WIDTH, HEIGHT, spread.covariance)
+    camera = Camera.of(bundle.camera, WIDTH, HEIGHT, covariance)
     region, _ = seen_region([view.pixels for view in views], WIDTH, HEIGHT)
-    _, cross = pixel_map(camera, spread, halves(views, bundle), region)
+    _, cross = pixel_map(camera, stretch, halves(views, bundle), region)
     assert cross is not None
-    return off / np.sqrt(np.diag(spread.covariance)[free]), spread.stretch, cross.p_value
+    return off / np.sqrt(np.diag(covariance)[free]), stretch, cross.p_value
 
 
 @pytest.mark.parametrize(
@@ -194,8 +194,8 @@ def test_a_picture_that_is_covered_in_part_is_judged_where_a_thing_stands() -> N
     assert places is not None
     middle = np.array([[600.0, 300.0], [700.0, 400.0]])
     corner = np.array([[20.0, 20.0], [60.0, 90.0]])
-    assert CameraThere.of(places, middle, 1000.0).verdict(CAMERA).status == "pass"
-    refused = CameraThere.of(places, corner, 1000.0).verdict(CAMERA)
+    assert verdict_there(CAMERA, places, middle, 1000.0).status == "pass"
+    refused = verdict_there(CAMERA, places, corner, 1000.0)
     assert refused.status == "fail"
     assert "scissorcal fit camera" in refused.why
 
@@ -261,7 +261,7 @@ def chosen_model(bend: tuple[float, ...], seed: int) -> str:
     start = np.append(usual_camera(WIDTH, HEIGHT).parameters, [0.0, 0.0])
     photos = photographs(np.random.default_rng(seed), 12, lens=lens)
     compared = compare_cameras(boards(photos), start, lambda _share, _sentence: None)
-    (name,) = [one.row.name for one in compared if one.row.chosen]
+    (name,) = [row.name for row, _, _ in compared if row.chosen]
     return name
 
 

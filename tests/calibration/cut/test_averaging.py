@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from scissorcal.calibration.cut.laws import CutLaw
+from scissorcal.calibration.cut.structure import CutLaw
 from scissorcal.calibration.cut.widening import (
     AveragedLaw,
     Inferred,

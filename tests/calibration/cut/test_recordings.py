@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_cut
+from scissorcal.calibration.cut.checks import FREE, STARTING, usage_of_segments, usage_sentence
 from scissorcal.calibration.cut.known import MaterialData
-from scissorcal.calibration.cut.usage import FREE, STARTING, usage_of_segments, usage_sentence
 from scissorcal.calibration.cut.widening import NOT_KNOWN
 from scissorcal.calibration.signals.usage import INVALID
 from scissorcal.recording import Stroke

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration import fit_cut
-from scissorcal.calibration.cut.laws import allowed_laws
+from scissorcal.calibration.cut.structure import allowed_laws
 from scissorcal.errors import InputError
 from tests.calibration.cut.made_cuts import HIGH, LOW, cut, way
 from tests.calibration.cut.recipes import friction_of, paper, pressing

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scissorcal.calibration.cut.guess import Rest, placed_by_loading
 from scissorcal.calibration.cut.known import MaterialData
 from scissorcal.calibration.cut.path_motion import find_runs, path_motion, split
 from scissorcal.calibration.cut.path_work import material_of
-from scissorcal.calibration.cut.rests import Rest, placed_by_loading
 from scissorcal.calibration.cut.segments import cut_into_segments
 from tests.calibration.cut.made_cuts import (
     FRICTION,

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from scissorcal.calibration.cut.laws import allowed_laws, usual_law
+from scissorcal.calibration.cut.structure import allowed_laws, usual_law
 from scissorcal.recipe import builtin_recipe
 
 

@@ -47,7 +47,7 @@ def test_blades_that_settle_are_at_rest_behind_any_encoder(step):
     moved.samples["motor_torque"][2000:2010] += 1.0
     (period,) = idle_periods(moved)
     assert 1.4 < period.seconds < 1.5
-    assert abs(period.drive - ZERO) < 3 * period.drive_sd
+    assert abs(period.drive - ZERO) < 3 * period.sd
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.calibration.signals.steadiness import STUCK, Steadiness, steadiness
+from scissorcal.calibration.signals.soundness import STUCK, Steadiness, steadiness
 from scissorcal.calibration.signals.weak_form import weigh
 from scissorcal.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
 

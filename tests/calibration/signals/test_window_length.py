@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from scissorcal.calibration.signals.weak_form import next_cutoff, weigh
-from scissorcal.calibration.signals.window_length import (
+from scissorcal.calibration.signals.filtering import (
     ENCODER_SHARE,
     LONGEST_S,
     knot_samples,
     second_derivative,
     spline,
 )
+from scissorcal.calibration.signals.weak_form import next_cutoff, weigh
 from scissorcal.recording import SAMPLE_DTYPE, Recording
 
 INERTIA, RATE_HZ = 2e-4, 1000.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scissorcal.calibration.verify.halves import (
+from scissorcal.calibration.verify.statistics import (
     HalfFit,
     StrokeFacts,
     compare,

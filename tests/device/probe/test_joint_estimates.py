@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from scissorcal.device.probe.joint_posterior import LEFT_OUT, JointFit
-from scissorcal.device.probe.joint_values import NAMES
+from scissorcal.device.probe.joint_values import LEFT_OUT, NAMES, JointFit
 
 VALUES = {"log_inertia": math.log(3e-4), "log_coulomb": math.log(0.02), "log_slow": math.log(0.01),
           "slow_logit": 0.5, "log_rise_share": -1.0, "log_rise_rate": -2.0}  # fmt: skip

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.device.sim.faults import Faults, parse_faults
+from scissorcal.device.sim.sensors import Faults, parse_faults
 from scissorcal.errors import InputError
 
 

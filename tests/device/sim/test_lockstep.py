@@ -5,7 +5,7 @@ import pytest
 
 from scissorcal.device.link import Link
 from scissorcal.device.lockstep import LockstepLink
-from scissorcal.device.sim.faults import Faults
+from scissorcal.device.sim.sensors import Faults
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Command, ConfigKey, State, decode, encode
 

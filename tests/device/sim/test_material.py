@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.device.sim.material import FORCE_CEILING_N, Response, Sheet
+from scissorcal.device.sim.blade import FORCE_CEILING_N, Response, Sheet
 from tests.device.sim.build import specimen
 
 

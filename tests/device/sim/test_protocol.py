@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from scissorcal.device.sim.faults import Faults
+from scissorcal.device.probe.talk import MEASURED
 from scissorcal.device.sim.protocol import ENCODER_CHECK_MS, RigProtocol
 from scissorcal.device.sim.rig import VirtualRig
+from scissorcal.device.sim.sensors import MEASURED_FLAGS, Faults, Measured
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.kernel import (
     PROTOCOL_VERSION,
@@ -75,6 +76,10 @@ def host() -> Host:
     streaming = Host()
     streaming.set(ConfigKey.STREAM, 1.0)
     return streaming
+
+
+def test_the_sensors_give_the_numbers_of_a_state_in_their_order() -> None:
+    assert Measured._fields[:-MEASURED_FLAGS] == MEASURED
 
 
 def test_hello_is_answered_with_an_identity() -> None:

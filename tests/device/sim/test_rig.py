@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scissorcal.device.sim.blade import blade_on
+from scissorcal.device.sim.blade import Sheet, blade_on
 from scissorcal.device.sim.cutting import Cut
 from scissorcal.device.sim.hand import Phase
-from scissorcal.device.sim.material import Sheet
 from scissorcal.device.sim.rig import VirtualRig
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.device.sim.truth import average_torque

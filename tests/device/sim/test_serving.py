@@ -10,9 +10,9 @@ from types import SimpleNamespace
 import pytest
 
 from scissorcal.device.sim import server as room
-from scissorcal.device.sim.faults import Faults
 from scissorcal.device.sim.protocol import RigProtocol
 from scissorcal.device.sim.rig import TICK_S
+from scissorcal.device.sim.sensors import Faults
 from scissorcal.device.sim.server import CATCH_UP_TICKS, WAITING_FRAMES, ServeReport, serve
 from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.kernel import (

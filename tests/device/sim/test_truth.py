@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from scissorcal.device.sim.blade import blade_on
+from scissorcal.device.sim.blade import Sheet, blade_on
 from scissorcal.device.sim.cutting import Cut
-from scissorcal.device.sim.material import Sheet
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.device.sim.truth import (
     average_torque,

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 
-from scissorcal.model.surface import HeightField
+from scissorcal.model.surface import HeightField, normal
 
 X_M, Y_M = (-0.03, 0.03), (-0.02, 0.02)
 
@@ -25,3 +25,11 @@ def rough(seed=0, size=1e-3, intervals=(6, 8)):
     rng = np.random.default_rng(seed)
     weights = size * rng.standard_normal((intervals[0] + 3, intervals[1] + 3))
     return HeightField(X_M, Y_M, weights)
+
+
+def shape_operator(surface, points):
+    """Derivative of the normal along the surface, (..., 3, 3) [1/m]: P H P / abs(grad phi0)."""
+    unit = normal(surface, points)
+    length = np.linalg.norm(surface.gradient(points), axis=-1)[..., None, None]
+    across = np.eye(3) - unit[..., :, None] * unit[..., None, :]
+    return across @ surface.hessian(points) @ across / length

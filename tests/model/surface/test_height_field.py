@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline, NdBSpline
 
 from scissorcal.model.bspline import spline_powers, spline_slope, spline_value
-from scissorcal.model.surface import HeightField, Sphere, curvatures, normal, shape_operator
-from tests.model.surface.shapes import X_M, Y_M, knots, rough, spline_of
+from scissorcal.model.surface import HeightField, Sphere, curvatures, normal
+from tests.model.surface.shapes import X_M, Y_M, knots, rough, shape_operator, spline_of
 
 SEED = st.integers(0, 1000)
 PLACE = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)).map(np.array)

@@ -16,8 +16,8 @@ from scissorcal.model.surface import (
     curvatures,
     nearest,
     normal,
-    shape_operator,
 )
+from tests.model.surface.shapes import shape_operator
 
 EPS = np.finfo(float).eps
 RADIUS = st.builds(

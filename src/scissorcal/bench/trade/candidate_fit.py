@@ -12,7 +12,7 @@ from scissorcal.calibration.fit_model import CutRun
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.result import FitResult
 from scissorcal.device.cut_trajectory import cut_plan
-from scissorcal.device.rig_record import identity_of
+from scissorcal.device.session import identity_of
 from scissorcal.device.trajectory import friction_plan
 from scissorcal.errors import MissingError, ScissorcalError
 from scissorcal.recipe.schema import CaptureCut, CaptureFriction, Recipe

@@ -52,18 +52,11 @@ class SeenBoard:
 
 
 @dataclass(frozen=True)
-class Structure:
-    """Which of the parameters `SHARED` are free, and how: parameters = base + spread @ free."""
-
-    names: tuple[str, ...]
-    spread: Array
-
-
-@dataclass(frozen=True)
 class Bundle:
     """A fitted camera with its views.
 
-    ``shared`` (11,) are the parameters `SHARED`, ``poses`` (views, 6) rotation vector and
+    ``shared`` (11,) are the parameters `SHARED`, moved by ``spread`` (11, p) times the p free ones;
+    ``poses`` (views, 6) rotation vector and
     translation of each board in the camera's frame, ``residuals`` and ``weights`` of each view (n,
     2) and (n,). ``sd_px`` is the scale of corner errors. ``information`` (views, p, p) is what each
     view says of the free parameters once its pose is taken out, ``scores`` (views, p) its pull at
@@ -71,7 +64,7 @@ class Bundle:
     (p, p) is what the prior adds to the information.
     """
 
-    structure: Structure
+    spread: Array
     shared: Array
     poses: Array
     residuals: tuple[Array, ...]
@@ -95,21 +88,21 @@ class Bundle:
 
 
 def fit_bundle(
-    views: Sequence[SeenBoard], structure: Structure, shared: Array, poses: Array | None = None
+    views: Sequence[SeenBoard], spread: Array, shared: Array, poses: Array | None = None
 ) -> Bundle:
     """Maximise the Student-t likelihood of all corners over the camera and all poses.
 
-    Starts at ``shared`` (11,), whose parameters that are not free are held, and at ``poses`` (found
-    from the camera where None). Least squares on robust residuals with the scale held, and the
-    scale that the residuals show, follow each other until the scale stays.
+    Starts at ``shared`` (11,), which moves by ``spread`` (11, p) times the p free parameters, and
+    at ``poses`` (found from the camera where None). Least squares on robust residuals with the
+    scale held, and the scale that the residuals show, follow each other until the scale stays.
     """
     if poses is None:
         poses = np.array([first_pose(view, shared[: len(PARAMETERS)]) for view in views])
-    size = structure.spread.shape[1]
+    size = spread.shape[1]
 
     def place(point: Array) -> _Place:
-        moved = shared + structure.spread @ point[:size]
-        return _Place(views, structure, moved, point[size:].reshape(-1, 6))
+        moved = shared + spread @ point[:size]
+        return _Place(views, spread, moved, point[size:].reshape(-1, 6))
 
     def fitted(start: Array, sd_px: float) -> tuple[Array, bool]:
         return least_squares(lambda x: place(x).rows(sd_px), start, precision=_PRECISION)
@@ -127,7 +120,7 @@ def fit_bundle(
 
 def fit_pose(view: SeenBoard, shared: Array, start: Array) -> Array:
     """Fit a board's pose, all else known, from ``start`` (6,); return its residuals (n, 2)."""
-    nothing = Structure((), np.zeros((len(SHARED), 0)))
+    nothing = np.zeros((len(SHARED), 0))
     return fit_bundle([view], nothing, shared, start[None]).residuals[0]
 
 
@@ -176,9 +169,9 @@ class _Place:
     """Residuals (n, 2) and slopes of every view at one camera (``shared``) and ``poses``."""
 
     def __init__(
-        self, views: Sequence[SeenBoard], structure: Structure, shared: Array, poses: Array
+        self, views: Sequence[SeenBoard], spread: Array, shared: Array, poses: Array
     ) -> None:
-        self.structure, self.shared, self.poses = structure, shared, poses
+        self.spread, self.shared, self.poses = spread, shared, poses
         self.bulge_sd_m = views[0].bulge_sd_m
         self.residuals: list[Array] = []
         self.by_pose: list[Array] = []
@@ -187,7 +180,7 @@ class _Place:
             pixels, by_pose, by_shared = seen(view, pose, shared)
             self.residuals.append(view.pixels - pixels)
             self.by_pose.append(by_pose)
-            self.by_shared.append(by_shared @ structure.spread)
+            self.by_shared.append(by_shared @ spread)
 
     def rows(self, sd_px: float) -> tuple[Array, Array]:
         """Rows whose squares are the likelihood's and the prior's, and their slopes.
@@ -197,21 +190,21 @@ class _Place:
         rows hold its pose and the others the shared parameters alone; those are rotated together
         again, which leaves 6 views + p + 1 rows.
         """
-        size, views = self.structure.spread.shape[1], len(self.poses)
-        own = np.zeros((6 * views, size + 6 * views + 1))
+        size, views = self.spread.shape[1], len(self.poses)
+        of_poses = np.zeros((6 * views, size + 6 * views + 1))
         common = []
         for index in range(views):
             turned = np.asarray(np.linalg.qr(self._robust(index, sd_px), mode="r"))
             six = slice(6 * index, 6 * index + 6)
-            own[six, :size], own[six, -1] = turned[:6, 6:-1], turned[:6, -1]
-            own[six, size + 6 * index : size + 6 * index + 6] = turned[:6, :6]
+            of_poses[six, :size], of_poses[six, -1] = turned[:6, 6:-1], turned[:6, -1]
+            of_poses[six, size + 6 * index : size + 6 * index + 6] = turned[:6, :6]
             common.append(turned[6:, 6:])
         prior = np.sqrt(self._precision(sd_px))[:, None]
-        common.append(prior * np.column_stack([self.structure.spread, self.shared]))
+        common.append(prior * np.column_stack([self.spread, self.shared]))
         rest = np.asarray(np.linalg.qr(np.concatenate(common), mode="r"))
-        whole = np.zeros((len(own) + len(rest), own.shape[1]))
-        whole[: len(own)] = own
-        whole[len(own) :, :size], whole[len(own) :, -1] = rest[:, :-1], rest[:, -1]
+        whole = np.zeros((len(of_poses) + len(rest), of_poses.shape[1]))
+        whole[: len(of_poses)] = of_poses
+        whole[len(of_poses) :, :size], whole[len(of_poses) :, -1] = rest[:, :-1], rest[:, -1]
         if np.any(self.poses[:, 5] <= 0.0):
             whole[:, -1] = np.inf
         return whole[:, -1], whole[:, :-1]
@@ -237,7 +230,7 @@ class _Place:
         """Scale of the Student-t, per coordinate, by its fixed point."""
         residual = np.concatenate(self.residuals)
         squared = np.sum(residual**2, axis=1)
-        unknowns = self.poses.size + self.structure.spread.shape[1]
+        unknowns = self.poses.size + self.spread.shape[1]
         spare = max(2.0 * len(squared) - unknowns, 2.0)
         sd_px = start_px or float(np.sqrt(np.sum(squared) / spare))
         for _ in range(_ROUNDS):
@@ -247,7 +240,7 @@ class _Place:
 
     def bundle(self, sd_px: float, converged: bool) -> Bundle:
         """What the fit knows here: information by view, pulls of views and of single corners."""
-        size = self.structure.spread.shape[1]
+        size = self.spread.shape[1]
         weights = [_weights(residual, sd_px) for residual in self.residuals]
         curvature = _curvature(np.concatenate(self.residuals), np.concatenate(weights), sd_px)
         information, scores, noise = [], [], np.zeros((size, size))
@@ -256,16 +249,15 @@ class _Place:
             doubled = np.repeat(weight, 2)[:, None]
             inner = by_pose.T @ (doubled * by_pose)
             share = np.linalg.solve(inner, by_pose.T @ (doubled * by_shared)).T
-            own = by_shared - by_pose @ share.T
-            pulls = own * (doubled * residual.reshape(-1, 1))
-            information.append(curvature * own.T @ (doubled * by_shared))
+            less_pose = by_shared - by_pose @ share.T
+            pulls = less_pose * (doubled * residual.reshape(-1, 1))
+            information.append(curvature * less_pose.T @ (doubled * by_shared))
             scores.append(pulls.sum(axis=0))
             single = pulls.reshape(len(residual), 2, size).sum(axis=1)
             # The pose has taken up six of the residuals' degrees of freedom.
             noise += single.T @ single * residual.size / max(residual.size - 6, 1)
-        spread = self.structure.spread
         return Bundle(
-            self.structure,
+            self.spread,
             self.shared,
             self.poses,
             tuple(self.residuals),
@@ -274,7 +266,7 @@ class _Place:
             np.array(information),
             np.array(scores),
             noise,
-            spread.T @ (self._precision(sd_px)[:, None] * spread),
+            self.spread.T @ (self._precision(sd_px)[:, None] * self.spread),
             converged,
         )
 

@@ -1,7 +1,6 @@
 """Checks of a camera's fit, and how well the camera is known at some places of a picture."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -188,37 +187,29 @@ def _parallel(widest_deg: float) -> str:
     )
 
 
-@dataclass(frozen=True)
-class CameraThere:
-    """The camera's standard error at the pixels of a thing, in pixels and in metres on the thing.
+def verdict_there(
+    check: Check, places: PixelMap, pixels: Array, px_per_m: float, why: str = ""
+) -> Verdict:
+    """Judge the camera's standard error at the pixels (n, 2) of a thing, by the thing's ``check``.
 
     A part of the picture where no corner of the camera's board was seen is extrapolated. That does
     harm to what stands there, and to nothing else: so the share of the picture that is covered is
-    no verdict on a camera, and this is one on each thing that is measured with it.
+    no verdict on a camera, and this is one on each thing that is measured with it. ``px_per_m`` are
+    the pixels to a metre of the thing; the limit is the one that a camera's fit has where corners
+    were seen.
     """
-
-    worst_px: float
-    worst_m: float
-
-    @classmethod
-    def of(cls, places: PixelMap, pixels: Array, px_per_m: float) -> "CameraThere":
-        """Of a thing that shows pixels (n, 2), with so many of them to a metre of it."""
-        worst = places.worst_px(pixels)
-        return cls(worst, worst / px_per_m)
-
-    def verdict(self, check: Check, why: str = "") -> Verdict:
-        """Judge by a check whose limit a camera's fit has where corners were seen."""
-        known = np.isfinite(self.worst_px)
-        place = (
-            f"The camera is known there to {self.worst_px:.2g} px at worst, "
-            f"{1e3 * self.worst_m:.2g} mm (limit {check.threshold:g} px)."
-            if known
-            else "The camera is not known at all where a part of it lies in the picture."
-        )
-        good = f"{why} {place}".lstrip()
-        bad = (
-            f"{place} It was fitted without a corner in that part of the picture: put this nearer "
-            "to the middle, or add photographs of the camera board there and run 'scissorcal fit "
-            "camera'."
-        )
-        return check.judge(self.worst_px if known else 1e6, good, bad)
+    worst_px = places.worst_px(pixels)
+    known = np.isfinite(worst_px)
+    place = (
+        f"The camera is known there to {worst_px:.2g} px at worst, "
+        f"{1e3 * (worst_px / px_per_m):.2g} mm (limit {check.threshold:g} px)."
+        if known
+        else "The camera is not known at all where a part of it lies in the picture."
+    )
+    good = f"{why} {place}".lstrip()
+    bad = (
+        f"{place} It was fitted without a corner in that part of the picture: put this nearer "
+        "to the middle, or add photographs of the camera board there and run 'scissorcal fit "
+        "camera'."
+    )
+    return check.judge(worst_px if known else 1e6, good, bad)

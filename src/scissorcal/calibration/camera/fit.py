@@ -13,7 +13,6 @@ from scissorcal.calibration.camera.bundle import (
     SHARED,
     Bundle,
     SeenBoard,
-    Structure,
     fit_bundle,
     fit_pose,
 )
@@ -85,27 +84,26 @@ def fit_camera(
     first = fit_bundle(views, CANDIDATES[0][1], np.append(start, [0.0, 0.0]))
     refuse_undetermined(first, width, height)
     compared = compare_cameras(views, first.shared, tell)
-    (chosen,) = (one for one in compared if one.row.chosen)
-    bundle = chosen.bundle
+    ((chosen, bundle, _),) = (candidate for candidate in compared if candidate[0].chosen)
     refuse_undetermined(bundle, width, height)
-    spread = camera_covariance(bundle)
-    camera = Camera.of(bundle.camera, width, height, spread.covariance)
+    covariance, stretch = camera_covariance(bundle)
+    camera = Camera.of(bundle.camera, width, height, covariance)
     region, share = seen_region([view.pixels for view in views], width, height)
     tell(0.85, "camera: two halves apart")
-    rivals = [one.bundle.camera for one in compared if one.row.equivalent and not one.row.chosen]
-    places, cross = pixel_map(camera, spread, halves(views, bundle), region, rivals)
+    rivals = [b.camera for row, b, _ in compared if row.equivalent and not row.chosen]
+    places, cross = pixel_map(camera, stretch, halves(views, bundle), region, rivals)
     rows = _views(photos, bundle)
     return CameraFit(
         camera=camera,
         origin="fitted",
         board=photos[0].detection.board.name,
-        candidate=chosen.row.name,
-        candidates=tuple(one.as_row() for one in compared),
-        draws=rng.multivariate_normal(bundle.camera, spread.covariance, _DRAWS, method="eigh"),
+        candidate=chosen.name,
+        candidates=tuple(_candidate_facts(row, unseen_px) for row, _, unseen_px in compared),
+        draws=rng.multivariate_normal(bundle.camera, covariance, _DRAWS, method="eigh"),
         views=rows,
         bulge_mm=(float(1e3 * bundle.shared[-2]), float(1e3 * bundle.shared[-1])),
         noise_px=bundle.sd_px,
-        stretch=spread.stretch,
+        stretch=stretch,
         region=region,
         region_share=share,
         pixel_map=places,
@@ -115,6 +113,12 @@ def fit_camera(
         sources=tuple(photo.name for photo in photos),
         notes=uncovered_notes(places, share),
     )
+
+
+def _candidate_facts(row: CandidateRow, unseen_px: float) -> dict[str, Any]:
+    """The row of a candidate that reports and files hold."""
+    facts = asdict(row)
+    return {"free": facts.pop("parameters"), "unseen_px": unseen_px, **facts}
 
 
 def seen_board(name: str, detection: Detection, priors: CameraPriors) -> SeenBoard:
@@ -133,7 +137,7 @@ def seen_region(pixels: Sequence[Array], width: int, height: int) -> tuple[Array
     return outline, area / (width * height)
 
 
-def tilt_of(pose: Array) -> float:
+def _tilt_of(pose: Array) -> float:
     """Angle (rad) between a board and the picture's plane, from its pose (6,)."""
     import cv2
 
@@ -156,7 +160,7 @@ def _views(photos: Sequence[CameraPhoto], bundle: Bundle) -> tuple[ViewError, ..
                 worst_px=float(np.linalg.norm(residual, axis=1).max()),
                 square_px=photo.detection.square_px,
                 distance_m=float(np.linalg.norm(pose[3:])),
-                tilt_deg=float(np.degrees(tilt_of(pose))),
+                tilt_deg=float(np.degrees(_tilt_of(pose))),
                 outlying=bool(error > OUTLYING * middle),
                 pose=tuple(float(value) for value in pose),
             )
@@ -180,81 +184,68 @@ FOLDS = 5
 _SQUARE = (("fx", "fy"), ("cx",), ("cy",))
 
 
-def _structure(*camera: tuple[str, ...]) -> Structure:
+def _free(*camera: tuple[str, ...]) -> Array:
+    """How the shared parameters move (11, p) with groups of the camera's and the two bulges."""
     groups = (*camera, ("bulge_x",), ("bulge_y",))
     spread = np.zeros((len(SHARED), len(groups)))
     for column, group in enumerate(groups):
         for name in group:
             spread[SHARED.index(name), column] = 1.0
-    return Structure(tuple(group[0] if len(group) == 1 else "f" for group in groups), spread)
+    return spread
 
 
-CANDIDATES: tuple[tuple[str, Structure], ...] = (
-    ("no distortion", _structure(*_SQUARE)),
-    ("k1", _structure(*_SQUARE, ("k1",))),
-    ("k1, k2", _structure(*_SQUARE, ("k1",), ("k2",))),
-    ("k1, k2, p1, p2", _structure(*_SQUARE, ("k1",), ("k2",), ("p1",), ("p2",))),
+CANDIDATES: tuple[tuple[str, Array], ...] = (
+    ("no distortion", _free(*_SQUARE)),
+    ("k1", _free(*_SQUARE, ("k1",))),
+    ("k1, k2", _free(*_SQUARE, ("k1",), ("k2",))),
+    ("k1, k2, p1, p2", _free(*_SQUARE, ("k1",), ("k2",), ("p1",), ("p2",))),
     (
         "k1, k2, p1, p2, oblong pixels",
-        _structure(*((name,) for name in PARAMETERS if name != "k3")),
+        _free(*((name,) for name in PARAMETERS if name != "k3")),
     ),
-    ("k1, k2, p1, p2, k3, oblong pixels", _structure(*((name,) for name in PARAMETERS))),
+    ("k1, k2, p1, p2, k3, oblong pixels", _free(*((name,) for name in PARAMETERS))),
 )
 """Pixels are square (fx = fy) in all but the last two. The board may bulge in every candidate."""
 
 
-@dataclass(frozen=True)
-class CameraCandidate:
-    """One camera model fitted to all photographs; ``unseen_px`` is its rms on unseen ones."""
-
-    row: CandidateRow
-    bundle: Bundle
-    unseen_px: float
-
-    def as_row(self) -> dict[str, Any]:
-        """The row that reports and files hold."""
-        row = asdict(self.row)
-        return {"free": row.pop("parameters"), "unseen_px": self.unseen_px, **row}
-
-
 def compare_cameras(
     views: Sequence[SeenBoard], start: Array, tell: Callable[[float, str], None]
-) -> tuple[CameraCandidate, ...]:
+) -> tuple[tuple[CandidateRow, Bundle, float], ...]:
     """Fit every model to all photographs, and to all but each fifth part of them in turn.
+
+    Each comes with its row, its fit to all of them, and its rms error (px) on unseen ones.
 
     Models are compared by :func:`~.calibration.candidates.compare`, photographs being the units.
     The log density of a photograph counts as many corners as err independently: its share is one
     over the squared stretch that :func:`camera_covariance` finds.
     """
     shared, bundles = start, []
-    for _, structure in CANDIDATES:
-        bundles.append(fit_bundle(views, structure, shared))
+    for _, spread in CANDIDATES:
+        bundles.append(fit_bundle(views, spread, shared))
         shared = bundles[-1].shared
     densities, errors = [], []
-    for index, (name, structure) in enumerate(CANDIDATES):
+    for index, (name, spread) in enumerate(CANDIDATES):
         tell(0.8 * index / len(CANDIDATES), f"camera: {name}")
-        residuals = unseen_residuals(views, structure, bundles[index])
+        residuals = _unseen_residuals(views, spread, bundles[index])
         densities.append([_log_density(residual, bundles[-1].sd_px) for residual in residuals])
         errors.append(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2) * 2.0)))
-    share = camera_covariance(bundles[-1]).stretch ** -2
+    share = camera_covariance(bundles[-1])[1] ** -2
     rows = compare(
         [name for name, _ in CANDIDATES],
-        [len(structure.names) for _, structure in CANDIDATES],
+        [spread.shape[1] for _, spread in CANDIDATES],
         [Account(share * np.array(densities))],
     )
-    return tuple(map(CameraCandidate, rows, bundles, errors))
+    return tuple(zip(rows, bundles, errors, strict=True))
 
 
-def unseen_residuals(
-    views: Sequence[SeenBoard], structure: Structure, whole: Bundle
-) -> list[Array]:
+def _unseen_residuals(views: Sequence[SeenBoard], spread: Array, whole: Bundle) -> list[Array]:
     """Residuals of each photograph under a camera fitted without it; its pose is its own."""
     folds = min(FOLDS, len(views))
     found: list[Array] = [np.empty((0, 2))] * len(views)
     for fold in range(folds):
         seen = [index for index in range(len(views)) if index % folds != fold]
         trained = fit_bundle(
-            [views[index] for index in seen], structure, whole.shared, whole.poses[seen]
+            [views[index] for index in seen], spread, whole.shared, whole.poses[seen]
         )
         for index in range(fold, len(views), folds):
             found[index] = fit_pose(views[index], trained.shared, whole.poses[index])

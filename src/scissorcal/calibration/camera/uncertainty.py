@@ -1,7 +1,6 @@
 """How uncertain a fitted camera is, and whether two halves of the photographs agree with that."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,26 +19,17 @@ _TURN_STEPS = 8
 _LEAST_LEFT = 0.05
 
 
-@dataclass(frozen=True)
-class Spread:
-    """Covariance (9, 9) of the camera, and the stretch of standard errors that is in it."""
-
-    covariance: Array
-    stretch: float
-
-
-def camera_covariance(bundle: Bundle, stretch: float | None = None) -> Spread:
-    """Covariance of the camera's parameters, widened for errors that a photograph's corners share.
+def camera_covariance(bundle: Bundle, stretch: float | None = None) -> tuple[Array, float]:
+    """Covariance (9, 9) of the camera, widened for errors that a photograph's corners share.
 
     Corners taken as independent give the sandwich covariance C of a robust fit. But a board that is
     not flat, or a detector's bias, moves all corners of a photograph together, and C is then too
     small. The pulls of whole photographs show by how much, corrected for each photograph's share
     in the fit so that independent corners would give C on average (CR2: Bell and McCaffrey 2002).
     A dozen photographs cannot give a whole matrix: only one number is taken from them, the mean of
-    the variances over C's, and C is multiplied by it. ``stretch`` gives its root where it is known
-    from elsewhere.
+    the variances over C's, and C is multiplied by it. Its root, the stretch of standard errors,
+    comes second; ``stretch`` gives it where it is known from elsewhere.
     """
-    structure = bundle.structure
     back = np.linalg.inv(np.linalg.cholesky(bundle.information.sum(axis=0) + bundle.prior))
     noise = back @ (bundle.noise + bundle.sd_px**2 * bundle.prior) @ back.T
     if stretch is None:
@@ -52,8 +42,8 @@ def camera_covariance(bundle: Bundle, stretch: float | None = None) -> Spread:
         ratio = float(np.trace(np.linalg.solve(noise, pulls.T @ pulls))) / len(back)
         stretch = float(np.sqrt(max(ratio, 1.0)))
     single = back.T @ noise @ back
-    own = structure.spread[: len(PARAMETERS)]
-    return Spread(stretch**2 * own @ single @ own.T, stretch)
+    own = bundle.spread[: len(PARAMETERS)]
+    return stretch**2 * own @ single @ own.T, stretch
 
 
 def _inverse_root(symmetric: Array) -> Array:
@@ -66,23 +56,23 @@ def halves(views: Sequence[SeenBoard], bundle: Bundle) -> tuple[Bundle, Bundle] 
     if len(views) < FEWEST_TO_HALVE:
         return None
     first, second = (
-        fit_bundle(views[at::2], bundle.structure, bundle.shared, bundle.poses[at::2])
-        for at in (0, 1)
+        fit_bundle(views[at::2], bundle.spread, bundle.shared, bundle.poses[at::2]) for at in (0, 1)
     )
     return first, second
 
 
 def pixel_map(
     camera: Camera,
-    spread: Spread,
+    stretch: float,
     parts: tuple[Bundle, Bundle] | None,
     region: Array,
     rivals: Sequence[Array] = (),
 ) -> tuple[PixelMap, CrossValidation | None]:
     """Lay the projection's uncertainty and the two halves' difference over the picture.
 
-    ``rivals`` are the parameters (9,) of models that predict unseen photographs as well as the
-    chosen one: how far they differ from it is what the choice of a model leaves open.
+    ``camera`` has its covariance, in which standard errors were widened by ``stretch``. ``rivals``
+    are the parameters (9,) of models that predict unseen photographs as well as the chosen one: how
+    far they differ from it is what the choice of a model leaves open.
 
     Two cameras are compared as a user would notice: a direction seen by one is turned by the
     rotation that makes both agree best over the valid region, and projected by the other.
@@ -100,14 +90,15 @@ def pixel_map(
     known = np.isfinite(rays).all(axis=1)
     within = inside & known
     slope = _without_turn(rays, camera, within)
-    variance = np.einsum("npi,ij,npj->n", slope, spread.covariance, slope) / 2.0
+    assert camera.covariance is not None
+    variance = np.einsum("npi,ij,npj->n", slope, camera.covariance, slope) / 2.0
     shape = (GRID[1], GRID[0])
     sd = np.where(known, np.sqrt(np.maximum(variance, 0.0)), np.nan).reshape(shape)
     model = _apart(pixels, camera.parameters, rivals, within, shape)
     if parts is None:
         return PixelMap(x, y, sd, inside.reshape(shape), None, model), None
     difference = _difference(pixels, parts[0].camera, parts[1].camera, within)
-    covariance = sum(camera_covariance(part, spread.stretch).covariance for part in parts)
+    covariance = sum(camera_covariance(part, stretch)[0] for part in parts)
     cross = _judged(difference, slope, np.asarray(covariance), within)
     length = np.linalg.norm(difference, axis=1).reshape(shape)
     return PixelMap(x, y, sd, inside.reshape(shape), length, model), cross
@@ -117,10 +108,10 @@ def _without_turn(rays: Array, camera: Camera, within: NDArray[np.bool_]) -> Arr
     """Slopes (n, 2, 9) of pixels by the camera's parameters, the best rotation taken out."""
     points = np.column_stack([np.nan_to_num(rays), np.ones(len(rays))])
     _, by_pose, by_camera = projected(points, np.zeros(6), camera.parameters)
-    turn, own = by_pose[:, :3], by_camera
+    turn, by_parameter = by_pose[:, :3], by_camera
     rows = np.repeat(within, 2)
-    absorbed, *_ = np.linalg.lstsq(turn[rows], own[rows], rcond=None)
-    return np.asarray((own - turn @ absorbed).reshape(-1, 2, 9))
+    absorbed, *_ = np.linalg.lstsq(turn[rows], by_parameter[rows], rcond=None)
+    return np.asarray((by_parameter - turn @ absorbed).reshape(-1, 2, 9))
 
 
 def _apart(
@@ -147,12 +138,12 @@ def _difference(pixels: Array, first: Array, second: Array, within: NDArray[np.b
     safe = np.nan_to_num(points)
     pose = np.zeros(6)
     for _ in range(_TURN_STEPS):
-        seen, by_pose, _ = projected(safe, pose, second)
+        image, by_pose, _ = projected(safe, pose, second)
         rows = np.repeat(used, 2)
-        step, *_ = np.linalg.lstsq(by_pose[rows][:, :3], (pixels - seen)[used].ravel(), rcond=None)
+        step, *_ = np.linalg.lstsq(by_pose[rows][:, :3], (pixels - image)[used].ravel(), rcond=None)
         pose[:3] += step
-    seen, _, _ = projected(safe, pose, second)
-    return np.asarray(np.where(np.isfinite(rays), seen - pixels, np.nan))
+    image, _, _ = projected(safe, pose, second)
+    return np.asarray(np.where(np.isfinite(rays), image - pixels, np.nan))
 
 
 def _judged(
@@ -163,7 +154,9 @@ def _judged(
     used = within & np.isfinite(difference).all(axis=1)
     moved = np.einsum("npi,di->dnp", slope[used], drawn)
     expected = np.mean(np.sum(moved**2, axis=2), axis=1)
-    seen = float(np.mean(np.sum(difference[used] ** 2, axis=1)))
+    squared = float(np.mean(np.sum(difference[used] ** 2, axis=1)))
     return CrossValidation(
-        float(np.sqrt(seen)), float(np.sqrt(expected.mean())), float(np.mean(expected >= seen))
+        float(np.sqrt(squared)),
+        float(np.sqrt(expected.mean())),
+        float(np.mean(expected >= squared)),
     )

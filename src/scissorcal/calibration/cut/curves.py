@@ -173,12 +173,12 @@ def force_along_edge(fit: FitResult, strokes: Sequence[Integers]) -> tuple[EdgeP
         raise MissingError("No stroke pressed hard enough on the material to judge the edge.")
     low, high = float(view.station[kept].min()), float(view.station[kept].max())
     count = max(1, min(MOST_PLACES, int((high - low) / SHORTEST_M)))
-    found = []
+    stretches = []
     for first, last in pairwise(np.linspace(low, high, count + 1)):
         here = kept & (view.station >= first) & (view.station <= last)
-        found.append((float(first), float(last), *_ratios(fit, strokes, here)))
-    tests = max(1, sum(len(ratios) >= FEWEST_STROKES for _, _, ratios, _ in found))
-    return tuple(_place(*one, tests) for one in found if len(one[2]))
+        stretches.append((float(first), float(last), *_ratios(fit, strokes, here)))
+    tests = max(1, sum(len(ratios) >= FEWEST_STROKES for _, _, ratios, _ in stretches))
+    return tuple(_place(*stretch, tests) for stretch in stretches if len(stretch[2]))
 
 
 def _ratios(
@@ -269,10 +269,10 @@ def fracture_work(
         )
     balance = _Balance(fit, friction, cutting, _path_of(chosen, friction, cutting))
     kept = [balance.of(label) for label in strokes if label >= 0]
-    found = tuple(row for row in kept if row is not None)
-    if not found:
+    rows = tuple(row for row in kept if row is not None)
+    if not rows:
         raise MissingError("No stroke cut the material.")
-    return found
+    return rows
 
 
 @dataclass(frozen=True)

@@ -6,19 +6,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.assemble import CriticRequest, Particulars, assemble
+from scissorcal.calibration.assemble import Particulars, assemble
 from scissorcal.calibration.between import BetweenRecordings, widened
 from scissorcal.calibration.comparison import choose
 from scissorcal.calibration.cut.checks import (
+    counted,
     cut_diagnostics,
     cut_verdicts,
     line_notes,
     scatter_verdict,
+    usage_of_segments,
+    usage_sentence,
 )
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import CoarseEncoderError, NoUnloadingError
 from scissorcal.calibration.cut.known import CutBasis, KnownFriction
-from scissorcal.calibration.cut.laws import NUISANCE, CutLaw, allowed_laws, usual_law
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.cut.path_motion import PathMotion, path_motion
 from scissorcal.calibration.cut.scout import (
@@ -27,8 +29,8 @@ from scissorcal.calibration.cut.scout import (
     make_experiment,
     scout,
 )
+from scissorcal.calibration.cut.structure import NUISANCE, CutLaw, allowed_laws, usual_law
 from scissorcal.calibration.cut.unknowns import with_toughness, with_unknowns
-from scissorcal.calibration.cut.usage import counted, usage_of_segments, usage_sentence
 from scissorcal.calibration.cut.widening import (
     AveragedLaw,
     Inferred,
@@ -176,8 +178,7 @@ def fit_cut(
         ),
         recordings,
         usage,
-        Particulars(verdicts, notes, diagnostics),
-        CriticRequest(recipe.fit.cut.critic and effort != "draft"),
+        Particulars(verdicts, notes, diagnostics, recipe.fit.cut.critic and effort != "draft"),
         rng,
     )
     return with_unknowns(with_toughness(fit, recipe, rng), recipe, friction, recordings)
@@ -337,8 +338,8 @@ def _knots(scouted: Scouted, geometry: Geometry) -> tuple[float, ...]:
         opening = motion.opening[piece.ends]
         contact = segments.rests[piece.rest].place - motion.advance[piece.ends]
         depths.append(geometry.depth_and_lever(geometry.edge, opening, contact)[0])
-    every = np.concatenate(depths)
-    pressed = every[every > 0.0]
+    all_depths = np.concatenate(depths)
+    pressed = all_depths[all_depths > 0.0]
     deepest = float(np.quantile(pressed, DEEPEST)) if len(pressed) else geometry.reference_m
     return tuple(float(f"{knot:.4g}") for knot in np.geomspace(deepest / SPAN, deepest, KNOTS))
 

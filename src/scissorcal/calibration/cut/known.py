@@ -104,8 +104,8 @@ class KnownFriction:
 
 def _draws(friction: FitResult, taken: dict[str, Array], law: FrictionLaw) -> FrictionDraws:
     """Some draws of a posterior beside the values that were taken, evenly out of all."""
-    every = np.unique(np.linspace(0, len(friction.draws) - 1, SOME_DRAWS).astype(int))
-    values = {p.name: friction.column(p.name)[every, None] for p in friction.parameters}
+    picked = np.unique(np.linspace(0, len(friction.draws) - 1, SOME_DRAWS).astype(int))
+    values = {p.name: friction.column(p.name)[picked, None] for p in friction.parameters}
     known = {name: law.values[name] for name in law.values if name not in values}
     centre = law.angle_center
     closing, opening = (
@@ -113,7 +113,7 @@ def _draws(friction: FitResult, taken: dict[str, Array], law: FrictionLaw) -> Fr
         - friction_and_offset(taken, centre, sign * USUAL_RATE)
         for sign in (-1, 1)
     )
-    offset = values.get("offset", np.zeros((len(every), 1)))
+    offset = values.get("offset", np.zeros((len(picked), 1)))
     return FrictionDraws(FrictionLaw.of_fit(known | values, centre), offset, closing, opening)
 
 

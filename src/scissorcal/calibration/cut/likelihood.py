@@ -62,14 +62,14 @@ class CutLikelihood:
 
     def evaluate(self, values: Mapping[str, Array], response: Response) -> Evaluation:
         """Compare with parameters by name (scalars) and a response."""
-        found = Evaluation(*cut_log_likelihood(self.data, self._parameters(values, response)))
+        evaluation = Evaluation(*cut_log_likelihood(self.data, self._parameters(values, response)))
         if self.line is None:
-            return found
-        away = (found.log_period - self.line.log_period) / self.line.sd
+            return evaluation
+        away = (evaluation.log_period - self.line.log_period) / self.line.sd
         share = -0.5 * away**2 * self.data.line_weight
-        terms = found.terms.copy()
-        terms[self.elastic_count :] += share
-        return found._replace(total=found.total - 0.5 * away**2, terms=terms)
+        terms = evaluation.terms.copy()
+        terms[self._elastic_count :] += share
+        return evaluation._replace(total=evaluation.total - 0.5 * away**2, terms=terms)
 
     def log_likelihoods(self, values: Mapping[str, Array], response: Response) -> Array:
         """Log-likelihoods (k,) at parameters by name (k,), those of the response among them."""
@@ -80,7 +80,7 @@ class CutLikelihood:
         return totals
 
     @cached_property
-    def elastic_count(self) -> int:
+    def _elastic_count(self) -> int:
         """Elastic segments."""
         return sum(len(piece.torque) for piece in self.segments.pieces)
 
@@ -186,7 +186,7 @@ class CutLikelihood:
         return {
             "run_first": _starts(by_sheet),
             "joined": np.concatenate(joined).astype(np.int32) if runs else np.zeros(0, np.int32),
-            "run_torque": self._measured(runs, self.elastic_count),
+            "run_torque": self._measured(runs, self._elastic_count),
             "run_late": _joined([run.late for run in runs]),
             "run_direction": _joined([run.direction for run in runs]),
             "run_lever": view.lever,
@@ -260,12 +260,12 @@ def response_table(response: Response, reference_m: float) -> tuple[Array, Array
     depth, shapes = np.exp(log_depth), np.reshape(response.shape, (len(force), -1))
     rows = []
     for one_force, one_exponent, shape in zip(force, exponent, shapes, strict=True):
-        one = replace(response, force=one_force, exponent=one_exponent, shape=shape)
+        drawn = replace(response, force=one_force, exponent=one_exponent, shape=shape)
         held, energy = (
             np.maximum(some, np.finfo(np.float64).tiny)  # a trial exponent of 13 underflows
-            for some in (one.force_at(depth), one.energy_at(depth))
+            for some in (drawn.force_at(depth), drawn.energy_at(depth))
         )
-        rows.append((np.log(held), one.stiffness_at(depth) * depth / held, energy))
+        rows.append((np.log(held), drawn.stiffness_at(depth) * depth / held, energy))
     log_force, slope, energy = (np.stack(row) for row in zip(*rows, strict=True))
     return log_depth, log_force, slope, np.log(energy)
 

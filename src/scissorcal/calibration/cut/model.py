@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.calibration.cut.laws import NUISANCE, CutLaw
 from scissorcal.calibration.cut.likelihood import CutLikelihood, Evaluation
 from scissorcal.calibration.cut.path_work import mean_advance
-from scissorcal.calibration.cut.structure import response_from
+from scissorcal.calibration.cut.structure import NUISANCE, CutLaw, response_from
 from scissorcal.calibration.fit_candidate import (
     SEARCH_REACH,
     Candidate,
@@ -99,9 +98,9 @@ class CutExperiment:
         key = u.tobytes()
         if key not in self._last:
             values = self.layout.natural(u)
-            found = self.likelihood.evaluate(values, response_from(self.key, values))
+            evaluation = self.likelihood.evaluate(values, response_from(self.key, values))
             self._last.clear()
-            self._last[key] = found
+            self._last[key] = evaluation
         return self._last[key]
 
     def mean(self, u: Array) -> Array:
@@ -118,8 +117,8 @@ class CutExperiment:
             return design.evaluate(u).residuals
 
         def normal(u: Array) -> tuple[Array, Array]:
-            found = design.evaluate(u)
-            return found.standardised, -found.terms - 0.5 * found.standardised**2
+            evaluation = design.evaluate(u)
+            return evaluation.standardised, -evaluation.terms - 0.5 * evaluation.standardised**2
 
         def log_likelihoods(points: Array) -> Array:
             values = design.layout.natural(points)

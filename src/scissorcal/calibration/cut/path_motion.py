@@ -88,15 +88,15 @@ def path_motion(
     banded system). The walk's size comes from the data: a fine encoder is hardly smoothed, a coarse
     one more, and less where the torque changes fast, as while blades oscillate on the material.
     """
-    found: list[PathMotion] = []
+    motions: list[PathMotion] = []
     offset = 0
     for index, recording in enumerate(recordings):
         good = np.ones(len(recording.samples), dtype=bool) if usable is None else usable[index]
         bridged = bridge(recording, good)
         sheets = sheets_of(bridged.recording)
-        found += [_piece(bridged, index, b, inertia, sheets, offset) for b in bridged.pieces]
+        motions += [_piece(bridged, index, b, inertia, sheets, offset) for b in bridged.pieces]
         offset += len(recording.strokes)
-    return tuple(found)
+    return tuple(motions)
 
 
 def _piece(
@@ -118,8 +118,8 @@ def _piece(
     good &= ~_beside(~recorded & ~good, len(RATE_WEIGHTS) // 2)
     step = np.append(np.diff(measured), 0.0)
     drive = measured + HELD * step
-    seen = resolution_of(position[recorded])
-    resolution = seen if np.isfinite(seen) else FINEST_STEP
+    encoder_step = resolution_of(position[recorded])
+    resolution = encoder_step if np.isfinite(encoder_step) else FINEST_STEP
     model = _Dynamics(position, drive, tick_s, inertia, resolution)
     walk = _local_walk(model, _torque_walk(model))
     smooth = model.most_probable(walk)
@@ -270,10 +270,10 @@ def _torque_walk(model: _Dynamics) -> float:
         mean = np.add.reduceat(model.drive, np.arange(0, len(model.drive), stride))[:count] / stride
         gain = model.inertia / (stride * model.tick_s) ** 2
         change = gain * np.diff(places, 3) - np.diff(0.5 * (mean[1:-1] + mean[:-2]))
-        seen = float(np.mean(change**2))
+        mean_square = float(np.mean(change**2))
         steps = gain**2 * 20.0 * model.resolution**2 / 12.0
-        walk = float(np.sqrt(max(seen - steps, 0.2 * seen) / stride))
-        if seen > CLEAR * steps:
+        walk = float(np.sqrt(max(mean_square - steps, 0.2 * mean_square) / stride))
+        if mean_square > CLEAR * steps:
             break
     return max(walk, 1e-12)
 
@@ -304,11 +304,11 @@ def _error(model: _Dynamics, walk: Array, of: Array, count: int = 401) -> Array:
     weights[count // 2 - half : count // 2 + half + 1] = of
     low, high = np.log(walk.min()), np.log(walk.max())
     sizes = np.linspace(low, high, WALKS if high > low else 1)
-    found = []
+    errors = []
     for size in np.exp(sizes):
         band = model.band(np.full(count - 3, size))
-        found.append(float(np.sqrt(weights @ solveh_banded(band, weights))))
-    inside = np.interp(np.log(walk), sizes, found)
+        errors.append(float(np.sqrt(weights @ solveh_banded(band, weights))))
+    inside = np.interp(np.log(walk), sizes, errors)
     return np.concatenate([inside[:1], inside, inside[-1:], inside[-1:]])
 
 

@@ -140,11 +140,11 @@ def built_up(path: Array, sense: Array, friction: FrictionLaw, fine_rad: float) 
         built = presliding_state(path, length)
         return np.asarray(0.5 * (built[1:] + built[:-1]))
 
-    found = between(fine_rad) if fine_rad > 0.0 else sense
+    direction = between(fine_rad) if fine_rad > 0.0 else sense
     share = float(np.asarray(friction["presliding_share"]))
     if share > 0.0:
-        found = found + share * (between(float(friction["presliding_length"])) - found)
-    return np.asarray(found)
+        direction = direction + share * (between(float(friction["presliding_length"])) - direction)
+    return np.asarray(direction)
 
 
 def built_friction(

@@ -16,13 +16,18 @@ from scissorcal.calibration.cut.guess import (
     first_guess,
 )
 from scissorcal.calibration.cut.known import CutBasis
-from scissorcal.calibration.cut.laws import CutLaw, cut_layout
 from scissorcal.calibration.cut.likelihood import CutLikelihood
 from scissorcal.calibration.cut.model import CutExperiment, starting_point
 from scissorcal.calibration.cut.path_motion import FEWEST_SEGMENTS, PathMotion
 from scissorcal.calibration.cut.path_work import Material
 from scissorcal.calibration.cut.segments import Segments, cut_into_segments
-from scissorcal.calibration.cut.structure import edge_layout, geometry_of, response_from
+from scissorcal.calibration.cut.structure import (
+    CutLaw,
+    cut_layout,
+    edge_layout,
+    geometry_of,
+    response_from,
+)
 from scissorcal.calibration.cut.teeth import Line, find_line, phase_signals
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference import Counter, Optimum, find_optimum

@@ -12,7 +12,16 @@ import numpy as np
 
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.geometry import Geometry
-from scissorcal.calibration.cut.guess import Guess
+from scissorcal.calibration.cut.guess import (
+    ELASTIC_SEGMENTS,
+    LEAST_RANGE_RAD,
+    Guess,
+    Rest,
+    left_for_good,
+    place_at_turn,
+    placed_by_loading,
+    shortest_segment,
+)
 from scissorcal.calibration.cut.known import MaterialData
 from scissorcal.calibration.cut.path_motion import (
     FEWEST_SEGMENTS,
@@ -26,15 +35,6 @@ from scissorcal.calibration.cut.path_work import (
     mean_torque,
     sums_between,
     torque_covariance,
-)
-from scissorcal.calibration.cut.rests import (
-    ELASTIC_SEGMENTS,
-    LEAST_RANGE_RAD,
-    Rest,
-    left_for_good,
-    place_at_turn,
-    placed_by_loading,
-    shortest_segment,
 )
 
 RUNNING_RAD, SEGMENT_CYCLES = 5e-3, 4.0
@@ -204,7 +204,7 @@ class _Builder:
         """Unloading from where the blades turned; a crack may have come to rest there."""
         motion = self.data.motions[run.motion]
         if self.cuts:
-            found = place_at_turn(
+            at_turn = place_at_turn(
                 motion,
                 self.data.materials[run.motion].work,
                 run,
@@ -212,10 +212,10 @@ class _Builder:
                 self.guess,
                 self.data.noise,
             )
-            if found is None:
+            if at_turn is None:
                 return
             turn = float(motion.opening[run.low]), float(motion.advance[run.low])
-            place, seen = found
+            place, seen = at_turn
             turned = bool(motion.usable[run.low])
             self.rests.append(Rest(self.sheet, False, place, *turn, seen and turned, turned))
             if not turned:
@@ -251,7 +251,7 @@ class _Builder:
         rest = len(self.rests) - 1
         covariance += material.torque_doubt(motion, ends)
         covariance += np.diag(self._by_opening(motion, ends, self.rests[rest].place) ** 2)
-        direction = mean_direction(motion, material, ends)
+        direction = _mean_direction(motion, material, ends)
         self.pieces.append(Piece(kind, rest, index, ends, torque, late, direction, covariance))
 
     def _by_opening(self, motion: PathMotion, ends: Integers, place: float) -> Array:
@@ -269,9 +269,9 @@ class _Builder:
         motion, geometry = self.data.motions[run.motion], self.geometry
         _, period = self.guess.tooth(geometry, motion.opening[low : run.high + 1])
         step = max(RUNNING_RAD, SEGMENT_CYCLES * period)
-        every = split(motion.opening, low, run.high, step)
+        all_ends = split(motion.opening, low, run.high, step)
         invalid = np.concatenate([[0], np.cumsum(~motion.usable)])
-        for ends in _parts(every, invalid):
+        for ends in _parts(all_ends, invalid):
             material = self.data.materials[run.motion]
             path, work = free_path(motion, material, geometry, ends)
             turned = np.diff(motion.opening[ends])
@@ -289,7 +289,7 @@ class _Builder:
                     ends=ends,
                     torque=work / path,
                     late=late * turned / path,
-                    direction=mean_direction(motion, material, ends, by_torque=True),
+                    direction=_mean_direction(motion, material, ends, by_torque=True),
                     path=path,
                     noise=noise + (work / path) ** 2 if unseen else noise,
                     speed=float(np.median(np.abs(turned) / (ticks * motion.tick_s))),
@@ -330,7 +330,7 @@ def free_path(
     return np.diff(path[at]), np.diff(material.work[ends]) - np.diff(extra[at])
 
 
-def mean_direction(
+def _mean_direction(
     motion: PathMotion, material: Material, ends: Integers, by_torque: bool = False
 ) -> Array:
     """Mean direction (k,) of friction between samples ``ends`` (k + 1,), weighed by the path.

@@ -153,19 +153,19 @@ def find_line(
     worked out with; ``near`` says that the expected period is right to some percent, and needs no
     search.
     """
-    seen = [s for s in signals if _ticks_per_cycle(s) >= LEAST_TICKS * SCAN[0]]
-    if not seen:
+    resolved = [s for s in signals if _ticks_per_cycle(s) >= LEAST_TICKS * SCAN[0]]
+    if not resolved:
         return None
     frequency = 1.0
     if not near:
         scan = np.exp(np.arange(np.log(SCAN[0]), np.log(SCAN[1]), SCAN_STEP))
-        gains = np.array([_shown(seen, float(f)) for f in scan])
+        gains = np.array([_shown(resolved, float(f)) for f in scan])
         if not np.any(gains > 0):
             return None
-        frequency = _fundamental(seen, float(scan[int(np.argmax(gains))]))
+        frequency = _fundamental(resolved, float(scan[int(np.argmax(gains))]))
     else:
-        frequency = _refined(seen, frequency)
-    pairs = {s.stretch: p for s in seen if (p := _pairs(s, frequency)) is not None}
+        frequency = _refined(resolved, frequency)
+    pairs = {s.stretch: p for s in resolved if (p := _pairs(s, frequency)) is not None}
     if not pairs:
         return None
     kept = {index: pair for index, pair in pairs.items() if _gain([pair]) > SHOWN}
@@ -175,7 +175,7 @@ def find_line(
     shift = np.angle(sums.sum()) / (2 * np.pi * WINDOW_CYCLES)
     jackknife = _jackknife(sums)
     where = tuple(kept)
-    by_stretch = {s.stretch: s for s in seen}
+    by_stretch = {s.stretch: s for s in resolved}
     weights = tuple(_weights(by_stretch[i], kept[i], frequency) for i in where)
     frequency *= 1.0 + float(shift)
 
@@ -184,8 +184,8 @@ def find_line(
             np.average(np.concatenate([logs[i] for i in where]), weights=np.concatenate(weights))
         )
 
-    chosen = [s for s in seen if s.stretch in kept]
-    own = coherent_power(chosen, frequency)
+    chosen = [s for s in resolved if s.stretch in kept]
+    power = coherent_power(chosen, frequency)
     return Line(
         ratio=1.0 / frequency,
         sd=float(np.hypot(jackknife, PERIOD_SD)),
@@ -194,9 +194,9 @@ def find_line(
         stretches=where,
         weights=weights,
         gain=_gain(list(kept.values())),
-        speeds=_by_speed(seen, frequency),
-        half=coherent_power(chosen, frequency / 2) / own,
-        third=coherent_power(chosen, frequency / 3) / own,
+        speeds=_by_speed(resolved, frequency),
+        half=coherent_power(chosen, frequency / 2) / power,
+        third=coherent_power(chosen, frequency / 3) / power,
     )
 
 
@@ -269,9 +269,9 @@ def _weights(signal: PhaseSignal, pairs: Complex, frequency: float) -> Array:
 
 def _gain(pairs: Sequence[Complex]) -> float:
     """Squared sum of the pairs over what it would be if their phases were random."""
-    own = [pair / np.abs(pair).mean() for pair in pairs]
-    chance = OVERLAP * sum(float(np.sum(np.abs(pair) ** 2)) for pair in own)
-    return float(abs(sum(complex(pair.sum()) for pair in own)) ** 2 / max(chance, 1e-300))
+    scaled = [pair / np.abs(pair).mean() for pair in pairs]
+    chance = OVERLAP * sum(float(np.sum(np.abs(pair) ** 2)) for pair in scaled)
+    return float(abs(sum(complex(pair.sum()) for pair in scaled)) ** 2 / max(chance, 1e-300))
 
 
 def coherent_power(signals: Sequence[PhaseSignal], frequency: float) -> float:
@@ -334,11 +334,11 @@ def _strongest(signals: Sequence[PhaseSignal], frequency: float) -> float:
 def _fundamental(signals: Sequence[PhaseSignal], frequency: float) -> float:
     """The frequency, or a half or a third of it where that has enough power."""
     frequency = _strongest(signals, frequency)
-    own = coherent_power(signals, frequency)
+    power = coherent_power(signals, frequency)
     for order in HARMONICS:
         lower = _refined(signals, frequency / order)
         near = abs(np.log(lower * order / frequency)) < SAME_PERIOD
-        if near and coherent_power(signals, lower) > HARMONIC_POWER * own:
+        if near and coherent_power(signals, lower) > HARMONIC_POWER * power:
             return lower
     return frequency
 

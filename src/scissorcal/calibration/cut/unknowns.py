@@ -5,14 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.cut.laws import LOADED
-from scissorcal.calibration.cut.structure import cutting_from
+from scissorcal.calibration.cut.structure import LOADED, cutting_from
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.zeros import DriveZero, idle_zero
 from scissorcal.model import Cutting, edge_height, settled_contact
 from scissorcal.model.cutting import torque_at, within_thickness
-from scissorcal.model.transforms import LOG
+from scissorcal.model.terms import LOG
 from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.recording import Recording
 from scissorcal.verdicts import STATED, TORQUE, Check, Verdict
@@ -116,7 +115,7 @@ def with_unknowns(
     lies within the data. A bound is no observed error: a large one rejects nothing; the check
     counts as not evaluated and names what to measure.
     """
-    unknowns = find_unknowns(fit, recipe, friction, recordings)
+    unknowns = _find_unknowns(fit, recipe, friction, recordings)
     limit = recipe.scene.tolerance_percent / 100.0
     facts = {"not_measured": [dict(vars(unknown)) for unknown in unknowns]}
     return replace(
@@ -126,7 +125,7 @@ def with_unknowns(
     )
 
 
-def find_unknowns(
+def _find_unknowns(
     fit: FitResult, recipe: Recipe, friction: FitResult, recordings: tuple[Recording, ...]
 ) -> tuple[Unknown, ...]:
     """Bound the scene's mean torque by zeros, edge shape and friction by load."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scissorcal.aliases import Array, Mask
-from scissorcal.calibration.between import BetweenRecordings, FitsApart, gather_recordings
+from scissorcal.calibration.between import BetweenRecordings, gather_recordings
 from scissorcal.calibration.cut.model import CutExperiment
 from scissorcal.calibration.fit_candidate import FittedCandidate
 from scissorcal.inference import Posterior, find_optimum, infer
@@ -48,8 +48,8 @@ def by_load(
     """
     design = next(d for c, d in fitted if c.candidate.name == chosen.candidate.name)
     twins = [
-        (one, d)
-        for one, d in fitted
+        (candidate, d)
+        for candidate, d in fitted
         if replace(d.law, loaded=False, knots_m=()) == replace(design.law, loaded=False, knots_m=())
     ]
     if len(twins) == 1:
@@ -58,7 +58,7 @@ def by_load(
     (loaded, its_design), plain = twins
     if its_design.layout.natural(loaded.optimum.point).get("load_share", 1.0) <= 0.0:
         return [AveragedLaw(replace(plain[0], equivalent=chosen.equivalent), plain[1])]
-    logs = np.array([log_evidence(one) for one, _ in twins])
+    logs = np.array([log_evidence(candidate) for candidate, _ in twins])
     odds = np.exp(logs - logs.max())
     kept = [i for i in range(len(twins)) if odds[i] / odds.sum() > LEAST_PROBABILITY]
     total = sum(odds[i] for i in kept)
@@ -94,10 +94,10 @@ def average(
     (poorer,) = others
     names = richest.posterior.names
     count = len(richest.posterior.draws)
-    own = round(count * richest.law.probability)
+    share = round(count * richest.law.probability)
     filled = np.zeros((count, len(names)))
     filled[:, [names.index(name) for name in poorer.posterior.names]] = poorer.posterior.draws
-    draws = rng.permutation(np.concatenate([richest.posterior.draws[:own], filled[own:]]))
+    draws = rng.permutation(np.concatenate([richest.posterior.draws[:share], filled[share:]]))
     law = richest.law
     if poorer.law.probability > law.probability:
         optimum = law.fitted.optimum
@@ -108,7 +108,10 @@ def average(
     worst = max(
         richest,
         poorer,
-        key=lambda one: (not one.posterior.status.trusted, np.nan_to_num(one.posterior.k_hat)),
+        key=lambda drawn: (
+            not drawn.posterior.status.trusted,
+            np.nan_to_num(drawn.posterior.k_hat),
+        ),
     )
     averaged = replace(
         richest.posterior,
@@ -160,14 +163,14 @@ def compare_cuts(
     design = replace(design, likelihood=replace(design.likelihood, line=None), _last={})
     candidate = replace(design.candidate(design.observed), starts=point[None, :])
 
-    def own(here: Mask) -> Posterior:
+    def alone(here: Mask) -> Posterior:
         problem = candidate.problem(design.series, here)
         return infer(problem, "draft", rng, optimum=find_optimum(problem))
 
     def others(here: Mask) -> Array:
         return find_optimum(candidate.problem(design.series, ~here)).point
 
-    return gather_recordings(design, point, recordings, FitsApart(own, others), usual, rng)
+    return gather_recordings(design, point, recordings, (alone, others), usual, rng)
 
 
 def between_notes(between: BetweenRecordings | None, nuisance: tuple[str, ...]) -> tuple[str, ...]:
@@ -254,14 +257,14 @@ def changed_designs(design: CutExperiment) -> dict[str, CutExperiment]:
         "unloading, by its torque": np.concatenate([unloading * slope, rest]),
         "running": (np.arange(count) >= elastic).astype(np.float64),
     }
-    found = {}
+    kinds = {}
     for kind, weight in weights.items():
         if np.any(weight):
             measured = (1.0 + PERTURBATION * weight) * design.likelihood.torque
             likelihood = replace(design.likelihood, measured=measured)
-            found[kind] = replace(design, likelihood=likelihood, _last={})
+            kinds[kind] = replace(design, likelihood=likelihood, _last={})
     line = design.likelihood.line
     if line is not None:
         moved = replace(line, log_period=line.log_period + PERTURBATION)
-        found["line"] = replace(design, likelihood=replace(design.likelihood, line=moved), _last={})
-    return found
+        kinds["line"] = replace(design, likelihood=replace(design.likelihood, line=moved), _last={})
+    return kinds

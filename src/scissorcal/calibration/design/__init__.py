@@ -23,7 +23,7 @@ from scissorcal.calibration.design.information import (
     friction_information,
     line_information,
 )
-from scissorcal.calibration.design.planned import PlannedMotion, planned_cut, planned_friction
+from scissorcal.calibration.design.state import PlannedMotion, planned_cut, planned_friction
 
 __all__ = [
     "Band",

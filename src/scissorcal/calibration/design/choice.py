@@ -180,13 +180,13 @@ def choose_captures(known: TorqueKnowledge, stock: Stock) -> Design:
         complete = _begun(known, captures)
         if complete and _enough(band, captures):
             break
-        options = [one for one in _options(known, stock, captures) if one[2].fits_a_recipe]
+        options = [entry for entry in _options(known, stock, captures) if entry[2].fits_a_recipe]
         judged = [(_judged(known, stock, captures, band, option), option) for option in options]
         if complete:
-            judged = [one for one in judged if one[0].gain > WORTH]
+            judged = [entry for entry in judged if entry[0].gain > WORTH]
         if not judged:
             break
-        best, (_, _, captures) = max(judged, key=lambda one: one[0].gain)
+        best, (_, _, captures) = max(judged, key=lambda entry: entry[0].gain)
         steps.append(best)
         band = best.after
     while captures != CaptureList() and _enough(band, captures):
@@ -194,10 +194,10 @@ def choose_captures(known: TorqueKnowledge, stock: Stock) -> Design:
             (_judged(known, stock, captures, band, option), option)
             for option in _shorter(stock, captures)
         ]
-        kept = [one for one in spared if _enough(one[0].after, one[1][2])]
+        kept = [entry for entry in spared if _enough(entry[0].after, entry[1][2])]
         if not kept:
             break
-        best, (_, _, captures) = min(kept, key=lambda one: one[0].minutes)
+        best, (_, _, captures) = min(kept, key=lambda entry: entry[0].minutes)
         steps.append(best)
         band = best.after
     return Design(captures, tuple(steps), now, band, captures.seconds(stock) / 60.0)
@@ -273,7 +273,7 @@ def _options(known: TorqueKnowledge, stock: Stock, captures: CaptureList) -> Ite
 
 def _shorter(stock: Stock, captures: CaptureList) -> list[_Option]:
     """Lists that lack one addition; what a first capture needs stays."""
-    found: list[_Option] = []
+    shorter_lists: list[_Option] = []
     speeds, pieces = captures.speeds, captures.pieces
     needed = set(_first_sweeps(stock, captures)[2].speeds)
     for speed in sorted(set(speeds)):
@@ -283,10 +283,10 @@ def _shorter(stock: Stock, captures: CaptureList) -> list[_Option]:
             what = f"without a sweep at {speed:.3g} rad/s"
             fewer = replace(captures, speeds=tuple(rest))
             if _balanced(stock, fewer):
-                found.append(("friction", what, fewer))
+                shorter_lists.append(("friction", what, fewer))
     if len(pieces) > FEWEST_PIECES:
         one_less = replace(captures, pieces=pieces[:-1])
-        found.append(("cut", "without the last piece", one_less))
+        shorter_lists.append(("cut", "without the last piece", one_less))
     if pieces and len(pieces[0]) > min(FEWEST_STROKES, stock.places):
         count = len(pieces[0]) - 1
         shorter = (
@@ -294,10 +294,10 @@ def _shorter(stock: Stock, captures: CaptureList) -> list[_Option]:
             if stock.rotates
             else tuple(piece[:-1] for piece in pieces)
         )
-        found.append(
+        shorter_lists.append(
             ("cut", "without the last stroke on every piece", replace(captures, pieces=shorter))
         )
-    return found
+    return shorter_lists
 
 
 def _balanced(stock: Stock, captures: CaptureList) -> bool:

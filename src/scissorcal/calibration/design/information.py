@@ -85,7 +85,7 @@ def friction_information(
     slopes = gradient(design.mean, point, STEP * design.layout.sd)
     variance = float(np.exp(2.0 * point[-1]))
     correlated = _window_covariance(design, noise)
-    found = {}
+    by_stroke = {}
     for label in np.unique(design.strokes):
         here = slopes[design.strokes == label]
         total = here.sum(axis=0)
@@ -93,8 +93,8 @@ def friction_information(
         spread = here.T @ _convolved(here, correlated) + stroke_sd**2 * np.outer(total, total)
         scores = spread / variance**2
         curvature[-1, -1] = scores[-1, -1] = 2.0 * len(here)
-        found[int(label)] = Information(curvature, _at_least(scores, curvature, design.share))
-    return found
+        by_stroke[int(label)] = Information(curvature, _at_least(scores, curvature, design.share))
+    return by_stroke
 
 
 def _at_least(scores: Array, curvature: Array, share: float | None) -> Array:
@@ -124,13 +124,13 @@ def cut_information(design: CutExperiment, point: Array) -> dict[int, Informatio
     slopes = slopes_at(replace(problem, standardised=candidate.likelihood.normal), point, step)
     assert slopes is not None
     errors = _errors(design, point, slopes)
-    found = {}
+    by_stroke = {}
     for label in np.unique(design.strokes):
         here = design.strokes == label
         curvature = likelihood_information(problem, point, step, slopes.where(here))
         by_kind = {kind: error[here].sum(axis=0) for kind, error in errors.items()}
-        found[int(label)] = Information(curvature, curvature, by_kind)
-    return found
+        by_stroke[int(label)] = Information(curvature, curvature, by_kind)
+    return by_stroke
 
 
 def line_information(design: CutExperiment, point: Array) -> Information:
@@ -151,13 +151,13 @@ def line_information(design: CutExperiment, point: Array) -> Information:
 
 def _errors(design: CutExperiment, point: Array, slopes: Slopes) -> dict[str, Array]:
     """Change of each segment's score (n, p) for a relative error of one, by kind of segment."""
-    found = {}
+    by_kind = {}
     for kind, changed in changed_designs(design).items():
         if kind == "line":
             continue
         moved = (changed.evaluate(point).standardised - slopes.z) / PERTURBATION
-        found[kind] = -moved[:, None] * slopes.by_mean
-    return found
+        by_kind[kind] = -moved[:, None] * slopes.by_mean
+    return by_kind
 
 
 def _window_covariance(design: FrictionExperiment, noise: TorqueNoise) -> Array:
@@ -237,17 +237,6 @@ class Knowledge:
         if self.between is not None:
             return self.between
         return usual_sd(self.layout, self.usual_scatter)
-
-    @property
-    def shares_of_prior(self) -> dict[str, float]:
-        """Standard deviation of each parameter as a share of its prior's, by name."""
-        sds = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return dict(zip(self.layout.names, (sds / self.layout.sd).tolist(), strict=True))
-
-    def sd_of(self, name: str) -> float:
-        """Standard deviation of one parameter in its unconstrained coordinate."""
-        place = self.layout.names.index(name)
-        return float(np.sqrt(self.covariance[place, place]))
 
     @property
     def _common(self) -> Information:

@@ -114,7 +114,7 @@ def outlook(
     return Outlook(
         chosen[0] if chosen else None,
         band.reached,
-        sum(one.seconds for one in chosen),
+        sum(stroke.seconds for stroke in chosen),
         len(chosen),
         band,
     )
@@ -162,7 +162,7 @@ def bounds(known: TorqueKnowledge) -> dict[str, Band]:
     }
     if edge.any():
         without["edge"] = replace(known, cut=_exact(known.cut, edge))
-    return {name: expected_band(one) for name, one in without.items()}
+    return {name: expected_band(knowledge) for name, knowledge in without.items()}
 
 
 _Offer = tuple[float, int, Information, float]
@@ -202,9 +202,9 @@ def _judged(
     after = (
         known.plus(friction=information) if capture == "friction" else known.plus(cut=information)
     )
-    found = judge(after)
-    gain = 60.0 * (band.excess - found.excess) / seconds
-    return NextStroke(speed, place, seconds, gain, after, found)
+    after_band = judge(after)
+    gain = 60.0 * (band.excess - after_band.excess) / seconds
+    return NextStroke(speed, place, seconds, gain, after, after_band)
 
 
 def _exact(known: Knowledge, which: NDArray[np.bool_]) -> Knowledge:

@@ -1,4 +1,4 @@
-"""What a design starts from: finished fits with their recordings, or the recipe's priors."""
+"""What a design starts from, fits or the recipe's priors; planned motion as a fit would see it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -6,15 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from scissorcal.aliases import Array
+from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.fit import cut_experiment, cut_optimum
 from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.known import USUAL_RATE, CutBasis, KnownFriction
-from scissorcal.calibration.cut.laws import CutLaw, allowed_laws
 from scissorcal.calibration.cut.model import CutExperiment
+from scissorcal.calibration.cut.path_motion import path_motion
 from scissorcal.calibration.cut.path_work import torque_noise_of
-from scissorcal.calibration.cut.scout import cut_prior
-from scissorcal.calibration.cut.structure import geometry_of
+from scissorcal.calibration.cut.scout import cut_prior, guess_at, make_experiment
+from scissorcal.calibration.cut.segments import cut_into_segments
+from scissorcal.calibration.cut.structure import CutLaw, allowed_laws, geometry_of
 from scissorcal.calibration.cut.widening import error_shares
 from scissorcal.calibration.design.band import Sharing
 from scissorcal.calibration.design.information import (
@@ -26,13 +27,22 @@ from scissorcal.calibration.design.information import (
 )
 from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.calibration.friction.layout import LawChoice, friction_layout, friction_precision
+from scissorcal.calibration.friction.model import FrictionExperiment, design
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
+from scissorcal.calibration.signals.weak_form import weigh
+from scissorcal.calibration.verify.simulated_motion import Motion, SmoothPiece
+from scissorcal.calibration.verify.simulated_recordings import (
+    cut_truth,
+    friction_truth,
+    simulate_cut,
+    simulate_friction,
+)
 from scissorcal.inference.curvature import gradient
 from scissorcal.model import EdgeDistribution, FrictionLaw, friction_torque
-from scissorcal.recipe.schema import Recipe
-from scissorcal.recording.recording import Joint, Recording
+from scissorcal.recipe.schema import FitFriction, Recipe
+from scissorcal.recording.recording import SAMPLE_DTYPE, Joint, Recording, Stroke
 
 EXPECTED_LAW = "stribeck+angle"
 """Law of friction that is expected before any data: what draft effort fits to scissors."""
@@ -173,7 +183,7 @@ def expected_cut(
     """
     fractures = ("none", "smooth", "rippled")
     laws = allowed_laws(recipe)
-    law = max(laws, key=lambda one: (fractures.index(one.fracture), one.loaded))
+    law = max(laws, key=lambda candidate: (fractures.index(candidate.fracture), candidate.loaded))
     basis = CutBasis.of(recipe, friction.known, edge)
     layout, prior = cut_prior(basis, law)
     geometry = basis.geometry
@@ -216,9 +226,9 @@ def sharing_of(recipe: Recipe, friction: FrictionState, cut: CutState) -> Sharin
     places = (names.index("offset_closing"), names.index("offset_opening"))
     floor = recipe.fit.cut.priors.friction_sd_floor_Nm
     if cut.knowledge.recordings:
-        own = np.einsum("ij,jk,ik->i", slopes, friction.knowledge.covariance, slopes)
+        variances = np.einsum("ij,jk,ik->i", slopes, friction.knowledge.covariance, slopes)
         stated = 1.0 / np.diag(cut.knowledge.prior)[list(places)]
-        rest = np.sqrt(np.maximum(stated - np.maximum(own, floor**2), 0.0))
+        rest = np.sqrt(np.maximum(stated - np.maximum(variances, floor**2), 0.0))
     else:
         rest = np.full(2, np.sqrt(2.0) * (friction.zero_sd or 0.0))
     return Sharing(slopes, places, floor, rest)
@@ -263,3 +273,104 @@ def _between(layout: Layout, fit: FitResult) -> Array | None:
 
 def _number(value: Any) -> float:
     return float(value) if value is not None and np.isfinite(value) else 0.0
+
+
+QUIET = TorqueNoise(0.0, 0.0, 0.01)
+
+
+@dataclass(frozen=True)
+class PlannedMotion:
+    """A planned motion without a pause, by tick (n,): rad, m, stroke's index and sheet (-1: none).
+
+    ``opening_step`` (rad) and ``advance_step`` (m) are the encoders'.
+    """
+
+    opening: Array
+    advance: Array
+    stroke: Integers
+    sheet: Integers
+    strokes: tuple[Stroke, ...]
+    tick_s: float
+    opening_step: float
+    advance_step: float
+
+
+def planned_friction(
+    motion: PlannedMotion,
+    settings: FitFriction,
+    structure: Mapping[str, Any],
+    layout: Layout,
+    point: Array,
+    zero_sd: float | None,
+) -> FrictionExperiment:
+    """The design of a fit to empty strokes that move as planned; its law is ``structure``'s.
+
+    ``point`` (p,) are unconstrained parameters of ``layout``, which the fit's design has too;
+    ``zero_sd`` (N m) is how well the sensors' zeros will be known.
+    """
+    values = {name: float(value) for name, value in layout.natural(point).items()}
+    truth = friction_truth(values, structure, QUIET)
+    recordings = simulate_friction((_motion(motion, "friction"),), truth, np.random.default_rng(0))
+    whole = weigh(recordings, settings.cutoff_Hz)
+    windows = whole.where(whole.bins.moving & (whole.bins.stroke >= 0))
+    strokes, choice = windows.bins.stroke.astype(np.int64), LawChoice.of(structure, zero_sd)
+    law = design(windows, strokes, choice, Joint("rotary"), settings.priors)
+    return replace(law, layout=layout, key={**law.key, "angle_center": structure["angle_center"]})
+
+
+def planned_cut(
+    motion: PlannedMotion,
+    basis: CutBasis,
+    law: CutLaw,
+    structure: Mapping[str, Any],
+    layout: Layout,
+    point: Array,
+) -> CutExperiment | None:
+    """The design of a fit to strokes through material that move as planned.
+
+    The crack is walked exactly along the motion with the parameters ``point`` (p,), through even
+    sheets. None where the fit would find no stroke that unloads the material.
+    """
+    values = {name: float(value) for name, value in layout.natural(point).items()}
+    even = {**values, "variation": 0.0, "sheet_variation": 0.0}
+    known = basis.friction
+    truth = cut_truth(even, structure, replace(known, noise=QUIET, stroke_sd=0.0), motion.tick_s)
+    recordings = simulate_cut((_motion(motion, "cut"),), truth, np.random.default_rng(0))
+    motions = path_motion(recordings, known.inertia)
+    guess, cuts = guess_at(structure, values), basis.recipe.scene.cut
+    segments = cut_into_segments(basis.data(motions), basis.geometry, guess, cuts)
+    if not segments.pieces:
+        return None
+    return make_experiment(segments, basis, law, values)
+
+
+def _motion(planned: PlannedMotion, kind: str) -> Motion:
+    """The motion as the simulation of recordings takes it, over samples without a torque yet."""
+    count = len(planned.opening)
+    samples = np.zeros(count, SAMPLE_DTYPE)
+    samples["sequence"] = np.arange(count)
+    samples["device_time_us"] = np.rint(1e6 * planned.tick_s * np.arange(count))
+    samples["opening"], samples["advance"] = planned.opening, planned.advance
+    samples["torque_command"] = 1e-3 * np.sign(np.arange(count) % 2 - 0.5)
+    samples["stroke"] = planned.stroke
+    recording = Recording(
+        kind="cut" if kind == "cut" else "friction",
+        samples=samples,
+        strokes=planned.strokes,
+        joint=Joint("rotary"),
+        source="planned capture",
+    )
+    piece = SmoothPiece(
+        start=0,
+        opening=planned.opening,
+        advance=planned.advance,
+        load=np.zeros(count),
+        stroke=np.zeros(count, dtype=np.int64),
+        sheet=planned.sheet,
+        tick_s=planned.tick_s,
+        error=0.0,
+        held=True,
+    )
+    recorded = np.ones(count, dtype=bool)
+    steps = planned.opening_step, planned.advance_step, float("nan")
+    return Motion(recording, recorded, (piece,), *steps)

@@ -133,8 +133,8 @@ def _residuals(fit: BladeFit, best: EdgeCandidate) -> Verdict:
     rows = [row for row in fit.photographs if len(row.residual) > 2]
     if not rows:
         return RESIDUAL.not_evaluated("The residuals of the points were not kept.")
-    found = [(_worst_stretch(row, fit, best), row) for row in rows]
-    (value, place, off, sd), row = max(found, key=lambda pair: pair[0][0])
+    worst_by_row = [(_worst_stretch(row, fit, best), row) for row in rows]
+    (value, place, off, sd), row = max(worst_by_row, key=lambda pair: pair[0][0])
     limit = float(-ndtri(0.5 * FALSE_ALARMS / (STRETCHES * len(rows))))
     size, unit = (1e3, "mm") if fit.metric else (100.0, "% of the length")
     return RESIDUAL.judge(
@@ -158,7 +158,7 @@ def _worst_stretch(
     station, residual = np.array(row.station), np.array(row.residual)
     several = len(fit.photographs) > 1
     parts = np.array_split(np.argsort(station), min(STRETCHES, len(station) // 2))
-    found = []
+    stretches = []
     for part in parts:
         place, off = float(station[part].mean()), float(residual[part].mean())
         noise = float(residual[part].std(ddof=1)) / np.sqrt(len(part))
@@ -167,11 +167,11 @@ def _worst_stretch(
             if several
             else 0.0
         )
-        own = row.away_sd if several else 0.0
+        of_photograph = row.away_sd if several else 0.0
         claimed = float(np.interp(place, fit.station, fit.offset.sd))
-        sd = float(np.sqrt(claimed**2 + noise**2 + apart**2 + own**2))
-        found.append((abs(off) / sd, place, off, sd))
-    return max(found)
+        sd = float(np.sqrt(claimed**2 + noise**2 + apart**2 + of_photograph**2))
+        stretches.append((abs(off) / sd, place, off, sd))
+    return max(stretches)
 
 
 def _lengths(pairs: Sequence[SeenPair]) -> Verdict:
@@ -182,7 +182,7 @@ def _lengths(pairs: Sequence[SeenPair]) -> Verdict:
     value = abs(worst.length_log_ratio) / worst.length_ratio_sd
     limit = float(-ndtri(0.5 * FALSE_ALARMS / len(pairs)))
     shorter = 100.0 * float(np.exp(-abs(worst.length_log_ratio)))
-    seen = (
+    said = (
         f"In {worst.source} one blade is {shorter:.1f} % as long as the other, {value:.1f} "
         "standard deviations from a pair of one length"
     )
@@ -194,8 +194,8 @@ def _lengths(pairs: Sequence[SeenPair]) -> Verdict:
     )
     return BLADE_LENGTHS.judge(
         value,
-        f"{seen}; at most {100 * FALSE_ALARMS:g} % of sound pairs exceed {limit:.2f}.",
-        f"{seen}; {limit:.2f} are allowed.{leaning} Or a tip was not found, or is broken: look at "
+        f"{said}; at most {100 * FALSE_ALARMS:g} % of sound pairs exceed {limit:.2f}.",
+        f"{said}; {limit:.2f} are allowed.{leaning} Or a tip was not found, or is broken: look at "
         "the picture.",
         threshold=limit,
     )
@@ -206,13 +206,13 @@ def _lamps(pairs: Sequence[SeenPair]) -> Verdict:
     if len(pairs) < 2:
         why = "One photograph has one lamp: a shadow taken for metal would not be noticed."
         return LAMPS_APART.not_evaluated(f"{why} Take another with the lamp elsewhere.")
-    seen = [pair.lamp_deg for pair in pairs if pair.lamp_deg is not None]
-    if len(seen) < len(pairs):
+    lamps = [pair.lamp_deg for pair in pairs if pair.lamp_deg is not None]
+    if len(lamps) < len(pairs):
         return LAMPS_APART.not_evaluated(
-            f"{len(pairs) - len(seen)} of {len(pairs)} photographs show no cast shadow that tells "
+            f"{len(pairs) - len(lamps)} of {len(pairs)} photographs show no cast shadow that tells "
             "where the lamp is."
         )
-    apart = max(abs((a - b + 180.0) % 360.0 - 180.0) for a, b in combinations(seen, 2))
+    apart = max(abs((a - b + 180.0) % 360.0 - 180.0) for a, b in combinations(lamps, 2))
     return LAMPS_APART.judge(
         apart,
         f"The scissors were lit from directions up to {apart:.0f} deg apart.",

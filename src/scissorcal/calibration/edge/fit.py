@@ -15,7 +15,6 @@ from scissorcal.calibration.edge.model import (
     CellData,
     EdgeEvidence,
     Family,
-    Found,
     basis_of,
     search,
 )
@@ -27,9 +26,9 @@ from scissorcal.calibration.edge.result import (
     PhotographRow,
 )
 from scissorcal.errors import InputError
-from scissorcal.inference import Effort, InferOptions
+from scissorcal.inference import Effort, InferOptions, Optimum
 from scissorcal.inference.infer import infer
-from scissorcal.inference.status import SamplingStatus
+from scissorcal.inference.problem import SamplingStatus
 from scissorcal.model import Edge, EdgeDistribution, draw_edges, edge_height
 from scissorcal.recipe.priors import BladePriors
 from scissorcal.recipe.schema import Recipe
@@ -287,16 +286,18 @@ def compare_edges(
     (`MOST_EVALUATIONS`, `SEARCH_EVALUATIONS`), and ``sentence`` says what came of it.
     """
     tell = progress or (lambda done, sentence: None)
-    found, evidences = [], []
+    optima, logs, evidences = [], [], []
     for number, family in enumerate(families):
         tell(0.4 * number / len(families), f"comparing edges: {family}")
         evidences.append(EdgeEvidence(data, basis_of(data, family, priors), priors))
-        found.append(search(evidences[-1]))
+        optimum, log_evidence = search(evidences[-1])
+        optima.append(optimum)
+        logs.append(log_evidence)
     sizes = [evidence.basis.columns.shape[1] for evidence in evidences]
-    chosen = _chosen(families, sizes, [searched.evidence for searched in found])
+    chosen = _chosen(families, sizes, logs)
     rows = tuple(
-        _row(data, family, searched, index == chosen)
-        for index, (family, searched) in enumerate(zip(families, found, strict=True))
+        _row(data, family, optima[index], logs[index], index == chosen)
+        for index, family in enumerate(families)
     )
     evidence = evidences[chosen]
     posterior = infer(
@@ -304,7 +305,7 @@ def compare_edges(
         effort,
         rng,
         count=_COUNT[effort],
-        optimum=found[chosen].optimum,
+        optimum=optima[chosen],
         options=InferOptions(
             budget=MOST_EVALUATIONS[effort] or None,
             progress=lambda done, sentence: tell(0.4 + 0.5 * done, sentence),
@@ -313,7 +314,7 @@ def compare_edges(
     draws = np.stack([_draw(evidence, u, rng) for u in posterior.draws])
     residual = data.offset - evidence.basis.columns @ draws.mean(axis=0)
     edge_posterior, natural = _edge_posterior(data, families[chosen], draws)
-    others = sum(searched.evaluations for index, searched in enumerate(found) if index != chosen)
+    others = sum(o.evaluations for index, o in enumerate(optima) if index != chosen)
     tell(1.0, f"edge fitted: {families[chosen]}")
     return EdgeComparison(
         rows,
@@ -326,10 +327,12 @@ def compare_edges(
     )
 
 
-def _row(data: CellData, family: Family, found: Found, chosen: bool) -> EdgeCandidate:
-    noise, rough, length, _, *more = (float(size) for size in np.exp(found.optimum.point))
+def _row(
+    data: CellData, family: Family, optimum: Optimum, log_evidence: float, chosen: bool
+) -> EdgeCandidate:
+    noise, rough, length, _, *more = (float(size) for size in np.exp(optimum.point))
     between = more[0] if data.several else 0.0
-    return EdgeCandidate(family, found.evidence, chosen, noise, rough, length, between)
+    return EdgeCandidate(family, log_evidence, chosen, noise, rough, length, between)
 
 
 def _chosen(families: Sequence[Family], sizes: Sequence[int], evidences: Sequence[float]) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.edge.cells import EdgeCells
 from scissorcal.inference import Cluster, Effort, Optimum, Problem
-from scissorcal.inference.status import SearchStatus
+from scissorcal.inference.problem import SearchStatus
 from scissorcal.model.bspline import spline_design
 from scissorcal.recipe.priors import BladePriors
 
@@ -72,21 +72,21 @@ class CellData:
     def _moved_together(self, photographs: tuple[EdgeCells, ...]) -> tuple[Array, Array]:
         """Columns (n, k) of common errors: those that stay as they are, and those of `MOVING`."""
         shared: dict[tuple[str, int], Array] = {}
-        own: list[tuple[str, Array]] = []
+        columns: list[tuple[str, Array]] = []
         for number, cells in enumerate(photographs):
             here = self.photo == number
-            seen: dict[str, int] = {}
+            counts: dict[str, int] = {}
             for column, name in zip(cells.modes.T, cells.mode_names, strict=True):
                 full = np.zeros(len(self.station))
                 full[here] = column
                 if name in ("shared mapping", "tone"):
-                    key = (name, seen.setdefault(name, 0))
-                    seen[name] += 1
+                    key = (name, counts.setdefault(name, 0))
+                    counts[name] += 1
                     shared[key] = shared.get(key, np.zeros_like(full)) + full
                 else:
-                    own.append((name, full))
-        fixed = [*shared.values(), *(column for name, column in own if name not in MOVING)]
-        moving = [column for name, column in own if name in MOVING]
+                    columns.append((name, full))
+        fixed = [*shared.values(), *(column for name, column in columns if name not in MOVING)]
+        moving = [column for name, column in columns if name in MOVING]
         nothing = np.zeros((len(self.station), 0))
         return tuple(np.stack(c, axis=1) if c else nothing for c in (fixed, moving))  # type: ignore[return-value]
 
@@ -102,9 +102,9 @@ class CellData:
         for number in range(int(self.photo[-1]) + 1):
             here = self.photo == number
             line = np.vander(s[here], 2)
-            own = np.linalg.lstsq(line, off[here], rcond=None)[0]
-            off[here] -= line @ own
-            moved.extend(own)
+            line_of_photograph = np.linalg.lstsq(line, off[here], rcond=None)[0]
+            off[here] -= line @ line_of_photograph
+            moved.extend(line_of_photograph)
         return float(np.sqrt(np.mean(np.square(moved)))), float(np.sqrt(np.mean(off**2)))
 
 
@@ -261,28 +261,18 @@ class EdgeEvidence:
     def starts(self) -> Array:
         """Where searches begin, (2, p): the prior's median, and what photographs plainly say."""
         between, within = self.data.disagreement()
-        seen = self.middle.copy()
-        seen[3] = np.log(max(within, 1e-12))
+        observed = self.middle.copy()
+        observed[3] = np.log(max(within, 1e-12))
         if self.data.several:
-            seen[4] = np.log(max(between, 1e-12))
+            observed[4] = np.log(max(between, 1e-12))
         reach = _START_BOUND * self.sd
-        return np.stack([self.middle, np.clip(seen, self.middle - reach, self.middle + reach)])
+        return np.stack([self.middle, np.clip(observed, self.middle - reach, self.middle + reach)])
 
 
-@dataclass(frozen=True)
-class Found:
-    """An optimum of the sizes, and the logarithm of the evidence by Laplace's approximation."""
+def search(evidence: EdgeEvidence) -> tuple[Optimum, float]:
+    """The most probable sizes, from each start by a quasi-Newton method, and the log evidence.
 
-    optimum: Optimum
-    evidence: float
-
-    @property
-    def evaluations(self) -> int:
-        return self.optimum.evaluations
-
-
-def search(evidence: EdgeEvidence) -> Found:
-    """The most probable sizes, from each start by a quasi-Newton method, and the evidence there.
+    The evidence is by Laplace's approximation.
 
     Distinct optima are kept, since disagreement of photographs can be explained in two ways.
     """
@@ -334,7 +324,7 @@ def search(evidence: EdgeEvidence) -> Found:
         status,
         tuple(clusters),
     )
-    return Found(optimum, clusters[0].value + len(sd) * _HALF_LOG_TWO_PI + volume)
+    return optimum, clusters[0].value + len(sd) * _HALF_LOG_TWO_PI + volume
 
 
 def _log_volume(evidence: EdgeEvidence, z: Array) -> float:
@@ -349,6 +339,6 @@ def _log_volume(evidence: EdgeEvidence, z: Array) -> float:
         / (2.0 * step)
         for reach in step * np.eye(len(z))
     ]
-    found = np.array(curvature)
-    levels = np.maximum(np.linalg.eigvalsh(0.5 * (found + found.T)), _FLOOR)
+    matrix = np.array(curvature)
+    levels = np.maximum(np.linalg.eigvalsh(0.5 * (matrix + matrix.T)), _FLOOR)
     return float(np.sum(np.log(sd)) - 0.5 * np.sum(np.log(levels)))

@@ -17,9 +17,9 @@ from scissorcal.calibration.fit_model import FrictionRun
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.friction.refusals import FEWEST_BINS
 from scissorcal.calibration.result import Effort, FitResult, Proposal
+from scissorcal.calibration.signals.filtering import spline
 from scissorcal.calibration.signals.segments import bridge
 from scissorcal.calibration.signals.weak_form import HELD, Windows, weigh
-from scissorcal.calibration.signals.window_length import spline
 from scissorcal.errors import InputError
 from scissorcal.kernel import presliding_path
 from scissorcal.recipe.friction import AdvanceSettings
@@ -283,8 +283,8 @@ def find_actuation(recordings: tuple[Recording, ...], cutoff_Hz: float) -> Actua
 
     starts = [np.array([delay, lag]) for delay in DELAYS for lag in LAGS]
     best = min(starts, key=badness)
-    found = minimize(badness, best, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6})
-    return Actuation(*np.abs(found.x).tolist())
+    fitted = minimize(badness, best, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6})
+    return Actuation(*np.abs(fitted.x).tolist())
 
 
 def _columns(windows: Windows) -> Array:

@@ -11,7 +11,7 @@ from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.parameters import Layout
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, side_of
-from scissorcal.model.transforms import LOG
+from scissorcal.model.terms import LOG
 from scissorcal.verdicts import INTERVALS, Check, Verdict
 
 MOST_STEPS = 30
@@ -54,8 +54,8 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
     """
     values = {name: float(value) for name, value in experiment.layout.natural(point).items()}
     rows = _rated(experiment, values)
-    found = [level for row in rows for level in _freed(experiment, row, share)]
-    suspected = [level for level in found if level.sds_below > PHYSICAL.threshold]
+    levels = [level for row in rows for level in _freed(experiment, row, share)]
+    suspected = [level for level in levels if level.sds_below > PHYSICAL.threshold]
     settled, felt = _settled(experiment, rows, share) if suspected else ([], 0.0)
     negative = sorted(settled) if felt >= NOTHING else []
     good = "No friction level is negative in an unconstrained fit, and the inertia is not."
@@ -65,10 +65,10 @@ def physical_verdict(experiment: FrictionExperiment, point: Array, share: float)
             "of the drive: any freedom explains a part of what a law lacks."
         )
     worst = {level.name: level for level in negative}.values()
-    listed = ", ".join(f"{one.name} = {one.value:.2g} (sd {one.sd:.1g})" for one in worst)
-    remedies = "; ".join(dict.fromkeys(one.remedy for one in worst))
+    listed = ", ".join(f"{entry.name} = {entry.value:.2g} (sd {entry.sd:.1g})" for entry in worst)
+    remedies = "; ".join(dict.fromkeys(entry.remedy for entry in worst))
     bad = f"An unconstrained fit gives {listed}, and no joint has a negative level: {remedies}."
-    value = max((one.sds_below for one in worst), default=0.0)
+    value = max((entry.sds_below for entry in worst), default=0.0)
     return PHYSICAL.judge(value, good, bad)
 
 
@@ -80,7 +80,7 @@ def start_verdict(experiment: FrictionExperiment, point: Array) -> Verdict:
     layout, starts = experiment.layout, experiment.candidate(experiment.observed).starts
     apart = np.abs(starts - point) / layout.sd
     judged = [not parameter.measured_prior for parameter in layout.parameters]
-    names = [name for name, own in zip(layout.names, judged, strict=True) if own]
+    names = [name for name, counts in zip(layout.names, judged, strict=True) if counts]
     least = apart.min(axis=0)[judged]
     stuck = [name for name, far in zip(names, least, strict=True) if far < START.threshold]
     value = float(least.min())
@@ -224,7 +224,7 @@ def _settled(
     held, free = (
         min(
             (_searched(experiment, row, weights, free=free) for row in rows),
-            key=lambda one: one[0],
+            key=lambda searched: searched[0],
         )
         for free in (False, True)
     )
@@ -269,10 +269,10 @@ def _searched(
     scale = {name: max(abs(begin[name]), floor) for name in names}
 
     def named(x: Array) -> dict[str, float]:
-        found = dict(values)
+        point = dict(values)
         for name, at in zip(names, x, strict=True):
-            found[name] = float(np.exp(np.clip(at, *LOGS)) if name in logs else at * scale[name])
-        return found
+            point[name] = float(np.exp(np.clip(at, *LOGS)) if name in logs else at * scale[name])
+        return point
 
     def left(x: Array) -> Array:
         return (experiment.observed - experiment.mean_at(_arrays(named(x)))) * weights / unit

@@ -13,7 +13,7 @@ from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.search import scan_nodes
 from scissorcal.inference import Posterior, Stop, gradient, tails_of
 from scissorcal.model.friction_terms import NUISANCE, PARAMETERS, parts_of, side_of
-from scissorcal.model.transforms import LOG, LOGIT
+from scissorcal.model.terms import LOG, LOGIT
 
 USUAL_LAWS = {"rotary": "stribeck+angle", "linear": "coulomb+viscous"}
 """The law that evidence takes on most days, by the kind of joint: the pivot's on 12 of 12 days of
@@ -45,7 +45,7 @@ def choose_law(
     """Fit every candidate law and choose one.
 
     The fits of all laws, that of the chosen one, its design, and notes on laws that were passed
-    over: those with build-up after reversals, where :func:`gain_of_build_up` is less
+    over: those with build-up after reversals, where :func:`_gain_of_build_up` is less
     than evidence asks for. The chosen law is fitted again with a Student-t noise where its
     residuals have outliers; that fit takes the place of the first. A share ``lack_of_fit`` of the
     drive that is stated as the law's error is what makes laws differ, and residuals below it have
@@ -54,21 +54,21 @@ def choose_law(
     compared: list[FittedCandidate] = []
     by_name: dict[str, FittedCandidate] = {}
     passed: dict[str, float] = {}
-    every, laws = laws, []
-    for index, law in enumerate(every):
+    all_laws, laws = laws, []
+    for index, law in enumerate(all_laws):
         plain = by_name.get(law.name.replace(BUILD_UP, ""))
         if plain is not None and law.name not in by_name:
-            gain = gain_of_build_up(plain, law)
+            gain = _gain_of_build_up(plain, law)
             if gain < POSITIVE_EVIDENCE:
                 passed[law.name] = gain
                 continue
-        tell(0.6 * index / len(every), f"friction: trying {law.name}")
+        tell(0.6 * index / len(all_laws), f"friction: trying {law.name}")
         laws.append(law)
         compared.append(fit_candidate(law.candidate(law.observed), law.series, law.strokes, stop))
         by_name[law.name] = compared[-1]
     drive = _rms(laws[0].observed)
     chosen = choose(compared, drive, lack_of_fit)
-    place = next(i for i, one in enumerate(compared) if one.candidate is chosen.candidate)
+    place = next(i for i, entry in enumerate(compared) if entry.candidate is chosen.candidate)
     law = replace(laws[place], share=chosen.candidate.share)
     likelihood, point = chosen.candidate.likelihood, chosen.optimum.point
     if _rms(likelihood.residuals(point)) < lack_of_fit * drive:
@@ -93,7 +93,7 @@ def _notes(passed: Mapping[str, float]) -> tuple[str, ...]:
     )
 
 
-def gain_of_build_up(plain: FittedCandidate, rich: FrictionExperiment) -> float:
+def _gain_of_build_up(plain: FittedCandidate, rich: FrictionExperiment) -> float:
     """Log density (nats) that build-up after reversals would add to a fitted law, by a score test.
 
     ``rich`` is the law of ``plain`` with build-up, over the same windows. At each length of the

@@ -18,8 +18,8 @@ Product = tuple[float, tuple[str, ...]]
 Cell = tuple[tuple[int, ...], tuple[int, ...]]
 """Nodes of Stribeck's speed and of Dahl's length that parameters lie between, four or one each."""
 
-_SCALED = next(one for one in PARAMETERS.values() if one.role is Role.DRY and one.scale)
-_SHARE = next(one for one in PARAMETERS.values() if one.role is Role.BUILD_UP)
+_SCALED = next(term for term in PARAMETERS.values() if term.role is Role.DRY and term.scale)
+_SHARE = next(term for term in PARAMETERS.values() if term.role is Role.BUILD_UP)
 SCALES = (_SCALED.scale, "presliding_length")
 
 RATE_SPACING, LENGTH_SPACING = 0.15, 0.2
@@ -85,8 +85,8 @@ class FrictionBasis:
     def __call__(self, values: Mapping[str, Array]) -> Array:
         """Friction (n,) from a law's parameters by name; those it lacks are zero."""
         fixed, *scaled = self.coefficients(values)
-        own = np.concatenate([np.zeros(len(DRIVE)), fixed[len(DRIVE) :]])
-        return self._total([own, *scaled], values)
+        friction = np.concatenate([np.zeros(len(DRIVE)), fixed[len(DRIVE) :]])
+        return self._total([friction, *scaled], values)
 
     def drive(self, values: Mapping[str, Array]) -> Array:
         """Friction, inertia, offset, lateness and cogging together (n,)."""
@@ -156,8 +156,8 @@ class FrictionBasis:
             for part in self.factors:
                 rows = []
                 for _, wanted in part:
-                    found = [side_of(name, names) for name in wanted]
-                    row = [zero if name is None else names.index(name) for name in found]
+                    sides = [side_of(name, names) for name in wanted]
+                    row = [zero if name is None else names.index(name) for name in sides]
                     rows.append([*row, one, one][:3])
                 places = np.array(rows, dtype=np.int64)
                 signs = np.array([sign for sign, _ in part])
@@ -180,12 +180,12 @@ class FrictionBasis:
         sliding = [name for term in self._sliding for name in term.names(symmetric=False)]
 
         def placed(sign: float, *names: str) -> list[Product]:
-            return [(sign, (*names, *one)) for one in place]
+            return [(sign, (*names, *product)) for product in place]
 
         fixed: list[Product] = [(-1.0 if name == "delay" else 1.0, (name,)) for name in DRIVE]
         fixed += [(1.0, (term.name,)) for term in self._plain]
-        fixed += [one for name in (*dry, *sliding) for one in placed(1.0, name)]
-        late = [one for name in dry for one in placed(-1.0, share, name)]
+        fixed += [product for name in (*dry, *sliding) for product in placed(1.0, name)]
+        late = [product for name in dry for product in placed(-1.0, share, name)]
         coupled = placed(-1.0, share, level)
         return tuple(fixed), tuple(placed(1.0, level)), tuple(late), tuple(coupled)
 
@@ -218,7 +218,7 @@ class FrictionBasis:
     def _levels(self) -> Array:
         def levels(here: slice) -> list[Array]:
             sign = np.sign(self.windows.rate[here])
-            dry = [sign * one for one in self._levels_of(self._dry, here)]
+            dry = [sign * level for level in self._levels_of(self._dry, here)]
             return [*dry, *self._levels_of(self._sliding, here)]
 
         return self._weigh(levels)
@@ -279,12 +279,12 @@ class FrictionBasis:
         """
 
         def placed(here: slice) -> list[Array]:
-            away, found = self.windows.opening[here] - self._center, []
+            away, powers = self.windows.opening[here] - self._center, []
             for column in columns(here):
-                found.append(column)
+                powers.append(column)
                 for _ in self._place:
-                    found.append(found[-1] * away)
-            return found
+                    powers.append(powers[-1] * away)
+            return powers
 
         return self.windows.averages(placed).T
 

@@ -60,7 +60,7 @@ def friction_curve(fit: FitResult) -> FrictionCurve | None:
     one_way = np.geomspace(SLOWEST_SHARE * fastest, fastest, POINTS_EACH_WAY)
     rate = np.concatenate([-one_way[::-1], one_way])
     center = _center(fit)
-    curves = friction_at(fit, _draws(fit, MOST_DRAWS), np.asarray(center), rate[None, :])
+    curves = _friction_at(fit, _draws(fit, MOST_DRAWS), np.asarray(center), rate[None, :])
     low, high = np.quantile(curves, [0.05, 0.95], axis=0)
     return FrictionCurve(center, rate, curves.mean(axis=0), low, high)
 
@@ -68,8 +68,8 @@ def friction_curve(fit: FitResult) -> FrictionCurve | None:
 def partial_residuals(fit: FitResult) -> Array:
     """What was measured less all of the model but friction, (n,)."""
     series = fit.series
-    own = friction_at(fit, fit.map_point[:, None], series.opening, series.opening_rate)
-    return np.asarray(own + series.measured - series.predicted)
+    friction = _friction_at(fit, fit.map_point[:, None], series.opening, series.opening_rate)
+    return np.asarray(friction + series.measured - series.predicted)
 
 
 def friction_map(fit: FitResult) -> FrictionMap | None:
@@ -88,14 +88,14 @@ def friction_map(fit: FitResult) -> FrictionMap | None:
     rate = np.concatenate([-speeds[::-1], speeds])
     opening = np.linspace(low, high, OPENINGS)
     w, theta = (values.ravel() for values in np.meshgrid(rate, opening, indexing="ij"))
-    curves = np.abs(friction_at(fit, _draws(fit, MAP_DRAWS), theta, w))
+    curves = np.abs(_friction_at(fit, _draws(fit, MAP_DRAWS), theta, w))
     residual = _residuals(fit, w, theta, float(high - low) / OPENINGS)
     shape = (len(rate), len(opening))
     grids = (curves.mean(axis=0), curves.std(axis=0), residual)
     return FrictionMap(rate, opening, *(grid.reshape(shape) for grid in grids))
 
 
-def friction_at(fit: FitResult, columns: Array, opening: Array, rate: Array) -> Array:
+def _friction_at(fit: FitResult, columns: Array, opening: Array, rate: Array) -> Array:
     """The law for parameters ``columns``, whose axis of parameters is the last but one."""
     named = {p.name: np.take(columns, i, axis=-2) for i, p in enumerate(fit.parameters)}
     return friction_torque(FrictionLaw.of_fit(named, _center(fit)), opening, rate)
@@ -109,15 +109,15 @@ def _draws(fit: FitResult, most: int) -> Array:
 def _residuals(fit: FitResult, rate: Array, opening: Array, reach: float) -> Array:
     series = fit.series
     residual = np.sign(series.opening_rate) * (series.measured - series.predicted)
-    found = np.full(len(rate), np.nan)
+    means = np.full(len(rate), np.nan)
     for place, (w, theta) in enumerate(zip(rate, opening, strict=True)):
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = series.opening_rate / w
         near = (ratio > NEAR_SPEED[0]) & (ratio < NEAR_SPEED[1])
         near &= np.abs(series.opening - theta) <= reach
         if np.count_nonzero(near) >= FEWEST_SAMPLES:
-            found[place] = np.mean(residual[near])
-    return found
+            means[place] = np.mean(residual[near])
+    return means
 
 
 def _center(fit: FitResult) -> float:

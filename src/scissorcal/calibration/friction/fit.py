@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.assemble import CriticRequest, Particulars, assemble
+from scissorcal.calibration.assemble import Particulars, assemble
 from scissorcal.calibration.between import (
     NOT_KNOWN,
     BetweenRecordings,
@@ -45,15 +45,18 @@ from scissorcal.calibration.friction.probed import (
     with_pushed_inertia,
 )
 from scissorcal.calibration.friction.refusals import FEWEST_BINS, refuse_friction
-from scissorcal.calibration.parameters import StatedPrior
-from scissorcal.calibration.result import Effort, FitResult, FittedParameter, in_words
-from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.calibration.parameters import FittedParameter, StatedPrior, in_words
+from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.signals.filtering import HALF_AT, Bins
 from scissorcal.calibration.signals.sensors import inspect_sensors
-from scissorcal.calibration.signals.soundness import interruptions, refuse_unsound
-from scissorcal.calibration.signals.steadiness import Steadiness, steadiness
+from scissorcal.calibration.signals.soundness import (
+    Steadiness,
+    interruptions,
+    refuse_unsound,
+    steadiness,
+)
 from scissorcal.calibration.signals.usage import usage_of_windows
 from scissorcal.calibration.signals.weak_form import Windows, next_cutoff, weigh
-from scissorcal.calibration.signals.window_length import HALF_AT
 from scissorcal.calibration.signals.zeros import DriveZero, idle_noise, without_zeros, zero_verdicts
 from scissorcal.inference import InferOptions, Posterior, infer
 from scissorcal.model.friction_terms import NUISANCE, needs_load
@@ -154,8 +157,10 @@ def fit_friction(
         Outcome(law, effort, compared, chosen, posterior, structure, simulated=prior is not None),
         recordings,
         usage,
-        Particulars(verdicts, notes, diagnostics | (zero.as_dict() if zero else {})),
-        CriticRequest(
+        Particulars(
+            verdicts,
+            notes,
+            diagnostics | (zero.as_dict() if zero else {}),
             run.critic or (settings.critic and effort != "draft"),
             tolerance=None if prior else run.tolerance,
             known=("time",) if zero and np.isfinite(zero.drift) else (),
@@ -177,8 +182,8 @@ def friction_experiment(
     joint = recordings[0].joint
     cleaned, zero = _cleaned(recordings, settings, simulated=False)
     usable = inspect_sensors(recordings).usable
-    every = _slid(steadiness(recordings), cleaned, settings.cutoff_Hz, usable)
-    windows = every.where(every.bins.moving)
+    whole = _slid(steadiness(recordings), cleaned, settings.cutoff_Hz, usable)
+    windows = whole.where(whole.bins.moving)
     settings = with_probed(settings, SlowFriction.of(recordings, windows.bins, settings))
     zero_sd = zero.sd if zero and _has_offset(fit) else None
     choice = LawChoice.of(fit.structure, zero_sd)
@@ -222,12 +227,12 @@ def _diagnostics(
     point = chosen.optimum.point
     noise = sample_noise(law, point, idle_noise(recordings))
     probe = newest_probe(recording.device for recording in recordings)
-    seen = probe.facts if probe else {}
+    facts = probe.facts if probe else {}
     residuals = chosen.candidate.likelihood.residuals(point)
     return {
         "window_lengthening": law.windows.lengthening,
         "jackknife_sd": jackknife(law, point, NUISANCE),
-        **({PRESLIDING: seen[PRESLIDING]} if PRESLIDING in seen else {}),
+        **({PRESLIDING: facts[PRESLIDING]} if PRESLIDING in facts else {}),
         **(between.diagnostics() if between else {}),
         **noise_diagnostics(noise),
         "stroke_offset_sd_Nm": stroke_offsets(residuals, law.strokes, law.windows, noise),
@@ -256,8 +261,8 @@ def _bandwidth(
             f"fit.friction.cutoff_Hz to {longer_Hz:.3g} or less, or log at a higher rate."
         )
         return BANDWIDTH.verdict("fail", None, why)
-    every = weighed(other_Hz)
-    windows = every.where(every.bins.moving)
+    whole = weighed(other_Hz)
+    windows = whole.where(whole.bins.moving)
     if len(windows.first) < FEWEST_BINS:
         why = f"At {other_Hz:.3g} Hz too little motion is left to compare cutoffs."
         return BANDWIDTH.not_evaluated(why)

@@ -17,8 +17,7 @@ from scissorcal.calibration.parameters import Layout, StatedPrior
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.model.friction_terms import CANDIDATES, NUISANCE, side_of, terms_of
-from scissorcal.model.terms import Role, Term
-from scissorcal.model.transforms import LOG
+from scissorcal.model.terms import LOG, Role, Term
 from scissorcal.recipe.priors import JointPriors
 from scissorcal.recording.recording import Joint
 

@@ -17,7 +17,7 @@ from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.friction.columns import SCALES, Cell, FrictionBasis, coupled_nodes
 from scissorcal.calibration.parameters import Layout
 from scissorcal.inference.noise import runs
-from scissorcal.model.transforms import IDENTITY, Transform
+from scissorcal.model.terms import IDENTITY, Transform
 
 Block = tuple[str, int, int]
 
@@ -67,11 +67,11 @@ class StrokeMoments:
     def squares(self, cell: Cell, factors: Array) -> Array:
         """Squares that factors (k, q) of a cell's columns leave in each stroke, (k, strokes)."""
         rows = [self._columns(block) for block in _blocks(cell)]
-        found = np.zeros((len(factors), len(self.labels)))
+        squares = np.zeros((len(factors), len(self.labels)))
         for stroke, low, high in self._runs:  # a run at a time stays in the cache
             left = factors @ np.concatenate([row[:, low:high] for row in rows])
-            found[:, stroke] += np.einsum("kn,kn->k", left, left)
-        return found
+            squares[:, stroke] += np.einsum("kn,kn->k", left, left)
+        return squares
 
     def assembled(
         self, cell: Cell, products: Callable[[Block, Block], Array], shape: tuple[int, ...]
@@ -82,9 +82,9 @@ class StrokeMoments:
         ends = np.cumsum([0, *(known[a, a].shape[-1] for a in blocks)]).tolist()
         places = {a: slice(*bounds) for a, bounds in zip(blocks, pairwise(ends), strict=True)}
         result = np.empty((*shape, ends[-1], ends[-1]))
-        for (a, b), found in known.items():
-            result[..., places[a], places[b]] = found
-            result[..., places[b], places[a]] = np.swapaxes(found, -1, -2)
+        for (a, b), product in known.items():
+            result[..., places[a], places[b]] = product
+            result[..., places[b], places[a]] = np.swapaxes(product, -1, -2)
         return result
 
     def _columns(self, block: Block) -> Array:
@@ -130,8 +130,8 @@ class ReducedLaw:
         squares = np.empty(len(points))
         for cell, here in self._by_cell(points):
             factors, products = self.factors(points[here], cell), self.summed(cell)
-            found = np.einsum("kq,kq->k", factors @ products, factors)
-            squares[here] = np.maximum(found, LEAST * products[0, 0])
+            left = np.einsum("kq,kq->k", factors @ products, factors)
+            squares[here] = np.maximum(left, LEAST * products[0, 0])
         size = points[:, -1]
         return np.asarray(-0.5 * squares * np.exp(-2.0 * size) - self.counted * size)
 
@@ -149,9 +149,9 @@ class ReducedLaw:
         residuals of several draws.
         """
         squares = np.empty((len(draws), len(self.moments.labels)))
-        for cell, every in self._by_cell(draws):
-            for first in range(0, len(every), DRAWS_AT_ONCE):
-                here = every[first : first + DRAWS_AT_ONCE]
+        for cell, places in self._by_cell(draws):
+            for first in range(0, len(places), DRAWS_AT_ONCE):
+                here = places[first : first + DRAWS_AT_ONCE]
                 squares[here] = self.moments.squares(cell, self.factors(draws[here], cell))
         size = draws[:, -1:]
         return np.asarray(-0.5 * squares * np.exp(-2.0 * size) - self.moments.counts * size)
@@ -163,9 +163,9 @@ class ReducedLaw:
     def factors_and_slopes(self, u: Array, cell: Cell) -> tuple[Array, Array]:
         """Factors (q,) at ``u`` (p,) and their derivatives (q, p - 1), worked out at once."""
         reach = STEP * np.eye(len(u))[:-1]
-        every = self.factors(np.concatenate([u[None, :], u + reach, u - reach]), cell)
-        above, below = np.split(every[1:], 2)
-        return every[0], np.asarray((above - below).T / (2.0 * STEP))
+        values = self.factors(np.concatenate([u[None, :], u + reach, u - reach]), cell)
+        above, below = np.split(values[1:], 2)
+        return values[0], np.asarray((above - below).T / (2.0 * STEP))
 
     def slope(self, u: Array) -> Array:
         """Derivative of the log-likelihood at ``u`` (p,), shape (p,)."""
@@ -179,10 +179,10 @@ class ReducedLaw:
         """Fisher's information of the likelihood at ``u`` (p,), shape (p, p)."""
         cell = self.cell_at(u)
         slopes = self.slopes(u, cell)
-        found = np.zeros((len(u), len(u)))
-        found[:-1, :-1] = slopes.T @ self.summed(cell) @ slopes * np.exp(-2.0 * u[-1])
-        found[-1, -1] = 2.0 * self.counted
-        return found
+        information = np.zeros((len(u), len(u)))
+        information[:-1, :-1] = slopes.T @ self.summed(cell) @ slopes * np.exp(-2.0 * u[-1])
+        information[-1, -1] = 2.0 * self.counted
+        return information
 
     def cell_at(self, u: Array) -> Cell:
         """The nodes of the scales that ``u`` (p,) lies between."""
@@ -227,8 +227,8 @@ class ReducedLaw:
         basis = self.moments.basis
         scales = [None if place is None else known[..., place] for place in self._scales]
         weighed = [
-            (scaled.weights_over(scale, nodes), own)
-            for scale, nodes, scaled, own in zip(
+            (scaled.weights_over(scale, nodes), of_columns)
+            for scale, nodes, scaled, of_columns in zip(
                 scales, cell, (basis.stribeck, basis.lag), (stribeck, late), strict=True
             )
             if scale is not None and nodes
@@ -236,8 +236,8 @@ class ReducedLaw:
         rate, length = scales
         if rate is not None and length is not None:
             weighed.append((basis.coupled_weights(rate, length, cell), coupled))
-        for weights, own in weighed:
-            joined = weights[..., :, None] * own[..., None, :]
+        for weights, of_columns in weighed:
+            joined = weights[..., :, None] * of_columns[..., None, :]
             parts.append(joined.reshape((*u.shape[:-1], -1)))
         return np.concatenate(parts, axis=-1)
 
@@ -251,9 +251,9 @@ class ReducedLaw:
     @cached_property
     def _transformed(self) -> list[tuple[Transform, Integers]]:
         """Each transform but the identity, with the places of its parameters."""
-        own = [parameter.transform for parameter in self.layout.parameters]
-        kinds = [one for one in dict.fromkeys(own) if one != IDENTITY]
-        return [(kind, np.flatnonzero([one == kind for one in own])) for kind in kinds]
+        transforms = [parameter.transform for parameter in self.layout.parameters]
+        kinds = [used for used in dict.fromkeys(transforms) if used != IDENTITY]
+        return [(kind, np.flatnonzero([used == kind for used in transforms])) for kind in kinds]
 
     @cached_property
     def _weights(self) -> Array:

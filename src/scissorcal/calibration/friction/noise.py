@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.moments import FIXED, MEASURED, StrokeMoments
-from scissorcal.calibration.result import FittedParameter, in_words
+from scissorcal.calibration.parameters import FittedParameter, in_words
 from scissorcal.calibration.signals.segments import by_label, stretches
 from scissorcal.calibration.signals.torque_noise import TorqueNoise, torque_noise
 from scissorcal.calibration.signals.weak_form import Windows

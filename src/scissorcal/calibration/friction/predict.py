@@ -13,6 +13,7 @@ from scissorcal.calibration.friction.model import FrictionExperiment
 from scissorcal.calibration.friction.search import search_from
 from scissorcal.calibration.friction.transmission import LoadSolver, two_ended
 from scissorcal.calibration.result import FitResult
+from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.weak_form import Windows, weigh
 from scissorcal.calibration.signals.zeros import DriveZero, without_zeros
 from scissorcal.errors import InputError
@@ -101,7 +102,8 @@ def effort_band(design: FrictionExperiment, fit: FitResult, level: float = 0.9) 
     folds = _Folds.of(design, fit)
     return _band(
         folds,
-        _Judged(design.strokes, design.bins.recording, np.ones(len(design.observed), dtype=bool)),
+        design.strokes,
+        design.bins,
         lambda point: design.observed - design.mean(point),
         level,
         folds.freedom(),
@@ -127,7 +129,8 @@ def load_band(
     folds = _Folds.of(design, fit)
     return _band(
         folds,
-        _Judged(_carried(design, windows), windows.bins.recording, windows.bins.moving),
+        _carried(design, windows),
+        windows.bins,
         lambda point: solver(design.layout.natural(point)) - measured,
         level,
         float(len(folds.recordings)),
@@ -201,15 +204,15 @@ def half_width(errors: Array, units: Integers, level: float, freedom: float) -> 
     order = np.argsort(size, kind="stable")
     size, unit, count = size[order], unit[order], len(labels)
     mass = 1.0 / (counts[unit] * count)
-    found = _quantile(size, mass, level)
+    width = _quantile(size, mass, level)
     if enough(count, level):
-        held = count * np.bincount(unit, mass * (size <= found), count)
+        held = count * np.bincount(unit, mass * (size <= width), count)
         rho = min(float(np.mean((held - level) ** 2)) / (level * (1.0 - level)), 1.0)
         return _quantile(size, mass, min(level * (1.0 + rho / count), 1.0)), True
     tail = 0.5 + 0.5 * level
     student = float(t.ppf(tail, max(freedom, 1.0)))
     rms = float(np.sqrt(np.sum(mass * size**2)))
-    return max(found * student / float(norm.ppf(tail)), rms * student), False
+    return max(width * student / float(norm.ppf(tail)), rms * student), False
 
 
 def enough(count: int, level: float) -> bool:
@@ -228,17 +231,18 @@ def _quantile(ascending: Array, mass: Array, level: float) -> float:
 
 def _band(
     folds: "_Folds",
-    judged: "_Judged",
+    strokes: Integers,
+    bins: Bins,
     errors: Callable[[Array], Array],
     level: float,
     freedom: float,
 ) -> Band:
-    """The band of the windows that are ``judged``; ``errors`` (n,) are by a point.
+    """The band of windows with these ``strokes`` (n,) and ``bins``; ``errors`` (n,) are by a point.
 
     Strokes are the units until recordings are enough; ``freedom`` is that of the recordings' mean
     squared error.
     """
-    strokes, recordings, moving = judged.strokes, judged.recordings, judged.moving
+    recordings, moving = bins.recording, bins.moving
     left_out = np.full(len(moving), np.nan)
     whole = np.full(len(moving), np.nan)
     labels, several = folds.strokes, folds.recordings
@@ -263,15 +267,6 @@ def _band(
         new = half_width(whole[there], recordings[there], level, freedom)[0]
     unit: Unit = "recording" if by_recording else "stroke"
     return Band(level, unit, count, width, resting, calibrated, len(several), new)
-
-
-@dataclass(frozen=True)
-class _Judged:
-    """Windows (n,) whose errors are judged: their strokes, recordings, and whether they move."""
-
-    strokes: Integers
-    recordings: Integers
-    moving: Mask
 
 
 @dataclass(frozen=True)
@@ -306,7 +301,7 @@ class _Folds:
         """
         if len(self.recordings) < 2:
             return 1.0
-        shift, own = 0.0, 0.0
+        shift, residual = 0.0, 0.0
         for label in self.recordings:
             here = self.design.bins.recording == label
             strokes = self.of_recording(label)
@@ -314,18 +309,17 @@ class _Folds:
             shift += float(
                 np.mean((by_itself - self.design.mean(self.without(strokes)))[here] ** 2)
             )
-            own += float(np.mean((self.design.observed - by_itself)[here] ** 2))
+            residual += float(np.mean((self.design.observed - by_itself)[here] ** 2))
         count = len(self.recordings)
-        return (shift + own) ** 2 / (shift**2 / count + own**2 / len(self.strokes))
+        return (shift + residual) ** 2 / (shift**2 / count + residual**2 / len(self.strokes))
 
     def without(self, left_out: Integers) -> Array:
         """The optimum (p,) without some strokes."""
         candidate = self.design.candidate(self.design.observed)
         assert candidate.reduced is not None
         problem = candidate.problem(self.design.series)
-        return search_from(
-            replace(problem, reduced=candidate.reduced.without(left_out)), self.point
-        ).point
+        others = replace(problem, reduced=candidate.reduced.without(left_out))
+        return search_from(others, self.point)[0].point
 
 
 def _values(fit: FitResult) -> dict[str, Array]:

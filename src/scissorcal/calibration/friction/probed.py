@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.calibration.caveats import LONG_WINDOWS, OF_PROBE
 from scissorcal.calibration.friction.model import FrictionExperiment
-from scissorcal.calibration.result import FitResult, FittedParameter
+from scissorcal.calibration.parameters import FittedParameter
+from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.inference import Posterior
 from scissorcal.model.friction_terms import PARAMETERS, side_of

@@ -116,11 +116,11 @@ def _hiding(recordings: tuple[Recording, ...], unit: str) -> str:
     errors = [
         position_error(np.asarray(recording.samples["opening"], float)) for recording in recordings
     ]
-    worst = max(errors, key=lambda error: error.sd)
-    if np.isfinite(worst.step) and worst.sd < worst.step:
-        turned = f" ({np.degrees(worst.step):.3g} deg)" if unit == "rad" else ""
-        return f"the encoder's step of {worst.step:.3g} {unit}{turned}"
-    return f"the position's noise of {worst.sd:.2g} {unit}"
+    step, sd = max(errors, key=lambda error: error[1])
+    if np.isfinite(step) and sd < step:
+        turned = f" ({np.degrees(step):.3g} deg)" if unit == "rad" else ""
+        return f"the encoder's step of {step:.3g} {unit}{turned}"
+    return f"the position's noise of {sd:.2g} {unit}"
 
 
 def _refuse_poor_motion(bins: Bins, recordings: tuple[Recording, ...], joint: Joint) -> None:

@@ -1,6 +1,5 @@
 """The optimum of a friction law by least squares over products of its columns."""
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -11,8 +10,7 @@ from scissorcal.calibration.friction.columns import Cell
 from scissorcal.calibration.friction.moments import ReducedLaw
 from scissorcal.inference.ascent import least_squares
 from scissorcal.inference.optimise import Cluster, Optimum, is_rounded
-from scissorcal.inference.problem import Problem
-from scissorcal.inference.status import SearchStatus, about, picked
+from scissorcal.inference.problem import Problem, SearchStatus, about, picked
 
 MOST_ROUNDS = 20
 TINY = 1e-300
@@ -27,15 +25,6 @@ SCANNED_STARTS = 2
 RIDGE = 1e-10
 
 
-@dataclass(frozen=True)
-class LocalOptimum:
-    """Where a search from one start ended: point (p,) and log-posterior."""
-
-    point: Array
-    value: float
-    evaluations: int
-
-
 def search(problem: CandidateProblem) -> Optimum:
     """Maximise the log-posterior of a law from the problem's starts and from scans of its scales.
 
@@ -44,13 +33,14 @@ def search(problem: CandidateProblem) -> Optimum:
     places are starts too.
     """
     starts = [*problem.starts, *_scanned(problem)]
-    ended = [search_from(problem, start) for start in starts]
+    searched = [search_from(problem, start) for start in starts]
+    ended = [end for end, _ in searched]
     best = max(ended, key=lambda end: end.value)
     agreeing = sum(end.value > best.value - SAME_HEIGHT for end in ended)
     optima: list[Cluster] = []
     for end in sorted(ended, key=lambda end: -end.value):
         if all(np.abs((end.point - c.point) / problem.prior_sd).max() > 1e-3 for c in optima):
-            optima.append(Cluster(end.point, end.value, 1, True))
+            optima.append(end)
     optima = [c for i, c in enumerate(optima) if i == 0 or _dips(problem, optima[0], c)]
     status, concerns = _status(problem, best.point)
     sentence = about(status, concerns)
@@ -63,15 +53,15 @@ def search(problem: CandidateProblem) -> Optimum:
         sentence=sentence,
         agreeing=agreeing,
         starts=len(ended),
-        evaluations=sum(end.evaluations for end in ended),
+        evaluations=sum(evaluations for _, evaluations in searched),
         status=status,
         optima=tuple(optima),
         concerns=concerns,
     )
 
 
-def search_from(problem: CandidateProblem, start: Array) -> LocalOptimum:
-    """Maximise the log-posterior from one start (p,).
+def search_from(problem: CandidateProblem, start: Array) -> tuple[Cluster, int]:
+    """Maximise the log-posterior from one start (p,); with the number of evaluations.
 
     Least squares over the law's coefficients and the best noise for what they leave follow each
     other until the log-posterior stays.
@@ -88,12 +78,12 @@ def search_from(problem: CandidateProblem, start: Array) -> LocalOptimum:
             point, value = reached, height
         if not gained > ARRIVED:
             break
-    return LocalOptimum(point, value, evaluations)
+    return Cluster(point, value, 1, True), evaluations
 
 
 def _law(problem: CandidateProblem) -> ReducedLaw:
     """The law over products; TypeError where there is none."""
-    if not isinstance(problem.reduced, ReducedLaw):
+    if problem.reduced is None:
         raise TypeError("this posterior is one over bins: search it with find_optimum")
     return problem.reduced
 
@@ -125,8 +115,8 @@ def _least_squares(problem: CandidateProblem, point: Array) -> tuple[Array, int]
         root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * size
         return root[:, -1], root[:, :-1]
 
-    found, _ = least_squares(evaluate, point[:-1])
-    return np.clip(found, problem.lower[:-1], problem.upper[:-1]), count
+    solution, _ = least_squares(evaluate, point[:-1])
+    return np.clip(solution, problem.lower[:-1], problem.upper[:-1]), count
 
 
 def _with_best_noise(problem: CandidateProblem, point: Array) -> Array:
@@ -161,14 +151,14 @@ def _scanned(problem: CandidateProblem) -> list[Array]:
     rates: list[int | None] = [None]
     if slow is not None:
         rates = list(_scan(problem, slow, basis.stribeck.spacing))
-    found = []
+    scanned = []
     for rate, length in product(rates, lengths):
         cell: Cell = (() if rate is None else (rate,), (length,))
-        found.append((_free_squares(law, problem.starts[0], cell), rate, length))
-    found.sort(key=lambda end: end[0])
+        scanned.append((_free_squares(law, problem.starts[0], cell), rate, length))
+    scanned.sort(key=lambda end: end[0])
     starts: list[Array] = []
     taken: list[int] = []
-    for _, rate, length in found:
+    for _, rate, length in scanned:
         if any(abs(length - other) * basis.lag.spacing < 1.5 * SCAN_STEP for other in taken):
             continue
         taken.append(length)

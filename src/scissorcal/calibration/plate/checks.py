@@ -4,13 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scissorcal.calibration.camera.checks import MOST_SD_PX, CameraThere
+from scissorcal.calibration.camera.checks import MOST_SD_PX, verdict_there
+from scissorcal.calibration.camera.result import PixelMap
 from scissorcal.calibration.plate.result import PoseHalves, PoseView
 from scissorcal.verdicts import STATED, Check, Verdict
 from scissorcal.vision.geometry.board_pose import ODDS, BoardPose
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.rig_frame import RigPose
-from scissorcal.vision.targets.detect import SMALL_PX
+from scissorcal.vision.targets.detect import SMALL_PX, Detection
 
 FALSE_ALARM = 0.001
 """False-alarm rate of the two splits into halves together."""
@@ -41,18 +42,17 @@ def plate_verdicts(
     whole: BoardPose,
     views: Sequence[PoseView],
     halves: PoseHalves | None,
-    camera: Camera,
-    there: CameraThere | None,
+    camera: Verdict,
     rig: RigPose | None,
 ) -> tuple[Verdict, ...]:
-    """Judge a plate's pose. ``there`` is what the camera's fit knows of where the target was."""
+    """Judge a plate's pose; ``camera`` is the verdict on the camera (:func:`camera_verdict`)."""
     return (
         _one_pose(whole),
         _at_rest(views),
         _residuals(whole),
         _halves(halves),
         _size(views),
-        _camera(camera, there),
+        camera,
         _rig(rig),
     )
 
@@ -117,7 +117,8 @@ def _size(views: Sequence[PoseView]) -> Verdict:
     return SIZE.judge(least, why, why + remedy)
 
 
-def _camera(camera: Camera, there: CameraThere | None) -> Verdict:
+def camera_verdict(camera: Camera, places: PixelMap | None, seen: Sequence[Detection]) -> Verdict:
+    """Judge what the camera's fit knows of where the target was seen, by ``places`` of it."""
     if camera.covariance is None:
         why = (
             "The camera has no covariance, so the pose treats it as exact. Run 'scissorcal fit "
@@ -125,9 +126,11 @@ def _camera(camera: Camera, there: CameraThere | None) -> Verdict:
         )
         return CAMERA.not_evaluated(why)
     why = "The pose's covariance includes the camera's."
-    if there is None:
+    if places is None:
         return CAMERA.verdict("pass", None, why)
-    return there.verdict(CAMERA, why)
+    pixels = np.concatenate([detection.pixels for detection in seen])
+    scale = min(detection.px_per_m for detection in seen)
+    return verdict_there(CAMERA, places, pixels, scale, why)
 
 
 def _rig(rig: RigPose | None) -> Verdict:

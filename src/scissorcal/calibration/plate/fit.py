@@ -2,26 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.calibration.camera.checks import CameraThere
 from scissorcal.calibration.camera.result import PixelMap
-from scissorcal.calibration.plate.checks import plate_verdicts
+from scissorcal.calibration.plate.checks import camera_verdict, plate_verdicts
 from scissorcal.calibration.plate.result import PlateFit, PoseHalves, PoseView
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recipe.priors import PlatePriors
+from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.targets.detect import Detection
-
-if TYPE_CHECKING:
-    from scissorcal.recipe.schema import Recipe
-
 
 UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _EXACT_PRINT = {"print_scale_sd_percent": 0.0}
@@ -81,6 +76,7 @@ def fit_plate(
         for i, (photo, located) in enumerate(zip(photos, alone, strict=True))
     )
     pose = whole.pose.after(back)
+    known = camera_verdict(camera, places, [photo.detection for photo in photos])
     in_rig = rig.holds(whole, camera).after(back) if rig else None
     return PlateFit(
         target=target,
@@ -93,21 +89,13 @@ def fit_plate(
         halves=halves,
         rms_px=whole.rms_px,
         noise_px=whole.sd_px,
-        verdicts=plate_verdicts(whole, views, halves, camera, _there(photos, places), rig),
+        verdicts=plate_verdicts(whole, views, halves, known, rig),
         inputs_hash="",
         sources=tuple(photo.name for photo in photos),
     )
 
 
-def _there(photos: Sequence[PosePhoto], places: PixelMap | None) -> CameraThere | None:
-    if places is None:
-        return None
-    pixels = np.concatenate([photo.detection.pixels for photo in photos])
-    scale = min(photo.detection.px_per_m for photo in photos)
-    return CameraThere.of(places, pixels, scale)
-
-
-def plate_target(recipe: "Recipe") -> Pose:
+def plate_target(recipe: Recipe) -> Pose:
     """T_plate_target of the recipe: printed y runs down and z into the sheet, hence the half turn
     about x."""
     x, y = (1e-3 * value for value in recipe.plate.place_mm)

@@ -52,7 +52,7 @@ class Usage:
     spans: tuple[Spans, ...] = ()
 
     @property
-    def by_speed(self) -> tuple[UsageRow, ...]:
+    def _by_speed(self) -> tuple[UsageRow, ...]:
         """The strokes of one speed together, slowest first, ``stroke`` and ``recording`` left out.
 
         What lies between strokes and strokes without a single speed come last, as one row.
@@ -83,7 +83,7 @@ class Usage:
         strokes = [row for row in self.rows if row.stroke >= 0] or list(self.rows)
         whole = _together(strokes, float("nan"))
         text = f"{whole.used_s:.3g} s of {whole.recorded_s:.3g} s recorded in strokes are used."
-        speeds = Usage(tuple(strokes)).by_speed
+        speeds = Usage(tuple(strokes))._by_speed
         if not speeds:
             return text
         worst = min(speeds, key=lambda row: row.share)

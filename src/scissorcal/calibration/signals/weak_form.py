@@ -9,23 +9,20 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.signals.filtering import (
     BIN_S,
-    Bins,
-    PositionError,
-    low_pass,
-    position_error,
-    rate_floor,
-)
-from scissorcal.calibration.signals.segments import bridge, no_piece, sheets_of, usual_tick
-from scissorcal.calibration.signals.window_length import (
     HALF_AT,
     SMOOTH,
+    Bins,
     Motion,
     knot_samples,
     longer_knot,
+    low_pass,
+    position_error,
+    rate_floor,
     second_derivative,
     spline,
     widened,
 )
+from scissorcal.calibration.signals.segments import bridge, no_piece, sheets_of, usual_tick
 from scissorcal.errors import InputError
 from scissorcal.recording.recording import Recording
 
@@ -85,15 +82,15 @@ class Windows:
         ``columns`` (samples) gives them at a stretch of samples, a block of windows at a time, so
         that columns which are worked out from the samples take no memory for all of them.
         """
-        found = np.empty((len(columns(slice(0, 0))), len(self.first)))
+        averages = np.empty((len(columns(slice(0, 0))), len(self.first)))
         for low in range(0, len(self.first), WINDOWS_AT_ONCE):
             windows = slice(low, low + WINDOWS_AT_ONCE)
             first = self.first[windows]
             samples = slice(int(first[0]), int(first[-1]) + len(self.weights))
             over = _over(first - samples.start, self.weights)
-            for row, column in zip(found, columns(samples), strict=True):
+            for row, column in zip(averages, columns(samples), strict=True):
                 row[windows] = over(column)
-        return found
+        return averages
 
     @property
     def bears_load(self) -> bool:
@@ -129,7 +126,7 @@ def weigh(
     547; Messenger and Bortz 2021, doi:10.1137/20M1343166). So nothing is smeared that is not
     smeared on both sides, and a window knows nothing of what lies outside it. Windows are longer
     than the cutoff asks for where the encoder's steps would else be a part of psi''
-    (:func:`~.window_length.longer_knot`); ``window_Hz`` is where they pass half, if that is to be
+    (:func:`~.filtering.longer_knot`); ``window_Hz`` is where they pass half, if that is to be
     prescribed. The rate within F keeps the band of ``cutoff_Hz`` all the same. Short gaps are
     bridged (:func:`~.segments.bridge`): ``first`` and the samples are then those of the bridged
     recordings, and windows that touch a gap are left out of ``moving``.
@@ -143,7 +140,7 @@ def weigh(
     if not recordings:
         raise InputError("There is no recording to fit: capture or import one first.")
     loaded = all(np.isfinite(recording.handle_radius_m) for recording in recordings)
-    found: list[tuple[int, tuple[int, int], Motion]] = []
+    parts: list[tuple[int, tuple[int, int], Motion]] = []
     filled: list[Recording] = []
     for index, recording in enumerate(recordings):
         good = np.ones(len(recording.samples), dtype=bool) if usable is None else usable[index]
@@ -154,16 +151,16 @@ def weigh(
             motion = _motion(
                 bridged.recording, (low, high), cutoff_Hz, bridged.usable[low:high], error
             )
-            found.append((index, (low, high), motion))
-    if not found:
+            parts.append((index, (low, high), motion))
+    if not parts:
         raise no_piece(recordings)
-    motions = [motion for _, _, motion in found]
+    motions = [motion for _, _, motion in parts]
     asked = _common_knot(recordings, window_Hz or cutoff_Hz)
     knot = asked if window_Hz else longer_knot(motions, asked)
     strokes = np.cumsum([0, *(len(recording.strokes) for recording in recordings)]).tolist()
     pieces: list[Windows] = []
     samples = 0
-    for number, ((index, (low, high), _), motion) in enumerate(zip(found, motions, strict=True)):
+    for number, ((index, (low, high), _), motion) in enumerate(zip(parts, motions, strict=True)):
         numbers = (index, strokes[index], number)
         piece = _weigh_piece(filled[index], (low, high), motion, knot, cutoff_Hz, numbers)
         shifted = replace(piece, first=piece.first + samples, starts=piece.starts + samples)
@@ -257,7 +254,7 @@ def _motion(
     piece: tuple[int, int],
     cutoff_Hz: float,
     usable: Mask,
-    error: PositionError,
+    error: tuple[float, float],
 ) -> Motion:
     low, high = piece
     time = recording.device_time_s[low:high]
@@ -266,9 +263,10 @@ def _motion(
     band_Hz = RATE_BAND * cutoff_Hz
     opening = low_pass(position, band_Hz, rate_Hz)
     rate = np.gradient(opening) * rate_Hz
-    floor = rate_floor(error.sd, band_Hz, rate_Hz)
+    step, sd = error
+    floor = rate_floor(sd, band_Hz, rate_Hz)
     turns = _turns(rate, floor if np.ptp(position) > 0.0 else np.inf)
-    return Motion(position, error.step, opening, rate, floor, turns, ~usable, rate_Hz)
+    return Motion(position, step, opening, rate, floor, turns, ~usable, rate_Hz)
 
 
 def _weigh_piece(

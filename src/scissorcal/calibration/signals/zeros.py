@@ -32,11 +32,12 @@ ZERO_DRIFT = Check(
 
 @dataclass(frozen=True)
 class DriveZero:
-    """What the sensors show while nothing drives the joint, over one or more recordings.
+    """What the sensors show while nothing drives the joint, over recordings or one idle period.
 
     ``torque`` (N m or N) and ``force_N`` are means, ``drive`` is both together at the joint and
     ``sd`` is how well that is known over a recording, with ``drift`` between its beginning and end
-    (NaN where only one end shows it). ``seconds`` of idle time show them, 0 for none.
+    (NaN where only one end shows it). ``seconds`` of idle time show them, 0 for none. ``force_N``
+    is 0 where no handle force is measured; ``time_s`` is the middle of one idle period.
     """
 
     torque: float
@@ -45,6 +46,7 @@ class DriveZero:
     sd: float
     drift: float
     seconds: float
+    time_s: float = float("nan")
 
     @property
     def measured(self) -> bool:
@@ -89,7 +91,7 @@ def without_zeros(
     None where no recording has commands in strokes: such files (imports, a hand's strokes) do not
     show when nothing drove the joint, and stay as they are.
     """
-    if known is None and not any(is_driven(recording) for recording in recordings):
+    if known is None and not any(_is_driven(recording) for recording in recordings):
         return recordings, None
     cleaned, zeros = [], []
     for recording in recordings:
@@ -145,7 +147,7 @@ def zero_verdicts(
     )
 
 
-def _shown(recording: Recording) -> "tuple[IdlePeriod, ...]":
+def _shown(recording: Recording) -> tuple[DriveZero, ...]:
     """Idle periods of a recording, and before its first stroke what the probe of the rig found."""
     periods = idle_periods(recording)
     moving = np.flatnonzero(np.asarray(recording.samples["stroke"]) >= 0)
@@ -158,18 +160,19 @@ def _shown(recording: Recording) -> "tuple[IdlePeriod, ...]":
     if force is not None and np.isfinite(recording.handle_radius_m):
         radius = recording.handle_radius_m
     pushed = (0.0, 0.0) if force is None else (force.mean, force.sd)
-    before = IdlePeriod(
+    before = DriveZero(
         time_s=0.0,
+        drift=float("nan"),
         torque=torque.mean,
         force_N=pushed[0],
         drive=torque.mean - radius * pushed[0],
-        drive_sd=float(np.hypot(torque.sd, radius * pushed[1])),
+        sd=float(np.hypot(torque.sd, radius * pushed[1])),
         seconds=IDLE_S,
     )
     return (before, *periods)
 
 
-def _zero_of(periods: "tuple[IdlePeriod, ...]", unmeasured_sd: float) -> DriveZero:
+def _zero_of(periods: tuple[DriveZero, ...], unmeasured_sd: float) -> DriveZero:
     """The zero of one recording from its idle periods.
 
     With a single period it may have come from 0, at which sensors are tared, during the recording.
@@ -177,7 +180,7 @@ def _zero_of(periods: "tuple[IdlePeriod, ...]", unmeasured_sd: float) -> DriveZe
     if not periods:
         return DriveZero(0.0, 0.0, 0.0, unmeasured_sd, float("nan"), 0.0)
     drive = np.array([period.drive for period in periods])
-    errors = np.array([period.drive_sd for period in periods])
+    errors = np.array([period.sd for period in periods])
     steps, drift = drive, float("nan")
     if len(periods) > 1:
         steps, drift = np.diff(drive), float(drive[-1] - drive[0])
@@ -193,9 +196,7 @@ def _zero_of(periods: "tuple[IdlePeriod, ...]", unmeasured_sd: float) -> DriveZe
     )
 
 
-def _subtracted(
-    recording: Recording, periods: "tuple[IdlePeriod, ...]", zero: DriveZero
-) -> Recording:
+def _subtracted(recording: Recording, periods: tuple[DriveZero, ...], zero: DriveZero) -> Recording:
     """The recording less its zeros, on a line between idle periods."""
     samples = recording.samples.copy()
     time = [period.time_s for period in periods] or [0.0]
@@ -242,32 +243,16 @@ class Zero:
     seconds: float
 
 
-@dataclass(frozen=True)
-class IdlePeriod:
-    """Means over one idle period, around ``time_s`` on the device's clock.
-
-    ``force_N`` is 0 where no handle force is measured; ``drive`` (N m or N) is both together,
-    with its standard error ``drive_sd``.
-    """
-
-    time_s: float
-    torque: float
-    force_N: float
-    drive: float
-    drive_sd: float
-    seconds: float
-
-
 def idle_zero(recordings: tuple[Recording, ...]) -> Zero | None:
     """The drive (N m) over the idle periods of recordings; None without any."""
-    spans = [(recording, span) for recording in recordings for span in idle_spans(recording)]
+    spans = [(recording, span) for recording in recordings for span in _idle_spans(recording)]
     if not spans:
         return None
-    every = np.concatenate(
+    drive = np.concatenate(
         [replace(one, samples=one.samples[span]).drive_effort for one, span in spans]
     )
     seconds = sum(_tick(recording) * (span.stop - span.start) for recording, span in spans)
-    return Zero(float(every.mean()), _standard_error(every, seconds), seconds)
+    return Zero(float(drive.mean()), _standard_error(drive, seconds), seconds)
 
 
 def idle_noise(recordings: tuple[Recording, ...]) -> float:
@@ -275,41 +260,42 @@ def idle_noise(recordings: tuple[Recording, ...]) -> float:
     noises = []
     for recording in recordings:
         effort = recording.drive_effort
-        noises += [noise_of(effort[span]) for span in idle_spans(recording)]
+        noises += [noise_of(effort[span]) for span in _idle_spans(recording)]
     return float(np.median(noises)) if noises else 0.0
 
 
-def idle_periods(recording: Recording) -> "tuple[IdlePeriod, ...]":
+def idle_periods(recording: Recording) -> tuple[DriveZero, ...]:
     """Means over each idle period of a recording, in order of time."""
     periods = []
     has_force = bool(np.isfinite(recording.handle_radius_m))
-    spans = idle_spans(recording)
+    spans = _idle_spans(recording)
     effort, time = recording.drive_effort, recording.device_time_s
     tick = _tick(recording)
     for span in spans:
         samples, drive = recording.samples[span], effort[span]
         seconds = tick * len(drive)
         periods.append(
-            IdlePeriod(
+            DriveZero(
+                drift=float("nan"),
                 time_s=float(time[span].mean()),
                 torque=float(samples["motor_torque"].mean()),
                 force_N=float(samples["handle_force"].mean()) if has_force else 0.0,
                 drive=float(drive.mean()),
-                drive_sd=_standard_error(drive, seconds),
+                sd=_standard_error(drive, seconds),
                 seconds=seconds,
             )
         )
     return tuple(periods)
 
 
-def idle_spans(recording: Recording) -> list[slice]:
+def _idle_spans(recording: Recording) -> list[slice]:
     """Samples of idle periods: no command, blades at rest and no stroke for ``IDLE_S``.
 
     A period begins when the blades have come to where they rest at its end. Where no stroke has a
     command, nothing shows when motors were off, or a hand moves the handles and may hold them at
     rest: there are none.
     """
-    if not is_driven(recording):
+    if not _is_driven(recording):
         return []
     samples = recording.samples
     command = np.asarray(samples["torque_command"], dtype=np.float64)
@@ -328,7 +314,7 @@ def idle_spans(recording: Recording) -> list[slice]:
     return spans
 
 
-def is_driven(recording: Recording) -> bool:
+def _is_driven(recording: Recording) -> bool:
     """Whether motors move the joint in strokes, by the commands."""
     samples = recording.samples
     return bool(np.any(samples["torque_command"][samples["stroke"] >= 0]))

@@ -10,13 +10,6 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.result import FitResult
-from scissorcal.calibration.verify.halves import (
-    HalfFit,
-    StrokeFacts,
-    compare,
-    effort_difference,
-    split_strokes,
-)
 from scissorcal.calibration.verify.result import (
     FORMAT,
     Calibration,
@@ -33,11 +26,16 @@ from scissorcal.calibration.verify.result import (
 from scissorcal.calibration.verify.simulator import Simulator
 from scissorcal.calibration.verify.statistics import (
     SENSITIVE,
+    HalfFit,
+    StrokeFacts,
     acceptance,
     chi_square_p_value,
+    compare,
     diagnose,
     ecdf_band,
     ecdf_p_value,
+    effort_difference,
+    split_strokes,
 )
 from scissorcal.calibration.verify.study import (
     LEVELS,
@@ -121,7 +119,7 @@ def assess(
     calibration = halves = sensitivity = None
     if "sbc" in checks:
         units = [fit.parameter(name).unit for name in study.quantities[:-1]]
-        calibration = summarise_simulated(
+        calibration = _summarise_simulated(
             study, by_kind["simulated"], [*units, fit.effort_unit], RANKS_SHARE
         )
         if calibration is None:
@@ -134,11 +132,11 @@ def assess(
             not_done += broken
         else:
             rng = _stream(study.seed, _HALVES_STREAM)
-            halves = summarise_halves(study, by_kind["half"], rng)
+            halves = _summarise_halves(study, by_kind["half"], rng)
     if "prior" in checks:
         broken = _broken(by_kind["whole"], "The fit could not be repeated")
         not_done += broken
-        sensitivity = None if broken else summarise_sensitivity(study, by_kind["whole"][0])
+        sensitivity = None if broken else _summarise_sensitivity(study, by_kind["whole"][0])
     return VerifyResult(
         format=FORMAT,
         what=fit.what,
@@ -197,7 +195,7 @@ SLOPE_STEP = 1e-3
 """Step of the effort's derivatives, in standard deviations of the difference of halves."""
 
 
-def summarise_simulated(
+def _summarise_simulated(
     study: Study, records: Sequence[Record], units: Sequence[str], alpha: float
 ) -> Calibration | None:
     """Summarise the ranks of simulated fits; None where all of them failed.
@@ -238,7 +236,7 @@ def summarise_simulated(
     )
 
 
-def summarise_halves(study: Study, records: Sequence[Record], rng: np.random.Generator) -> Halves:
+def _summarise_halves(study: Study, records: Sequence[Record], rng: np.random.Generator) -> Halves:
     """Compare the two halves' fits, in their parameters and their predicted effort."""
     experiment, layout = study.experiment, study.experiment.layout
     assert study.split is not None
@@ -281,7 +279,7 @@ def _scatter(study: Study, half: int) -> Array:
     return np.diag(study.between) / study.split.recordings[half]
 
 
-def summarise_sensitivity(study: Study, record: Record) -> Sensitivity:
+def _summarise_sensitivity(study: Study, record: Record) -> Sensitivity:
     """Name what the posterior owes to its prior."""
     rows = tuple(
         SensitivityRow(name, prior, likelihood, diagnose(prior, likelihood))

@@ -8,10 +8,10 @@ import numpy as np
 from scissorcal.aliases import Array, Integers, Mask
 from scissorcal.calibration.cut.path_motion import PathMotion, path_motion
 from scissorcal.calibration.cut.path_work import built_friction, built_up
+from scissorcal.calibration.signals.filtering import SMOOTH
 from scissorcal.calibration.signals.segments import bridge
 from scissorcal.calibration.signals.torque_noise import TorqueNoise
 from scissorcal.calibration.signals.weak_form import HELD
-from scissorcal.calibration.signals.window_length import SMOOTH
 from scissorcal.model import FrictionLaw
 from scissorcal.recording.recording import Recording
 from scissorcal.recording.resolution import resolution_of

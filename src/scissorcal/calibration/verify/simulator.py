@@ -8,7 +8,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.comparison import names_of_contenders
-from scissorcal.calibration.cut import fit_cut
+from scissorcal.calibration.cut.fit import fit_cut
 from scissorcal.calibration.cut.known import KnownFriction
 from scissorcal.calibration.cut.path_work import torque_noise_of
 from scissorcal.calibration.fit_model import CutRun, FrictionRun
@@ -70,7 +70,7 @@ class FrictionSimulator:
     @property
     def noise(self) -> str:
         """Description of the noise of the samples."""
-        return noise_in_words(self.torque_noise, self.stroke_sd, self._unit)
+        return _noise_in_words(self.torque_noise, self.stroke_sd, self._unit)
 
     def simulate(self, truth: Array, rng: np.random.Generator) -> tuple[Recording, ...]:
         """Recordings of the same motion with the truth's friction."""
@@ -124,7 +124,7 @@ class CutSimulator:
     def noise(self) -> str:
         """Description of the noise of the samples."""
         known = KnownFriction.of(self.friction, self.recipe.fit.cut.priors)
-        return noise_in_words(known.noise, known.stroke_sd, "N m")
+        return _noise_in_words(known.noise, known.stroke_sd, "N m")
 
     def simulate(self, truth: Array, rng: np.random.Generator) -> tuple[Recording, ...]:
         """Recordings of the same motion through sheets of the truth's material."""
@@ -210,10 +210,10 @@ def cut_simulator(
     )
 
 
-def noise_in_words(noise: TorqueNoise, stroke_sd: float, unit: str) -> str:
+def _noise_in_words(noise: TorqueNoise, stroke_sd: float, unit: str) -> str:
     """Describe the noise of simulated samples, for people.
 
-    >>> noise_in_words(TorqueNoise(1e-3, 5e-4, 0.02), 1e-4, "N m")
+    >>> _noise_in_words(TorqueNoise(1e-3, 5e-4, 0.02), 1e-4, "N m")
     'white 0.001, over 20 ms 0.0005, by stroke 0.0001 N m'
     """
     lasting = f"over {noise.slow_time_s * 1e3:.3g} ms {noise.slow_Nm:.3g}"

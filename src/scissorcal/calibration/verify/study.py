@@ -13,10 +13,9 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.parameters import StatedPrior
 from scissorcal.calibration.result import Effort, FitResult
-from scissorcal.calibration.verify.halves import Split
 from scissorcal.calibration.verify.result import PriorKind
 from scissorcal.calibration.verify.simulator import Simulator
-from scissorcal.calibration.verify.statistics import power_sensitivity, rank_among
+from scissorcal.calibration.verify.statistics import Split, power_sensitivity, rank_among
 from scissorcal.errors import MissingError, ScissorcalError
 from scissorcal.inference import Posterior, infer, ljung_box
 
@@ -89,12 +88,12 @@ def run(study: Study, task: Task) -> Record:
     rng = np.random.default_rng(sequence)
     began = time.perf_counter()
     try:
-        found = _DO[task.kind](study, task.index, rng)
-        json.dumps(found, allow_nan=False)
+        record = _DO[task.kind](study, task.index, rng)
+        json.dumps(record, allow_nan=False)
     except (ArithmeticError, np.linalg.LinAlgError, ValueError, ScissorcalError) as error:
-        found = {"broken": f"{type(error).__name__}: {error}"}
+        record = {"broken": f"{type(error).__name__}: {error}"}
     seconds = round(time.perf_counter() - began, 3)
-    return {"kind": task.kind, "index": task.index, **found, "seconds": seconds}
+    return {"kind": task.kind, "index": task.index, **record, "seconds": seconds}
 
 
 def _simulated(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
@@ -108,9 +107,9 @@ def _simulated(study: Study, index: int, rng: np.random.Generator) -> dict[str, 
     fit = study.simulator.refit(data, prior, study.effort, rng)
     chosen = rng.choice(len(fit.draws), LEVELS - 1, replace=len(fit.draws) < LEVELS - 1)
     truths = quantities(study, truth[None, :])[0]
-    found = _shown(study, fit, chosen)
-    known = [i for i, column in enumerate(found) if column is not None]
-    drawn = np.stack([column for column in found if column is not None], axis=1)
+    columns = _shown(study, fit, chosen)
+    known = [i for i, column in enumerate(columns) if column is not None]
+    drawn = np.stack([column for column in columns if column is not None], axis=1)
     ranks: list[int | None] = [None] * len(truths)
     for i, rank in zip(known, rank_among(drawn, truths[known], rng).tolist(), strict=True):
         ranks[i] = rank
@@ -131,14 +130,14 @@ def _shown(study: Study, fit: FitResult, chosen: NDArray[np.int64]) -> list[Arra
         u = unconstrained_draws(study.experiment, fit, chosen)
     except MissingError:
         u = None
-    own = study.experiment.candidate(study.experiment.observed)
-    if u is not None and fit.candidate == own.name:
+    candidate = study.experiment.candidate(study.experiment.observed)
+    if u is not None and fit.candidate == candidate.name:
         return list(quantities(study, u).T)
     names = [parameter.name for parameter in fit.parameters]
     other = []
-    if fit.structure.get("response") != own.key.get("response"):
+    if fit.structure.get("response") != candidate.key.get("response"):
         other = [n for n in names if n.startswith("response_") and n != "response_force"]
-    if fit.structure.get("fracture") != own.key.get("fracture"):
+    if fit.structure.get("fracture") != candidate.key.get("fracture"):
         other += ["fracture_energy", "toughness"]
     columns: list[Array | None] = [
         fit.column(name)[chosen] if name in names and name not in other else None
@@ -172,7 +171,7 @@ def _half(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]:
     experiment = study.experiment
     keep = study.split.first if index == 0 else study.split.second
     candidate = replace(experiment.candidate(experiment.observed), starts=study.start[None, :])
-    series = unbroken(experiment.series, keep)
+    series = _unbroken(experiment.series, keep)
     posterior = infer(candidate.problem(series, keep), study.effort, rng, count=study.draws)
     residuals = candidate.likelihood.standardised(posterior.optimum.point)
     white = ljung_box(residuals[keep], series[keep])
@@ -196,10 +195,10 @@ def _whole(study: Study, index: int, rng: np.random.Generator) -> dict[str, Any]
     shown = quantities(study, posterior.draws)
     stated = [i for i in study.wanted if not experiment.layout.parameters[i].measured_prior]
     away = (posterior.draws - candidate.prior_mean)[:, stated]
-    own = candidate.prior_precision[np.ix_(stated, stated)]
-    log_prior = -0.5 * np.einsum("ni,ij,nj->n", away, own, away)
-    every = posterior.draws - candidate.prior_mean
-    whole_prior = -0.5 * np.einsum("ni,ij,nj->n", every, candidate.prior_precision, every)
+    precision = candidate.prior_precision[np.ix_(stated, stated)]
+    log_prior = -0.5 * np.einsum("ni,ij,nj->n", away, precision, away)
+    from_prior = posterior.draws - candidate.prior_mean
+    whole_prior = -0.5 * np.einsum("ni,ij,nj->n", from_prior, candidate.prior_precision, from_prior)
     log_likelihood = np.array([posterior.log_posterior(u) for u in posterior.draws]) - whole_prior
     return {
         "prior": power_sensitivity(shown, log_prior).tolist(),
@@ -301,23 +300,23 @@ def refit_prior(experiment: Experiment, generating: Generating) -> StatedPrior:
 
     What is ``NOT_SIMULATED`` keeps the recipe's prior: simulated data do not come from its truth.
     """
-    own = experiment.candidate(experiment.observed)
+    candidate = experiment.candidate(experiment.observed)
     names = experiment.layout.names
     kept = [i for i, name in enumerate(names) if name not in NOT_SIMULATED]
-    mean = generating.mean if generating.kind == "local" else own.prior_mean
+    mean = generating.mean if generating.kind == "local" else candidate.prior_mean
     covariance: Array = np.asarray(np.linalg.inv(generating.precision))
     return StatedPrior(
         tuple(names[i] for i in kept),
         mean[kept],
         covariance[np.ix_(kept, kept)],
-        str(own.key.get("response", "")),
+        str(candidate.key.get("response", "")),
     )
 
 
-def unbroken(series: NDArray[np.int64], kept: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _unbroken(series: NDArray[np.int64], kept: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Labels (n,) of the contiguous stretches where only ``kept`` bins of ``series`` are used.
 
-    >>> unbroken(np.array([0, 0, 0, 0, 1]), np.array([True, True, False, True, True]))
+    >>> _unbroken(np.array([0, 0, 0, 0, 1]), np.array([True, True, False, True, True]))
     array([0, 0, 1, 2, 3])
     """
     turns = (np.diff(series) != 0) | (np.diff(kept.astype(np.int64)) != 0)

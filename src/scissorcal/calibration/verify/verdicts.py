@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from scissorcal.calibration.verify.halves import BY_RECORDING
 from scissorcal.calibration.verify.result import (
     Calibration,
     CheckKind,
@@ -10,6 +9,7 @@ from scissorcal.calibration.verify.result import (
     RankedQuantity,
     Sensitivity,
 )
+from scissorcal.calibration.verify.statistics import BY_RECORDING
 from scissorcal.calibration.verify.study import EFFORT
 from scissorcal.verdicts import INTERVALS, STATED, TORQUE, Check, Status, Verdict
 
@@ -145,10 +145,10 @@ def _how_wrong(quantity: RankedQuantity) -> str:
 
 
 def _refits(found: Calibration) -> Verdict:
-    every = found.fits + len(found.broken)
-    share = (found.unreliable * found.fits + len(found.broken)) / every
+    total = found.fits + len(found.broken)
+    share = (found.unreliable * found.fits + len(found.broken)) / total
     why = (
-        f"{share:.1%} of {every} simulated fits failed or did not pass their diagnostics (limit "
+        f"{share:.1%} of {total} simulated fits failed or did not pass their diagnostics (limit "
         f"{REFITS.threshold:.0%}); {found.escalated:.1%} used a higher effort, "
         f"{found.other_law:.1%} chose another candidate."
     )

@@ -5,13 +5,12 @@ zero show without any torque, so that a later push in the wrong direction accuse
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from scissorcal.device.loading import Confirm
-from scissorcal.device.probe.guards import SENSORS
-from scissorcal.device.probe.talk import RELEASE, Stage, Talk
+from scissorcal.device.probe.talk import RELEASE, SENSORS, Stage, Talk
+from scissorcal.device.session import Confirm
 from scissorcal.kernel import ConfigKey, Identity
 from scissorcal.verdicts import Check, Verdict
 
@@ -45,8 +44,7 @@ OPENING_ZERO = Check(
 give. At an edge of 60 mm it is 1.5 mm at the tip."""
 
 
-@dataclass(frozen=True)
-class HandPass:
+class HandPass(NamedTuple):
     """Openings (rad) at the closed and the open stop, as two passes showed them if one was odd."""
 
     closed: tuple[float, ...]
@@ -125,7 +123,7 @@ def judge_hand_pass(found: HandPass, identity: Identity) -> list[Verdict]:
     something between the blades); two that disagree are a person's, and determine nothing.
     """
     if not found.alive:
-        return [not_determined()]
+        return [_not_determined()]
     stated = identity.opening_max - identity.opening_min
     if len(found.ranges) == 2 and not _is_right(found, identity) and not _agree(found):
         first, second = found.ranges
@@ -160,7 +158,7 @@ def judge_hand_pass(found: HandPass, identity: Identity) -> list[Verdict]:
     return [*verdicts, OPENING_ZERO.judge(abs(zero), f"{said}.", bad)]
 
 
-def not_determined() -> Verdict:
+def _not_determined() -> Verdict:
     """Nobody moved the blades by hand, so nothing is known of scale, sign and zero."""
     why = (
         "Not determined: the opening did not change between the requests to close and to open the "

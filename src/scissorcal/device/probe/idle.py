@@ -1,13 +1,14 @@
 """The idle second: what the device sends with its motors off."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.device.probe.talk import RELEASE, Stage, Talk
+from scissorcal.device.probe.talk import MEASURED, RELEASE, Stage, Talk
 from scissorcal.kernel import Identity, StateFlag
 from scissorcal.recording.probe import Estimate
 from scissorcal.recording.summarising import missing_frames
@@ -35,6 +36,9 @@ LEAST_STEPS = 4
 """Differences between readings that tell the encoder's step."""
 
 
+PLACES = ("opening", "advance")
+
+
 @dataclass(frozen=True)
 class Idle:
     """What the idle second showed; ``nan`` where it cannot be told.
@@ -43,7 +47,8 @@ class Idle:
     ``tick_us``, ``host_ratio`` by the host's clock with its standard error; ``step_rad`` the
     encoder's step as seen, ``moved_rad`` how far the blades moved, ``jitter_rad`` the standard
     deviation of the opening about its slow motion and ``jitter_correlation`` the largest
-    magnitude of its autocorrelation. Shares are of the frames that were due.
+    magnitude of its autocorrelation. ``zeros`` and ``noises`` (standard deviations) are of all that
+    is measured but places, by its name. Shares are of the frames that were due.
     """
 
     fault_stays: bool
@@ -54,10 +59,8 @@ class Idle:
     moved_rad: float
     jitter_rad: float
     jitter_correlation: float
-    torque_zero: Estimate
-    torque_noise: float
-    force_zero: Estimate
-    force_noise: float
+    zeros: Mapping[str, Estimate]
+    noises: Mapping[str, float]
     clock_ratio: float
     clock_stands: bool
     host_ratio: float
@@ -84,8 +87,6 @@ def idle(talk: Talk) -> Idle:
         swings = _swing(float(np.std(opening - slow)), largest_correlation(opening - slow))
         if not (np.ptp(slow) > REST_RAD or swings):
             break
-    names = ("opening", "advance", "motor_torque", "handle_force")
-    not_finite = tuple(name for name in names if not np.isfinite(heard[name]).all())
     opening = heard["opening"][np.isfinite(heard["opening"])]
     if len(opening) == 0:
         opening = np.array([math.nan])
@@ -94,21 +95,19 @@ def idle(talk: Talk) -> Idle:
     due = max(1, int(heard["sequence"][-1] - heard["sequence"][0]) + 1)
     lost = int(missing_frames(heard["sequence"]).sum())
     ratio, error = host_ratio(heard["host_s"], heard["device_us"])
-    torque, force = (heard[name][np.isfinite(heard[name])] for name in names[2:])
+    loads = {name: heard[name][np.isfinite(heard[name])] for name in MEASURED if name not in PLACES}
     slow = _slow(opening)
     return Idle(
         fault_stays=faults[0],
         encoder_fault=faults[1],
-        not_finite=not_finite,
+        not_finite=tuple(name for name in MEASURED if not np.isfinite(heard[name]).all()),
         opening_low=float(opening.min()),
         opening_high=float(opening.max()),
         moved_rad=float(np.ptp(slow)),
         jitter_rad=float(np.std(opening - slow)),
         jitter_correlation=largest_correlation(opening - slow),
-        torque_zero=mean_of(torque),
-        torque_noise=_sd(torque),
-        force_zero=mean_of(force),
-        force_noise=_sd(force),
+        zeros={name: mean_of(values) for name, values in loads.items()},
+        noises={name: _sd(values) for name, values in loads.items()},
         clock_ratio=float(np.median(clock / ticks)) / talk.identity.tick_us,
         clock_stands=bool(np.mean(clock == 0) > 0.5),
         host_ratio=ratio,

@@ -7,11 +7,10 @@ interval refuses nothing. Every limit has its reason beside it.
 import math
 
 from scissorcal.device.motion import STOP_MARGIN_RAD
-from scissorcal.device.probe.guards import LINE, MOTORS, SENSORS
+from scissorcal.device.probe.clipping import Follow
 from scissorcal.device.probe.idle import JITTER_RAD, Idle
-from scissorcal.device.probe.lag import Lag
-from scissorcal.device.probe.measured_torque import Follow
-from scissorcal.device.probe.watchdog import Watchdog
+from scissorcal.device.probe.lag import Lag, Watchdog
+from scissorcal.device.probe.talk import LINE, MOTORS, SENSORS
 from scissorcal.kernel import Capability, Identity
 from scissorcal.verdicts import STATED, TORQUE, Check, Verdict
 
@@ -250,20 +249,20 @@ def _jitter(found: Idle, identity: Identity) -> Verdict:
 
 
 def _zeros(found: Idle, identity: Identity) -> list[Verdict]:
-    zero = found.torque_zero
+    zero = found.zeros["motor_torque"]
     said = (
         f"motor_torque shows {1e3 * zero.mean:.3g} +- {1e3 * zero.sd:.2g} mN m with the motors off"
     )
     warn = f"{said}, which is subtracted. Zero its current sensor."
     most = TORQUE_ZERO_SHARE * identity.torque_limit
     verdicts = [_warned(TORQUE_ZERO, abs(zero.mean), most, f"{said}.", warn)]
-    noise, most = found.torque_noise, TORQUE_NOISE_SHARE * identity.torque_limit
+    noise, most = found.noises["motor_torque"], TORQUE_NOISE_SHARE * identity.torque_limit
     said = f"motor_torque has a noise of {1e3 * noise:.3g} mN m (sd)"
     bad = f"{said}: shield its sensor, or filter it before it is sampled."
     verdicts.append(TORQUE_NOISE.judge(noise, f"{said}.", bad, threshold=most))
     if not identity.capabilities & Capability.HANDLE_FORCE_SENSOR:
         return verdicts
-    zero, noise = found.force_zero, found.force_noise
+    zero, noise = found.zeros["handle_force"], found.noises["handle_force"]
     said = f"handle_force shows {zero.mean:.3g} +- {zero.sd:.2g} N with nobody at the handles"
     warn = f"{said}, which is subtracted. Zero the sensor, or check that nobody held the handles."
     verdicts.append(_warned(FORCE_ZERO, abs(zero.mean), FORCE_ZERO.threshold, f"{said}.", warn))

@@ -5,14 +5,14 @@ determined ends a probe as a verdict that fails does, without accusing anything.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
-from scissorcal.device.probe.guards import MOTORS, SENSORS
 from scissorcal.device.probe.idle import REST_RAD, Idle
 from scissorcal.device.probe.joint_values import LATE_S
 from scissorcal.device.probe.pushes import Axis
 from scissorcal.device.probe.search import LEAST_INERTIA, Search, Sense
 from scissorcal.device.probe.swings import Swung
+from scissorcal.device.probe.talk import MOTORS, SENSORS
 from scissorcal.recording.probe import NORMAL_90
 from scissorcal.verdicts import Check, Verdict
 
@@ -39,8 +39,7 @@ INERTIA = Check(
 margin, which is what a gain margin of 2 allows."""
 
 
-@dataclass(frozen=True)
-class Words:
+class Words(NamedTuple):
     """The words for an axis: its name, what each sign does, and the remedies."""
 
     name: str
@@ -72,8 +71,7 @@ CARRIAGE = Words(
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """Verdicts, and the sentence that ends the probe undetermined; empty where it goes on."""
 
     verdicts: tuple[Verdict, ...]
@@ -93,7 +91,7 @@ def judge_rest(found: Idle) -> Outcome:
     return Outcome((REST.not_evaluated(why, moved),), why)
 
 
-def judge_search(found: Search, axis: Axis, words: Words, *, hand: bool) -> Outcome:
+def judge_search(found: Search, axis: Axis, words: Words, hand: bool) -> Outcome:
     """Whether the axis moved both ways; ``hand``: a pass by hand has shown the encoder alive."""
     if found.stop or len(found.movers) == 2:
         return Outcome(())
@@ -124,9 +122,7 @@ def judge_search(found: Search, axis: Axis, words: Words, *, hand: bool) -> Outc
     return _open(check, why, words.scale * axis.effort)
 
 
-def judge_sense(
-    found: Search, sensed: Sense, words: Words, motor_sign: int, *, hand: bool
-) -> Outcome:
+def judge_sense(found: Search, sensed: Sense, words: Words, motor_sign: int, hand: bool) -> Outcome:
     """Which way the axis goes when it is pushed."""
     check = DIRECTION[words.name]
     share = 0.5 + 0.5 * sensed.votes / max(sensed.pairs, 1)

@@ -2,12 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from scissorcal.device.probe.guards import LINE, MOTORS
-from scissorcal.device.probe.talk import RELEASE, Answer, Stage, Talk
-from scissorcal.kernel import StateFlag
+from scissorcal.device.probe.idle import CLEARINGS
+from scissorcal.device.probe.talk import LINE, MOTORS, RELEASE, Answer, Stage, Talk
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import ConfigKey, StateFlag
 from scissorcal.verdicts import Check, Verdict
 
 TOGGLES, ASKED = 12, 200
@@ -31,8 +33,7 @@ LOST_COMMANDS = Check("probe.line lost commands", f"{LINE}: share of commands", 
 """Share of commands. One in 200 lost lets two in a row go missing once a minute at 1 kHz."""
 
 
-@dataclass(frozen=True)
-class Lag:
+class Lag(NamedTuple):
     """``ticks``: from the state that a command answers to the first that shows it; empty where
     ENABLE never showed. ``lost`` of ``asked`` single commands did not arrive."""
 
@@ -103,7 +104,7 @@ def _toggled(talk: Talk) -> Stage[list[int]]:
             faulty = bool(state.flags & StateFlag.FAULT_LATCHED)
             disturbed = disturbed or faulty  # this computer was late, and the device braked
             state = yield answer._replace(clear=faulty)
-            found = _first(talk, begin, on=on)
+            found = _first(talk, begin, on)
             shown = found is not None
             if found is not None and not disturbed:
                 lags.append(found - asked)
@@ -142,8 +143,92 @@ def _shown(talk: Talk, begin: int) -> bool:
     return bool(np.any(heard & int(StateFlag.MOTOR_ENABLED | StateFlag.FAULT_LATCHED)))
 
 
-def _first(talk: Talk, begin: int, *, on: bool) -> int | None:
+def _first(talk: Talk, begin: int, on: bool) -> int | None:
     """Sequence of the first state since ``begin`` in which the motors are on, or off."""
     heard = talk.heard(begin)
     showing = ((heard["flags"] & int(StateFlag.MOTOR_ENABLED)) != 0) == on
     return int(heard["sequence"][int(np.argmax(showing))]) if showing.any() else None
+
+
+LATER_S = 0.05
+LONGEST_BRAKE_MS = 1000.0
+"""As in the protocol: no device has a longer BRAKE_AFTER_MS, whatever it refuses."""
+
+
+@dataclass(frozen=True)
+class Watchdog:
+    """What silence does.
+
+    ``brake_after_ms`` is the value in force, as asked for where the device refuses it; ``refused``
+    is why, empty where it takes the value. Commands were withheld for at most ``withheld_ms``;
+    ``braked_ms`` is the silence after which it braked, None where it did not.
+    """
+
+    brake_after_ms: float
+    refused: str
+    withheld_ms: float
+    braked_ms: float | None
+    latched: bool
+    lost_shown: bool
+    lost_cleared: bool
+    fault_cleared: bool
+
+
+def watchdog(talk: Talk, brake_after_ms: float) -> Watchdog:
+    """Enable the motors at zero torque, then withhold commands.
+
+    ``brake_after_ms`` is set as BRAKE_AFTER_MS, and stays. A device that refuses it keeps another
+    value, so commands are withheld for longer than any that the protocol allows.
+    """
+    refused, in_force = "", brake_after_ms
+    try:
+        in_force = talk.link.configure(ConfigKey.BRAKE_AFTER_MS, brake_after_ms)
+    except DeviceError as error:
+        refused = str(error)
+    withheld_s = 1e-3 * (LONGEST_BRAKE_MS if refused else in_force) + LATER_S
+    braked, latched, shown = talk.play(_silenced(talk, withheld_s))
+    lost_cleared, fault_cleared = talk.play(_recovered(talk))
+    return Watchdog(
+        in_force,
+        refused,
+        1e3 * withheld_s,
+        braked,
+        latched,
+        shown,
+        lost_cleared,
+        fault_cleared,
+    )
+
+
+def _silenced(talk: Talk, longest_s: float) -> Stage[tuple[float | None, bool, bool]]:
+    """Withhold commands; return the silence until the brake (ms), and which flags showed."""
+    state = yield RELEASE
+    for _ in range(talk.ticks(LATER_S) + CLEARINGS):
+        state = yield Answer(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
+        if not state.flags & StateFlag.FAULT_LATCHED and state.flags & StateFlag.MOTOR_ENABLED:
+            break
+    last, begin = talk.sequence, talk.mark()
+    while talk.sequence - last < talk.ticks(longest_s):
+        state = yield None
+        braked = StateFlag.FAULT_LATCHED | StateFlag.COMMANDS_LOST
+        if state.flags & braked:
+            heard = talk.heard(begin)  # of several states at once the first tells when
+            first = int(np.argmax((heard["flags"] & int(braked)) != 0))
+            silent = (int(heard["sequence"][first]) - last) * talk.tick_s
+            state = yield None
+            shown = bool(state.flags & StateFlag.COMMANDS_LOST)
+            return 1e3 * silent, bool(state.flags & StateFlag.FAULT_LATCHED), shown
+    return None, False, False
+
+
+def _recovered(talk: Talk) -> Stage[tuple[bool, bool]]:
+    """Send commands again; return whether COMMANDS_LOST clears by them, the fault when asked."""
+    state = yield RELEASE
+    for _ in range(talk.ticks(LATER_S)):
+        state = yield RELEASE
+    lost_cleared = not state.flags & StateFlag.COMMANDS_LOST
+    for _ in range(CLEARINGS):
+        if not state.flags & StateFlag.FAULT_LATCHED:
+            break
+        state = yield RELEASE._replace(clear=True)
+    return lost_cleared, not state.flags & StateFlag.FAULT_LATCHED

@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from scissorcal.device.link import PortLink
-from scissorcal.device.loading import Confirm, is_simulator
-from scissorcal.device.probe.clipping import clipping
-from scissorcal.device.probe.guards import REAL_TIME
+from scissorcal.device.probe.clipping import clipping, follow
 from scissorcal.device.probe.hand_pass import (
     HandPass,
     by_virtual_hand,
@@ -29,16 +27,20 @@ from scissorcal.device.probe.judge_push import (
     judge_search,
     judge_sense,
 )
-from scissorcal.device.probe.lag import judge_lag, lag
-from scissorcal.device.probe.measured_torque import follow
+from scissorcal.device.probe.lag import judge_lag, lag, watchdog
 from scissorcal.device.probe.pushes import axis_of, push
 from scissorcal.device.probe.search import search, sense
 from scissorcal.device.probe.swings import Swung, swings
-from scissorcal.device.probe.talk import Bounds, RunawayError, Talk
-from scissorcal.device.probe.watchdog import watchdog
-from scissorcal.device.rig_record import identity_facts
-from scissorcal.device.session import RigSession, ShowProgress
-from scissorcal.errors import DeviceError, InputError
+from scissorcal.device.probe.talk import REAL_TIME, Bounds, RunawayError, Talk
+from scissorcal.device.session import (
+    Confirm,
+    RigSession,
+    ShowProgress,
+    identity_facts,
+    is_simulator,
+    refuse_nobody,
+)
+from scissorcal.errors import DeviceError
 from scissorcal.identity import digest
 from scissorcal.kernel import Capability, ConfigKey, Identity
 from scissorcal.recipe.schema import Recipe
@@ -67,6 +69,8 @@ GAIN_HOLD_S, HELD_SHARE = 0.1, 0.6
 """How long an effort is held for its gain, and its share of the one that moved the blades."""
 CARRIAGE_FORCE_SHARE = 0.2
 """Of the recipe's and the device's force limit, for the carriage."""
+NOISE_FACTS = {"motor_torque": "torque_noise_Nm", "handle_force": "force_noise_N"}
+"""Facts of what is subtracted at rest; whatever else a device measures is a fact by its name."""
 CARRIAGE_WAY_M, CARRIAGE_SPEED_M_PER_S = 2e-3, 0.05
 
 
@@ -80,9 +84,11 @@ class ProbeRefusedError(DeviceError):
 
 @dataclass
 class _Finding:
-    """The result as it grows, and the errors of what was looked at so far."""
+    """The result as it grows, how far it is, and whether the encoder was seen to move by hand."""
 
     result: ProbeResult
+    tell: ShowProgress
+    by_hand: bool = False
 
     def add(self, verdicts: list[Verdict], **found: object) -> None:
         """Take verdicts and findings; ProbeRefusedError where a verdict failed."""
@@ -118,29 +124,25 @@ def probe(session: RigSession, *, then: str = "", now: datetime | None = None) -
     """
     identity, recipe = session.identity, session.recipe
     confirm, tell = session.operator.confirm, session.operator.progress
-    if confirm is None and not is_simulator(identity):
-        raise InputError(
-            "The probe must ask a person to clear the blades first: pass a confirm callback that "
-            "shows a sentence and returns when that is done."
-        )
+    refuse_nobody(identity, confirm, "The probe must ask a person to clear the blades first")
     made = (now or datetime.now(UTC)).astimezone(UTC).isoformat(timespec="seconds")
     finding = _Finding(
-        ProbeResult(session.name, identity_digest(identity), made, recipe.rig.motor_sign)
+        ProbeResult(session.name, identity_digest(identity), made, recipe.rig.motor_sign), tell
     )
     with Talk(session.link, bounds_of(recipe, identity), recipe.rig.motor_sign) as talk:
         tell(0.0, "the blades by hand, motors off")
         try:
-            hand = _by_hand(talk, finding, recipe, confirm, then)
-            _stages(talk, finding, recipe, hand, tell)
+            finding.by_hand = _by_hand(talk, finding, recipe, confirm, then)
+            _stages(talk, finding, recipe)
         except RunawayError as error:
             raise ProbeRefusedError(str(error), finding.result) from error
     tell(1.0, "done")
     return finding.result
 
 
-def _stages(talk: Talk, finding: _Finding, recipe: Recipe, hand: bool, tell: ShowProgress) -> None:
+def _stages(talk: Talk, finding: _Finding, recipe: Recipe) -> None:
     """Everything after the pass by hand to the last motion; ends at the first that stops it."""
-    identity = talk.identity
+    identity, tell = talk.identity, finding.tell
     tell(0.1, "listening with the motors off")
     quiet = idle(talk)
     finding.add(
@@ -163,7 +165,7 @@ def _stages(talk: Talk, finding: _Finding, recipe: Recipe, hand: bool, tell: Sho
     with talk.braking_after(min(expiry_ms, recipe.rig.line.brake_after_ms)):
         tell(0.35, "pushes that grow until the blades move")
         talk.pushing = True
-        _push(talk, finding, quiet, recipe, hand=hand, tell=tell)
+        _push(talk, finding, quiet, recipe)
         if _pushes_carriage(identity):
             tell(0.85, "small pushes on the carriage")
             _push_carriage(talk, finding, recipe)
@@ -242,11 +244,11 @@ def _of_hand(passed: HandPass, identity: Identity) -> dict[str, float]:
 def _of_idle(found: Idle, identity: Identity) -> dict[str, object]:
     sensor = identity.capabilities & Capability.HANDLE_FORCE_SENSOR
     return {
-        "torque_zero_Nm": _finite(found.torque_zero),
-        "force_zero_N": _finite(found.force_zero) if sensor else None,
+        "torque_zero_Nm": _finite(found.zeros["motor_torque"]),
+        "force_zero_N": _finite(found.zeros["handle_force"]) if sensor else None,
         "facts": {
-            "torque_noise_Nm": found.torque_noise,
-            "force_noise_N": found.force_noise,
+            **{NOISE_FACTS.get(name, f"{name}_noise"): sd for name, sd in found.noises.items()},
+            **{name: at.mean for name, at in found.zeros.items() if name not in NOISE_FACTS},
             "encoder_jitter_rad": found.jitter_rad,
             "encoder_jitters": float(jitters(found, identity)),
             "clock_ratio": found.clock_ratio,
@@ -258,24 +260,22 @@ def _of_idle(found: Idle, identity: Identity) -> dict[str, object]:
     }
 
 
-def _push(
-    talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe, *, hand: bool, tell: ShowProgress
-) -> None:
+def _push(talk: Talk, finding: _Finding, quiet: Idle, recipe: Recipe) -> None:
     """Pushes on the blades: what moves them, which way, how the torque follows; then swings."""
-    identity = talk.identity
+    identity, hand = talk.identity, finding.by_hand
     axis = axis_of(talk, "opening", quiet.jitter_rad, identity.opening_resolution)
     found = search(talk, axis, alive=hand)
     fell = fallen(float(talk.heard(talk.mark() - 1)["opening"][0]), identity)
     if fell is not None and hand and not found.stop:
         finding.take(Outcome((fell,), fell.why))
-    finding.take(judge_search(found, axis, BLADES, hand=hand))
+    finding.take(judge_search(found, axis, BLADES, hand))
     sensed = sense(talk, axis, found)
-    finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand=hand))
+    finding.take(judge_sense(found, sensed, BLADES, recipe.rig.motor_sign, hand))
     held = [
-        push(talk, axis, sign * HELD_SHARE * found.effort, GAIN_HOLD_S, hold=found.hold)
+        push(talk, axis, sign * HELD_SHARE * found.effort, GAIN_HOLD_S, found.hold)
         for sign in (1, -1)
     ]
-    tell(0.5, "swings, planned by what the last ones taught")
+    finding.tell(0.5, "swings, planned by what the last ones taught")
     lag_ticks = finding.result.facts["command_lag_ticks"]
     prior = Prior(
         (lag_ticks - 1.0 + FLAG_TO_DELAY_TICKS) * talk.tick_s,
@@ -284,8 +284,8 @@ def _push(
         found.stop,
     )
     step = observed_step(talk.heard()["opening"])
-    facts = {"encoder_step_rad": step}
-    finding.add([judge_step(step, identity.opening_resolution)], facts=facts)
+    judged = [judge_step(step, identity.opening_resolution)]
+    finding.add(judged, facts={"encoder_step_rad": step})
     noise = math.hypot(quiet.jitter_rad, identity.opening_resolution / math.sqrt(12.0))
     swung = swings(talk, axis, (*found.pushes, *sensed.pushes, *held), prior, noise, found.hold)
     zero = finding.result.torque_zero_Nm

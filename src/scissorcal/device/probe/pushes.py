@@ -107,7 +107,6 @@ def push(
     axis: Axis,
     effort: float,
     seconds: float,
-    *,
     hold: float = 0.0,
 ) -> Pushed:
     """Push with ``hold + effort`` for ``seconds``, at most until the axis has moved.

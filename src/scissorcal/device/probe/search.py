@@ -6,7 +6,7 @@ tells the direction where a threshold of motion could not.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from scissorcal.device.probe.hand_pass import stop_near
 from scissorcal.device.probe.pushes import Axis, Pushed, push
@@ -72,8 +72,7 @@ class Search:
         return [one for one in (self.pushed, self.pulled) if one is not None]
 
 
-@dataclass(frozen=True)
-class Sense:
+class Sense(NamedTuple):
     """Votes of the pairs: those that moved with the effort less those against it."""
 
     votes: int
@@ -132,7 +131,7 @@ def sense(talk: Talk, axis: Axis, found: Search) -> Sense:
         if not pushes or max(one.rate for one in pushes[-2:]) < CALM * axis.rate:
             factor = wanted
         pair = [
-            push(talk, wide, sign * min(factor * effort, axis.effort), seconds, hold=hold)
+            push(talk, wide, sign * min(factor * effort, axis.effort), seconds, hold)
             for sign in (1, -1)
         ]
         pushes += pair

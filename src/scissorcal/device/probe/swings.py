@@ -1,14 +1,13 @@
 """Planned swings: each is aimed by what the last ones taught, until the inertia is known."""
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.device.probe.joint_fit import fit_joint, swings_of, travel_of
-from scissorcal.device.probe.joint_posterior import JointFit
-from scissorcal.device.probe.joint_values import NAMES, Prior, Push
+from scissorcal.device.probe.joint_problem import fit_joint, swings_of, travel_of
+from scissorcal.device.probe.joint_values import NAMES, JointFit, Prior, Push
 from scissorcal.device.probe.pushes import MOVED_STEPS, Axis, Pushed, push
 from scissorcal.device.probe.talk import Talk
 from scissorcal.kernel import CommandFlag
@@ -39,8 +38,7 @@ AIM_SHARE, WAY_SHARE, RATE_SHARE = 0.6, 0.8, 0.7
 """Of the bounds: what the model aims at, and what it may reach with the lightest blades."""
 
 
-@dataclass(frozen=True)
-class Swung:
+class Swung(NamedTuple):
     """All pushes of the blades, what the model says of them, and the strongest beside it."""
 
     pushes: tuple[Pushed, ...]
@@ -64,7 +62,7 @@ def swings(
     wide = axis.until(_most_way(axis), MOST_RATE)
 
     def telling() -> list[Push]:
-        return pushes_of(talk, pushes, least, prior.stop, axis.seen)
+        return _pushes_of(talk, pushes, least, prior.stop, axis.seen)
 
     fit = _fitted(talk, telling(), prior, noise_rad)
     for pairs in range(MOST_PAIRS + 1):
@@ -74,7 +72,7 @@ def swings(
                 break
         for sign in (prior.stop, prior.stop) if prior.stop else (1, -1):
             effort, seconds = _planned(talk, axis, fit, sign * prior.breakaway_Nm, strongest, hold)
-            one = push(talk, wide, effort, seconds, hold=hold)
+            one = push(talk, wide, effort, seconds, hold)
             pushes.append(one)
             if not one.disturbed:
                 strongest = max(strongest, abs(effort))
@@ -98,7 +96,7 @@ def _fitted(
     ``modes`` others are sought in any case.
     """
     with talk.paused():
-        fit = fit_joint(pushes, prior, noise_rad, start=start, modes=modes)
+        fit = fit_joint(pushes, prior, noise_rad, start, modes)
         if modes or (fit.misfit <= EXPLAINED and not fit.strange):
             return fit
         anew = fit_joint(pushes, prior, noise_rad, modes=False)
@@ -112,7 +110,7 @@ def known(fit: JointFit, strongest: float) -> bool:
     )
 
 
-def pushes_of(
+def _pushes_of(
     talk: Talk, pushed: list[Pushed] | tuple[Pushed, ...], least: float, stop: int, seen: float
 ) -> list[Push]:
     """What was heard of each push of ``least`` and more that nothing disturbed, for the fit.

@@ -10,7 +10,7 @@ import time
 from collections.abc import Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,14 @@ from scissorcal.kernel import Command, CommandFlag, ConfigKey, State, StateFlag,
 from scissorcal.kernel.loop import STALL_TICKS
 from scissorcal.kernel.servo import LEAP_RATES, OPENING_RATE_LIMIT, STUCK_FRAMES
 
+LINE = "the line, before a motor runs"
+SENSORS = "the sensors, before a motor runs"
+MOTORS = "the motors, before they run in earnest"
+"""What checks of a probe guard begins so."""
+REAL_TIME = "real_time"
+"""Fact: 1 where the probe ran on a port, 0 in virtual time."""
+
+
 Done = TypeVar("Done")
 
 RATE_OVER_S = 4e-3
@@ -32,23 +40,23 @@ STAMPS, STAMPS_WRONG = 20, 8
 """Wrong intervals of the last ones that stop a rig, as the core's watch counts them (sc_stamp.c has
 the false-alarm rate)."""
 
+MEASURED = tuple(name for name, kind in get_type_hints(State).items() if kind is float)
+"""The numbers that a device measures, by their names in STATE."""
 HEARD = np.dtype(
     [
         ("sequence", np.int64),
         ("device_us", np.int64),
-        ("opening", np.float64),
-        ("advance", np.float64),
-        ("motor_torque", np.float64),
-        ("handle_force", np.float64),
-        ("flags", np.int64),
         ("host_s", np.float64),
+        *((name, np.float64) for name in MEASURED),
+        ("flags", np.int64),
         ("torque", np.float64),
         ("force", np.float64),
         ("answer_flags", np.int64),
     ]
 )
-"""A state with its answer; ``answer_flags`` is -1 for a state that was not answered. Sequence and
-clock are unwrapped; signs of torque are the corrected ones."""
+"""A state with its answer: opening and advance are the first numbers. ``answer_flags`` is -1 for a
+state that was not answered. Sequence and clock are unwrapped; signs of torque are the corrected
+ones."""
 
 
 class Answer(NamedTuple):
@@ -260,22 +268,10 @@ class Talk(AbstractContextManager["Talk"]):
             sequence = int(last[0]) + passed
             device_us = int(last[1]) + (device_us - int(last[1])) % U32
             self._restarted = self._restarted or passed > U32 // 2
-        torque = self._sign * state.motor_torque
-        self._rows.append(
-            (
-                sequence,
-                device_us,
-                state.opening,
-                state.advance,
-                torque,
-                state.handle_force,
-                state.flags,
-                self._now(),
-                0.0,
-                0.0,
-                -1,
-            )
-        )
+        corrected = state._replace(motor_torque=self._sign * state.motor_torque)
+        numbers = (getattr(corrected, name) for name in MEASURED)
+        stamps = (sequence, device_us, self._now())
+        self._rows.append((*stamps, *numbers, state.flags, 0.0, 0.0, -1))
         return True
 
     def _now(self) -> float:
@@ -291,7 +287,7 @@ class Talk(AbstractContextManager["Talk"]):
         flags = (CommandFlag.ENABLE if answer.enable else 0) | (
             CommandFlag.CLEAR_FAULT if answer.clear else 0
         )
-        self._rows[-1] = (*self._rows[-1][:8], torque, force, int(flags))
+        self._rows[-1] = (*self._rows[-1][:-3], torque, force, int(flags))
         command = Command(int(flags), state.sequence, self._sign * torque, force)
         if isinstance(self.link, PortLink):
             self.link.send(command)
@@ -318,7 +314,7 @@ class Talk(AbstractContextManager["Talk"]):
         far = not free and abs(place[0] - origin[0]) > bounds.angle_rad
         off = not free and abs(place[1] - origin[1]) > bounds.way_m
         if rate > bounds.rate_rad_per_s or speed > bounds.speed_m_per_s or far or off:
-            last = max(abs(row[8]) for row in self._rows[-50:])
+            last = max(abs(row[-3]) for row in self._rows[-50:])
             self.release()
             what = (
                 f"the blades moved by {abs(place[0] - origin[0]):.3g} rad at {rate:.2g} rad/s"
@@ -326,7 +322,7 @@ class Talk(AbstractContextManager["Talk"]):
                 else f"the carriage moved by {1e3 * abs(place[1] - origin[1]):.3g} mm at "
                 f"{speed:.2g} m/s"
             )
-            late = np.diff([row[7] for row in self._rows[-STUCK_FRAMES:]])
+            late = np.diff([row[2] for row in self._rows[-STUCK_FRAMES:]])
             stalled = bool(np.any(late > STALL_TICKS * self.tick_s))
             allowed = (
                 f"rig.probe.largest_angle_deg = {np.degrees(bounds.angle_rad):.3g} and "
@@ -364,7 +360,7 @@ class Talk(AbstractContextManager["Talk"]):
                 f"{STAMPS} states, so one of them leaps; correct it in the firmware."
             )
         if len(recent) > 1:
-            leap = abs(recent[-1][2] - recent[-2][2])
+            leap = abs(recent[-1][3] - recent[-2][3])
             passed_s = (recent[-1][0] - recent[-2][0]) * self.tick_s
             if leap > LEAP_RATES * OPENING_RATE_LIMIT * passed_s:
                 return (
@@ -381,7 +377,7 @@ class Talk(AbstractContextManager["Talk"]):
         time_s = (now[0] - then[0]) * self.tick_s
         if time_s <= 0.0:
             return 0.0, 0.0
-        return abs(now[2] - then[2]) / time_s, abs(now[3] - then[3]) / time_s
+        return abs(now[3] - then[3]) / time_s, abs(now[4] - then[4]) / time_s
 
 
 def contradictions(heard: NDArray[np.void], tick_us: float) -> int:

@@ -10,8 +10,7 @@ than the run releases, unless kappa = 1.)
 import math
 from collections.abc import Callable
 
-from scissorcal.device.sim.blade import APART, BladeOnSheet, Touch
-from scissorcal.device.sim.material import Sheet
+from scissorcal.device.sim.blade import APART, BladeOnSheet, Sheet, Touch
 
 RUNS_PER_STEP = 64
 PLACE_TOLERANCE = 1e-12

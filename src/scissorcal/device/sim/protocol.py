@@ -26,8 +26,8 @@ from collections import deque
 
 import numpy as np
 
-from scissorcal.device.sim.faults import Faults, FaultyLine
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
+from scissorcal.device.sim.sensors import MEASURED_FLAGS, Faults, FaultyLine
 from scissorcal.kernel import (
     Capability,
     Command,
@@ -146,9 +146,7 @@ class RigProtocol:
                 self._ticks & U32,
                 int(self._ticks * TICK_US * self._clock_rate) & U32,
                 opening,
-                measured.advance,
-                measured.motor_torque,
-                measured.handle_force,
+                *measured[1:-MEASURED_FLAGS],
             )
         )
 

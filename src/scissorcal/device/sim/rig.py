@@ -5,7 +5,7 @@ The opening axis obeys
     I acc = motor_torque - R handle_force - friction(theta, rate) + tau_cut - offset
 
 and the advance axis the same with its mass and the cut's force. Each tick takes SUBSTEPS steps
-(see :mod:`scissorcal.device.sim.axis`), with friction as an impulse
+(see :mod:`scissorcal.device.sim.friction`), with friction as an impulse
 (:mod:`scissorcal.device.sim.friction`). Everything is plain Python on floats: for scalars that is
 faster than NumPy, and the laws share nothing with the model that is fitted or the kernel.
 """
@@ -15,12 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scissorcal.device.sim.axis import Axis
-from scissorcal.device.sim.blade import blade_on
+from scissorcal.device.sim.blade import Sheet, blade_on
 from scissorcal.device.sim.cutting import Cut
-from scissorcal.device.sim.friction import DryFriction
+from scissorcal.device.sim.friction import Axis, DryFriction
 from scissorcal.device.sim.hand import VirtualHand
-from scissorcal.device.sim.material import Sheet
 from scissorcal.device.sim.plate_contact import PlateContact
 from scissorcal.device.sim.sensors import Measured, SensorSet
 from scissorcal.device.sim.specimen import Specimen

@@ -21,14 +21,14 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from types import FrameType
+from typing import NamedTuple
 
 import numpy as np
 
-from scissorcal.device.sim.faults import Faults, parse_faults
 from scissorcal.device.sim.protocol import RigProtocol
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
+from scissorcal.device.sim.sensors import Faults, parse_faults
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import ScissorcalError, needs_unix
 
@@ -37,8 +37,7 @@ WAITING_FRAMES = 256
 READ_BYTES = 4096
 
 
-@dataclass(frozen=True)
-class ServeReport:
+class ServeReport(NamedTuple):
     """How a served rig ended: ticks served, how often it stood still, whether it was unplugged."""
 
     ticks: int

@@ -16,7 +16,6 @@ from scissorcal.model.surface.protocol import (
     curvatures,
     nearest,
     normal,
-    shape_operator,
 )
 
 __all__ = [
@@ -32,5 +31,4 @@ __all__ = [
     "fit_height_field",
     "nearest",
     "normal",
-    "shape_operator",
 ]

@@ -97,19 +97,6 @@ def normal(surface: Surface, points: ArrayLike) -> Array:
     return np.asarray(gradient / np.where(length > 0.0, length, np.nan))
 
 
-def shape_operator(surface: Surface, points: ArrayLike) -> Array:
-    """Derivative of the normal along the surface, (..., 3, 3) [1/m]: P H P / abs(grad phi0).
-
-    H is the level's Hessian, P projects onto the tangent plane. Positive along a direction in which
-    the surface bulges out of the material: a sphere of radius R > 0 has P / R. Away from the
-    surface it is that of the level set through the point.
-    """
-    unit = normal(surface, points)
-    length = np.linalg.norm(surface.gradient(points), axis=-1)[..., None, None]
-    across = np.eye(3) - unit[..., :, None] * unit[..., None, :]
-    return np.asarray(across @ surface.hessian(points) @ across / length)
-
-
 def curvatures(surface: Surface, points: ArrayLike) -> Array:
     """Principal curvatures (..., 2) [1/m] in ascending order, positive where convex.
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.result import FitResult, FittedParameter
+from scissorcal.calibration.parameters import FittedParameter
+from scissorcal.calibration.result import FitResult
 from scissorcal.package.bound import SHARE_OF_TOLERANCE
 from scissorcal.package.compile import Compiled
 from scissorcal.package.exact import ExactModel, FitDraws, central_model

@@ -14,7 +14,8 @@ from scissorcal.calibration.caveats import (
     next_recording_sd,
     next_recording_sentence,
 )
-from scissorcal.calibration.result import PRIOR_ONLY, FitResult, FittedParameter
+from scissorcal.calibration.parameters import FittedParameter
+from scissorcal.calibration.result import PRIOR_ONLY, FitResult
 from scissorcal.report.numbers import Number, finite, scalar, shown_unit, significant
 from scissorcal.report.panel import (
     Axis,

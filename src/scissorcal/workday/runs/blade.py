@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.aliases import Progress
-from scissorcal.calibration.camera.checks import CameraThere
+from scissorcal.calibration.camera.checks import verdict_there
 from scissorcal.calibration.camera.result import CameraFit
 from scissorcal.calibration.edge.checks import CAMERA, pair_verdicts
 from scissorcal.calibration.edge.fit import Blade, fit_blade
@@ -118,7 +118,7 @@ def _camera_verdicts(engine: Engine, seen: Sequence[BladePhoto]) -> tuple[Verdic
         float(np.linalg.norm(np.ptp(photo.whole(own.edge.pixels), axis=0)) / np.ptp(own.station))
         for photo, own in edges
     )
-    return (CameraThere.of(fitted.pixel_map, pixels, scale).verdict(CAMERA),)
+    return (verdict_there(CAMERA, fitted.pixel_map, pixels, scale),)
 
 
 def _refuse_other_setup(before: Sequence[PhotoCapture], setup: BladeSetup) -> None:

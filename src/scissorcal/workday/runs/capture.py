@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from scissorcal.calibration.design.state import fitted_cut
-from scissorcal.device.advance_trajectory import refuse_without_motor
-from scissorcal.device.capture import CaptureReport, capture, open_writer, planned
-from scissorcal.device.capture_by_parts import capture_by_parts
+from scissorcal.device.capture import CaptureReport, capture, capture_by_parts, open_writer, planned
 from scissorcal.device.session import Operator, RigSession
+from scissorcal.device.trajectory import refuse_without_motor
 from scissorcal.errors import InputError
 from scissorcal.recipe.load import parse_recipe, read_text
 from scissorcal.recipe.pace import capture_cost, refuse_long

@@ -11,10 +11,8 @@ from scissorcal.control.control_result import ControlResult
 from scissorcal.control.follow import Job, control
 from scissorcal.control.mechanics import FASTEST_rad_per_s, RigMechanics
 from scissorcal.control.path_file import SurfacePoints, read_path
-from scissorcal.control.plate_request import ask_for_plate
-from scissorcal.control.settings import Material
-from scissorcal.device.rig_record import rig_facts
-from scissorcal.device.session import Operator, RigSession
+from scissorcal.control.settings import Material, ask_for_plate
+from scissorcal.device.session import Operator, RigSession, rig_facts
 from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import PATH

@@ -228,7 +228,7 @@ def _known(engine: Engine) -> tuple["TorqueKnowledge", Any, tuple[str, ...]]:
 
 def _last_identity(workspace: Workspace) -> "Identity | None":
     """The identity that the last recording's rig stated; None where there is none."""
-    from scissorcal.device.rig_record import identity_of
+    from scissorcal.device.session import identity_of
     from scissorcal.recording import read_header
 
     paths = [path for kind in ("friction", "cut") for path in workspace.recordings(kind)]

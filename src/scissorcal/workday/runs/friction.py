@@ -11,7 +11,7 @@ from scissorcal.calibration.friction.advance import fit_friction_advance
 from scissorcal.calibration.friction.fit import fit_friction
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
-from scissorcal.model.mechanism import AxisLaw
+from scissorcal.model.friction import AxisLaw
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.facts import UNFINISHED
 from scissorcal.workday.recordings import used_recordings

@@ -137,7 +137,7 @@ def recorded_rig(captures: Path, fits: Mapping[str, Any]) -> "RigRecord | None":
 
     None where no recording is there that states one.
     """
-    from scissorcal.device.rig_record import identity_of
+    from scissorcal.device.session import identity_of
     from scissorcal.package.manifest import RigRecord
     from scissorcal.recording.header_reader import read_header
 

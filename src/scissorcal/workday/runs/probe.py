@@ -67,7 +67,7 @@ def ensure_probed(
     DeviceError, besides what the probe raises, where blades of its inertia would get too fast
     without commands (`refuse_unanswered`).
     """
-    from scissorcal.device.unanswered import refuse_unanswered
+    from scissorcal.device.session import refuse_unanswered
 
     recipe, say = session.recipe, session.operator.say
     last = _kept(workspace)
@@ -170,8 +170,8 @@ def _outdated(last: ProbeResult, recipe: Recipe, now: datetime) -> str:
 def _differs(last: ProbeResult, link: Link) -> bool:
     """Whether a probe is of another rig, or ran in virtual time where this one does not."""
     from scissorcal.device.link import PortLink
-    from scissorcal.device.probe.guards import REAL_TIME
     from scissorcal.device.probe.probe import identity_digest
+    from scissorcal.device.probe.talk import REAL_TIME
 
     real = last.facts.get(REAL_TIME) == 1.0
     return last.identity != identity_digest(link.identity) or real != isinstance(link, PortLink)

@@ -22,8 +22,7 @@ from scissorcal.render import (
     open_writer,
     render,
 )
-from scissorcal.render.mismatch import refuse_other_rig
-from scissorcal.render.rig_facts import fitted_facts, rig_facts, with_probe
+from scissorcal.render.rig_facts import fitted_facts, refuse_other_rig, rig_facts, with_probe
 from scissorcal.tracking.plate_pose import PoseSource
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, RenderOptions, RigOptions

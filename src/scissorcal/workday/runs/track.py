@@ -11,8 +11,7 @@ import numpy as np
 
 from scissorcal.device.link import Link
 from scissorcal.device.motion import Motion
-from scissorcal.device.rig_record import rig_facts
-from scissorcal.device.session import RigSession
+from scissorcal.device.session import RigSession, rig_facts
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.recipe.plate_surface import LONGEST_DELAY_MS

@@ -9,7 +9,7 @@ from typing import Any
 
 from scissorcal.aliases import Progress
 from scissorcal.calibration import FitResult
-from scissorcal.calibration.cut import cut_experiment
+from scissorcal.calibration.cut.fit import cut_experiment
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.friction.advance import actuation_of, sliding_joints
 from scissorcal.calibration.friction.fit import friction_experiment

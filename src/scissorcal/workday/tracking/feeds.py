@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scissorcal.device.capture import servo_config
 from scissorcal.device.link import Link
 from scissorcal.device.motion import Motion
-from scissorcal.device.open_motion import open_motion
+from scissorcal.device.port_motion import open_motion
 from scissorcal.device.session import RigSession
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.vision.live import Frame, LocatedFrame, camera_number

@@ -13,7 +13,7 @@ from scissorcal.errors import InputError, MissingError
 from scissorcal.model.blade_point import BladePoint
 from scissorcal.recipe.plate_surface import plate_surface
 from scissorcal.recipe.schema import Recipe
-from scissorcal.tracking.contacts import TipContacts
+from scissorcal.tracking.rows import TipContacts
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.runs.cut import blade_edge

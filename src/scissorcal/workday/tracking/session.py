@@ -12,9 +12,14 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array
 from scissorcal.model.surface import Surface
 from scissorcal.recipe.schema import Recipe
-from scissorcal.tracking.delay import DelayFit, measure_delay
 from scissorcal.tracking.follow import ContactSource, FollowedRow, PoseFollower
-from scissorcal.tracking.judge import TrackFigures, track_figures, track_verdicts
+from scissorcal.tracking.judge import (
+    DelayFit,
+    TrackFigures,
+    measure_delay,
+    track_figures,
+    track_verdicts,
+)
 from scissorcal.tracking.rows import CameraPose
 from scissorcal.tracking.settings import CameraErrors, TrackingSettings, settings_of
 from scissorcal.tracking.tracker import Outcome, PoseEstimate

@@ -17,7 +17,7 @@ from scissorcal.device.sim.specimen import Specimen, TouchedPlate, load_specimen
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey
 from scissorcal.recipe.schema import Recipe
-from scissorcal.tracking.rotation import rotation_of, rotation_vector
+from scissorcal.tracking.plate_pose import rotation_of, rotation_vector
 from scissorcal.vision.live import Frame
 from scissorcal.vision.sim.optics import SimPose
 from scissorcal.vision.sim.scenes import LEVEL

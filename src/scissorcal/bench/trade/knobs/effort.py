@@ -18,7 +18,7 @@ from scissorcal.bench.trade.fits import (
 from scissorcal.bench.trade.point import Error, Sample, Setting
 from scissorcal.bench.trade.torque import BAND_WORST
 from scissorcal.calibration import result
-from scissorcal.calibration.signals.window_length import knot_samples
+from scissorcal.calibration.signals.filtering import knot_samples
 
 
 class FitKnob(ABC):

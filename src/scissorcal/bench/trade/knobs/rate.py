@@ -12,7 +12,7 @@ from scissorcal.bench.trade.models import kernel_model, nothing_rendered
 from scissorcal.bench.trade.point import Error, Quantity, Sample, Setting
 from scissorcal.bench.trade.rendered import hand_strokes, rendered_error
 from scissorcal.bench.trade.torque import AVERAGE, WORST
-from scissorcal.device.rig_record import identity_of
+from scissorcal.device.session import identity_of
 from scissorcal.kernel import ModelTables
 from scissorcal.model import FrictionLaw
 from scissorcal.model.friction import angle_factor

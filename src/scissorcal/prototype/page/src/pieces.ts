@@ -9,7 +9,7 @@ export interface Strip {
   fracture_energy_J_per_m: number;
 }
 
-/** A stretch without a gap (scissorcal.kernel.pieces): its crack begins at its near edge. */
+/** A stretch without a gap (scissorcal.kernel.plate): its crack begins at its near edge. */
 export interface Piece {
   begin_m: number;
   upper_face_m: number;
