@@ -33,8 +33,7 @@ from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.inputs import REST_RATE_RAD_PER_S
 from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import SimWorld
-from scissorcal.workday.tracking.track_pictures import TrackPicture
-from scissorcal.workday.tracking.track_recorder import TrackAbout
+from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackPicture
 from scissorcal.workday.tracking.tracking_camera import TrackedPose
 
 PATH_MM = (10.0, 40.0)

@@ -34,12 +34,13 @@ from scissorcal.bench.trade.point import Curve
 from scissorcal.bench.trade.recommend import stated
 from scissorcal.bench.trade.together import Together, rendered_torque
 from scissorcal.bench.trade.torque import scene_places
-from scissorcal.cli.bench_trade import seconds_of
+from scissorcal.cli.bench import seconds_of
 from scissorcal.device.sim.specimen import Specimen
 from scissorcal.device.sim.truth import average_torque
 from scissorcal.workday.demo.day import make_day, specimen_of
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.runs.bench import TradeSettings, trade_workspace
+from scissorcal.workday.options import Processes, TradeOptions
+from scissorcal.workday.runs.bench import trade_workspace
 from scissorcal.workday.runs.bench_case import load_case
 from scissorcal.workday.workspace import create_workspace
 
@@ -83,8 +84,8 @@ def day(seed: int, budget_s: float, fresh: int, workers: int) -> list[Row]:
         workspace = create_workspace(Path(folder) / "day", name)
         make_day(workspace, seed=seed)
         specimen = specimen_of(workspace.recipe(), seed)
-        settings = TradeSettings(budget_s=budget_s)
-        trade = trade_workspace(workspace, settings, workers=workers).trade
+        settings = TradeOptions(budget_s=budget_s)
+        trade = trade_workspace(workspace, settings, Processes(workers))[0]
         print(f"day {seed}, {name}: {trade.measured} measurements in {trade.seconds:g} s")
         for sentence in trade.sentences:
             print(f"  {sentence}", flush=True)

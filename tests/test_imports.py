@@ -252,7 +252,7 @@ def test_a_command_loads_what_it_uses(what: str, tmp_path: Path) -> None:
     assert len(loaded) <= most
 
 
-SERVED = {f"scissorcal.prototype.{name}" for name in ("guard", "server", "watcher")}
+SERVED = {f"scissorcal.prototype.{name}" for name in ("server", "watcher")}
 """Modules that are nothing without aiohttp, and that only what needs them imports."""
 
 

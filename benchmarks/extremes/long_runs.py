@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.extremes.cells import Found, judged, worst_of
 from benchmarks.extremes.states import fitted_tables, made_state
 
-from scissorcal.bench.extremes.long_runs import strokes
+from scissorcal.bench.extremes.compare import strokes
 from scissorcal.bench.extremes.states import State
 from scissorcal.kernel import CrackLaw, Curve, Kernel, ModelTables, StepFlag, walk_crack
 from scissorcal.model import Response, edge_height, settled_contact

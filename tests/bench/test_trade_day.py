@@ -10,7 +10,8 @@ from scissorcal.bench.trade.study import tasks_of
 from scissorcal.errors import InputError
 from scissorcal.workday import (
     Engine,
-    TradeSettings,
+    Processes,
+    TradeOptions,
     Workspace,
     create_workspace,
     load_case,
@@ -54,7 +55,7 @@ def test_a_day_is_measured_within_a_budget_and_goes_on(day: Workspace) -> None:
     for point in tables.points:
         assert point.errors[tables.error].value > 0.0
         assert point.costs[tables.cost].median > 0.0
-    second = trade_workspace(day, TradeSettings(knobs, budget_s=budget_s), workers=2).trade
+    second = trade_workspace(day, TradeOptions(knobs, budget_s=budget_s), Processes(2))[0]
     assert second.measured == first.measured + second.measured_now
 
 
@@ -65,7 +66,7 @@ def measured_in_part(day: Workspace, knobs: tuple[str, ...]) -> tuple[Trade, flo
     it is at most about twice what the first few measurements take.
     """
     for doubling in range(8):
-        chosen = TradeSettings(knobs=knobs, budget_s=3.0 * 2.0**doubling)
+        chosen = TradeOptions(knobs=knobs, budget_s=3.0 * 2.0**doubling)
         with suppress(InputError):  # the budget is too small for any measurement
-            return trade_workspace(day, chosen, workers=2).trade, 3.0 * 2.0**doubling
+            return trade_workspace(day, chosen, Processes(2))[0], 3.0 * 2.0**doubling
     raise AssertionError("no budget up to 384 s was enough for one measurement")

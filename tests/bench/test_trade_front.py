@@ -5,7 +5,7 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scissorcal.bench.trade.pareto import pareto_front
+from scissorcal.bench.trade.assemble import pareto_front
 from scissorcal.bench.trade.point import (
     Curve,
     Error,

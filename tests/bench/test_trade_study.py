@@ -7,13 +7,18 @@ import pytest
 
 from scissorcal.bench.trade import fits, study
 from scissorcal.bench.trade import knob as knobs
-from scissorcal.bench.trade.assemble import curve_of, limit_of, reference_of
+from scissorcal.bench.trade.assemble import (
+    curve_of,
+    limit_of,
+    reference_of,
+    to_simulate,
+    without_prospect,
+)
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.knob import KNOBS, make_knob
 from scissorcal.bench.trade.knobs.effort import Effort
 from scissorcal.bench.trade.next_capture import NEXT_CAPTURE
 from scissorcal.bench.trade.point import Sample, Setting
-from scissorcal.bench.trade.prospects import to_simulate, without_prospect
 from scissorcal.bench.trade.schedule import Schedule
 from scissorcal.bench.trade.study import PRESENT_TASK, Record, Task, records_of, run_task, tasks_of
 from scissorcal.bench.trade.torque import WORST

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scissorcal.bench.trade.subsets import kept, movements, shortened
+from scissorcal.bench.trade.knobs.capture import kept, movements, shortened
 from scissorcal.recording import SAMPLE_DTYPE, UNLOADED_MARK, Recording, Stroke
 
 KINDS = ("closing", "opening", "closing", "opening", "closing", "opening", "excitation")

@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import jsonschema
 import pytest
@@ -13,7 +13,7 @@ from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade import study
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.point import Curve, Error, Point, Sample, Setting, Spread
-from scissorcal.bench.trade.result import FORMAT, read_trade
+from scissorcal.bench.trade.result import FORMAT, Trade, read_trade
 from scissorcal.bench.trade.schedule import Schedule
 from scissorcal.bench.trade.study import Task
 from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, TOGETHER, Together
@@ -21,7 +21,7 @@ from scissorcal.bench.trade.torque import WORST
 from scissorcal.errors import InputError, MissingError
 from scissorcal.recipe import schemas_dir
 from scissorcal.report import twin_text
-from scissorcal.workday import ON_A_CLUSTER, TradeOutcome, TradeSettings, Workspace, trade_workspace
+from scissorcal.workday import ON_A_CLUSTER, Processes, TradeOptions, Workspace, trade_workspace
 from scissorcal.workday.runs import bench
 from tests.bench.made_trade import ERRORS, FAILING, MADE, Slow, Steps, made_case
 from tests.guard import GUARD_S
@@ -42,8 +42,17 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     return quick_workspace(tmp_path / "paper")
 
 
-def run(workspace: Workspace, **settings: object) -> TradeOutcome:
-    return trade_workspace(workspace, TradeSettings(**settings), workers=1)  # type: ignore[arg-type]
+class Ran(NamedTuple):
+    trade: Trade
+    notes: tuple[str, ...]
+    html: Path
+    json: Path
+
+
+def run(workspace: Workspace, cluster: str | None = None, **options: object) -> Ran:
+    processes = Processes(None if cluster else 1, cluster)
+    found = trade_workspace(workspace, TradeOptions(**options), processes)  # type: ignore[arg-type]
+    return Ran(*found, workspace.trade_html, workspace.trade_json)
 
 
 def test_a_run_writes_a_page_and_a_twin_that_keeps_its_schema(workspace: Workspace) -> None:
@@ -131,9 +140,9 @@ def test_a_cluster_measures_no_photographs_and_says_why(
     monkeypatch.setattr(knobs, "KNOBS", {"steps": MADE["steps"], "plate": MADE["plate"]})
     monkeypatch.setattr(bench._Run, "together", lambda *_: None)
     whole = bench.open_pool
-    monkeypatch.setattr(bench, "open_pool", lambda workers, cluster: whole(1))
+    monkeypatch.setattr(bench, "open_pool", lambda processes: whole(Processes(1)))
     run(workspace, knobs=("plate",))
-    found = trade_workspace(workspace, TradeSettings(), cluster="tcp://host:1")
+    found = run(workspace, "tcp://host:1")
     assert found.trade.measured_now == ALL
     steps, plate = found.trade.curves
     assert len(steps.points) == len(ERRORS) + 1
@@ -142,7 +151,7 @@ def test_a_cluster_measures_no_photographs_and_says_why(
     page = found.html.read_text(encoding="utf-8")
     assert "photographs are read from files of this computer" in page
     with pytest.raises(InputError, match="--knob plate: It is left out with --cluster"):
-        trade_workspace(workspace, TradeSettings(("plate",)), cluster="tcp://host:1")
+        run(workspace, "tcp://host:1", knobs=("plate",))
 
 
 def test_an_interrupted_run_goes_on_where_it_was(
@@ -194,7 +203,7 @@ def test_a_budget_says_what_was_left_out(
         return whole(case, ["steps"])[:2]
 
     whole = study.tasks_of
-    monkeypatch.setattr(study, "tasks_of", hardly_any)
+    monkeypatch.setattr(bench, "tasks_of", hardly_any)
     found = run(workspace, budget_s=GUARD_S)
     assert found.trade.curves[0].unmeasured == ("middle", FAILING)
     assert found.trade.budget_s == GUARD_S
@@ -207,7 +216,7 @@ def test_a_knob_that_a_budget_leaves_out_as_a_whole_is_named(
     every = {name: MADE[name] for name in ("steps", "slow")}
     monkeypatch.setattr(knobs, "KNOBS", every)
     whole = study.tasks_of
-    monkeypatch.setattr(study, "tasks_of", lambda case, names: whole(case, ["steps"]))
+    monkeypatch.setattr(bench, "tasks_of", lambda case, names: whole(case, ["steps"]))
     monkeypatch.setattr(Slow, "title", "Slow steps")
     monkeypatch.setattr(bench._Run, "together", lambda *_: None)
     found = run(workspace, budget_s=GUARD_S)
@@ -255,7 +264,7 @@ def test_what_changes_nothing_at_once_is_named_and_alone_not_measured(
     asked: list[Task] = []
     file = SimpleNamespace(records=[record(Task("effort", "standard"))])
 
-    def work(self: object, pool: object, schedule: Schedule, count: int) -> None:
+    def work(self: object, pool: object, schedule: Schedule) -> None:
         asked.extend(schedule.left)
         file.records += [record(task) for task in schedule.left]
 
@@ -293,7 +302,7 @@ def test_a_knob_that_the_scene_does_not_have_is_refused(
 
 def test_a_workspace_without_fits_says_what_comes_first(tmp_path: Path) -> None:
     with pytest.raises(MissingError, match="There is no fit of friction yet: run 'scissorcal"):
-        trade_workspace(quick_workspace(tmp_path / "paper"), workers=1)
+        run(quick_workspace(tmp_path / "paper"))
 
 
 def test_results_of_another_version_are_refused(workspace: Workspace) -> None:

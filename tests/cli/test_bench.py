@@ -6,7 +6,7 @@ import pytest
 
 from scissorcal.bench.trade import knob as knobs
 from scissorcal.bench.trade import study
-from scissorcal.cli import bench_trade
+from scissorcal.cli import bench as bench_command
 from scissorcal.workday import Workspace
 from scissorcal.workday.demo import day
 from scissorcal.workday.runs import bench
@@ -82,9 +82,9 @@ def days(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, int
 
 
 def test_the_day_of_a_recipe_is_made_once_for_each_seed(days: list[tuple[str, int]]) -> None:
-    first = bench_trade._day("press-only", 0)
-    assert bench_trade._day("press-only", 0).root == first.root
-    other = bench_trade._day("press-only", 7)
+    first = bench_command._day("press-only", 0)
+    assert bench_command._day("press-only", 0).root == first.root
+    other = bench_command._day("press-only", 7)
     assert other.root != first.root
     assert first.recipe_path.is_file()
     assert days == [("bench-press-only", 0), ("bench-press-only-7", 7)]
@@ -99,6 +99,6 @@ def test_a_day_that_was_interrupted_is_made_anew(
     with monkeypatch.context() as patch:
         patch.setattr(day, "make_day", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            bench_trade._day("press-only", 0)
-    bench_trade._day("press-only", 0)
+            bench_command._day("press-only", 0)
+    bench_command._day("press-only", 0)
     assert days == [("bench-press-only", 0)]

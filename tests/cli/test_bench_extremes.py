@@ -17,14 +17,14 @@ from .conftest import Cli
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a run consist of three states of the scene."""
-    from scissorcal.bench.extremes import states
+    from scissorcal.workday.runs import bench_extremes
 
-    planned = states.package_states
+    planned = bench_extremes.package_states
 
     def three(package, size, seed):
         return [s for s in planned(package, 0.02, seed) if s.band == "scene"][:3]
 
-    monkeypatch.setattr(states, "package_states", three)
+    monkeypatch.setattr(bench_extremes, "package_states", three)
 
 
 def test_it_takes_the_workspaces_package_and_writes_a_page_and_a_twin(

@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.cli.log import LOG_FILE
 from scissorcal.cli.opening import open_workspace
-from scissorcal.cli.output import Answer
+from scissorcal.cli.output import LOG_FILE, Answer
 from scissorcal.verdicts import Verdict
 
 from .conftest import Cli, run_instead

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scissorcal.cli.fit_plate import facts, text
-from scissorcal.cli.track_view import track_line
+from scissorcal.cli.track import track_line
 from scissorcal.recipe import EulerAngles
 from scissorcal.report import plate_panels
 from scissorcal.vision import Pose

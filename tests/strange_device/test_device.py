@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device import Reference
-from scissorcal.device.port_motion import open_motion
+from scissorcal.device import Reference, open_motion
 from scissorcal.kernel import ServoConfig, StopReason
 
 from . import FAULTS, StrangeDevice, VirtualPort, wire

@@ -28,8 +28,7 @@ from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.inputs import REST_RATE_RAD_PER_S
 from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import CAMERA_DRIFT, CAMERA_OFFSET_S, SimCamera, SimWorld
-from scissorcal.workday.tracking.track_pictures import PoseFinder, TrackPicture
-from scissorcal.workday.tracking.track_recorder import TrackAbout
+from scissorcal.workday.tracking.track_recorder import PoseFinder, TrackAbout, TrackPicture
 from scissorcal.workday.tracking.tracking_camera import Due, TrackedPose
 from tests.control.virtual import mechanics
 from tests.render.plate_motion import Move, true_torque

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pytest
 
 from scissorcal.errors import InputError, ScissorcalError
-from scissorcal.workday.answers import answering, read_answer
+from scissorcal.workday.pool import answering, read_answer
 
 
 @dataclass(frozen=True)

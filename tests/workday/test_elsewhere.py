@@ -8,11 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.calibration import store
 from scissorcal.errors import InputError
-from scissorcal.workday.elsewhere import put_in_place, refuse_unwritable
+from scissorcal.workday import history
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.history import restore, versions
+from scissorcal.workday.history import put_in_place, refuse_unwritable, restore, versions
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.runs.fit import fit_step, fit_workspace
 from scissorcal.workday.steps import BY_NAME
@@ -34,14 +33,14 @@ def workspace(fitted: Path, tmp_path: Path) -> Workspace:
 
 def refused(workspace: Workspace, folder: Path | None, patch: pytest.MonkeyPatch) -> InputError:
     """Fit again where the workspace's folder of fits takes nothing."""
-    save = store.save
+    save = history.save
 
     def full(result: object, path: Path) -> None:
         if path.is_relative_to(workspace.root):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         save(result, path)  # type: ignore[arg-type]
 
-    patch.setattr(store, "save", full)
+    patch.setattr(history, "save", full)
     step = BY_NAME["fit friction"]
     with pytest.raises(InputError) as found:
         fit_step(Engine.of(workspace), step, FitOptions(seed=5, force=True, save_to=folder))

@@ -25,7 +25,7 @@ from scissorcal.workday.recordings import exclude_recording, include_recording, 
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
 from scissorcal.workday.runs.report import write_workspace_report
-from scissorcal.workday.scene_choice import known_scene_choice
+from scissorcal.workday.runs.simplest import known_scene_choice
 from scissorcal.workday.states import WAITING
 from scissorcal.workday.steps import BY_NAME, STEPS
 from scissorcal.workday.workspace import Workspace

@@ -10,7 +10,7 @@ from scissorcal.device import RigSession
 from scissorcal.errors import DeviceError
 from scissorcal.workday.tracking.feeds import idle_rig
 from scissorcal.workday.tracking.sim_world import SimWorld
-from scissorcal.workday.tracking.track_pictures import TrackPicture
+from scissorcal.workday.tracking.track_recorder import TrackPicture
 from scissorcal.workday.tracking.tracking_camera import TrackedPose
 from tests.workday.track_world import a_recipe, a_session, an_eye
 

@@ -14,13 +14,13 @@ from scissorcal.errors import DeviceError, InputError
 from scissorcal.recording import SAMPLE_DTYPE
 from scissorcal.vision import Frame, LocatedFrame, timed
 from scissorcal.workday.tracking import feeds
-from scissorcal.workday.tracking.camera_thread import CameraThread
 from scissorcal.workday.tracking.feeds import (
+    CameraThread,
     live_feed,
     refuse_strange_pairs,
     refuse_without_carriage,
 )
-from scissorcal.workday.tracking.track_pictures import TrackPicture
+from scissorcal.workday.tracking.track_recorder import TrackPicture
 from tests.guard import GUARD_S
 
 

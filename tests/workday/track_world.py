@@ -16,8 +16,12 @@ from scissorcal.vision import SIM_LENS, Camera, Pose, RigPose, sim_plate_scene
 from scissorcal.workday.tracking.feeds import idle_rig, sim_feed, sim_rig_feed
 from scissorcal.workday.tracking.session import RigDrive, TrackFacts, TrackSession
 from scissorcal.workday.tracking.sim_world import SimCamera, SimWorld
-from scissorcal.workday.tracking.track_pictures import PoseFinder, TrackPicture
-from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackRecorder
+from scissorcal.workday.tracking.track_recorder import (
+    PoseFinder,
+    TrackAbout,
+    TrackPicture,
+    TrackRecorder,
+)
 
 CAMERA_SDS = np.array([0.8, 0.8, 0.6, 0.6, 1e-3, 3e-3, 1e-4, 1e-4, 1e-3])
 RIG_SDS = np.array([5e-4, 5e-4, 5e-4, 1e-4, 1e-4, 2e-4])

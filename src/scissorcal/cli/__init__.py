@@ -1,4 +1,4 @@
-"""The command line: one file per command, each a thin call of a documented function."""
+"""The command line: a file for each command or group, thin calls of documented functions."""
 
 
 def main() -> None:

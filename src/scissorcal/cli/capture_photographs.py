@@ -173,7 +173,7 @@ def blade(photographs: BladePhotographs, placing: BladePlacing, folder: Folder =
       ...
     """
     from scissorcal.vision.sim.sim_camera import render_blade_photographs
-    from scissorcal.workday.demo.sim_photographs import specimen_blade
+    from scissorcal.workday.demo.photographs import specimen_blade
     from scissorcal.workday.runs.blade import capture_blade
 
     photographs.refuse_two_sources("--camera sim")

@@ -1,6 +1,5 @@
 """``scissorcal control``"""
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import typer
@@ -71,15 +70,7 @@ def control(
     workspace = open_workspace(folder)
     with LiveView(ask=not yes) as view:
         controlled = control_workspace(workspace, rig, options, view.operator)
-    result = asdict(controlled.result)
-    del result["verdicts"]
-    files = [controlled.recording] if controlled.recording else []
-    verdicts = controlled.result.verdicts
-    tracked = controlled.tracked
-    if tracked:
-        verdicts += tracked.verdicts
-    facts = {"rig": controlled.rig, "tracked": tracked.facts if tracked else None}
-    return Answer({**result, **facts}, _text(controlled), verdicts, files)
+    return Answer(controlled.facts, _text(controlled), controlled.verdicts, controlled.files)
 
 
 def _text(controlled: "RigRun[ControlResult]") -> str:

@@ -99,12 +99,12 @@ def _shown(outcome: "FitOutcome") -> str:
     fit = outcome.result
     known = caveats_of(fit)
     marked = {name for caveat in known for name in caveat.parameters}
-    lines = [parameter_table(fit, _reported(outcome), marked), next_recording_sentence(fit)]
+    lines = [_parameter_table(fit, _reported(outcome), marked), next_recording_sentence(fit)]
     lines += [f"* {', '.join(caveat.parameters)}: {caveat.sentence}" for caveat in known]
     return "\n".join(line for line in lines if line)
 
 
-def parameter_table(
+def _parameter_table(
     fit: "FitResult", parameters: "tuple[FittedParameter, ...]", marked: "Collection[str]" = ()
 ) -> str:
     """Set out parameters of a fit for people; those that are ``marked`` get an asterisk.

@@ -3,9 +3,10 @@
 from typing import TYPE_CHECKING
 
 from scissorcal.cli.output import table
-from scissorcal.cli.pose_lines import pose_lines
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from scissorcal.calibration.plate.result import PlateFit
     from scissorcal.vision.geometry.pose import Pose
     from scissorcal.workday.runs.fit import FitOutcome
@@ -54,3 +55,13 @@ def facts(outcome: "FitOutcome") -> dict[str, object]:
         "inputs_hash": fit.inputs_hash,
         "pictures": outcome.pictures,
     }
+
+
+def pose_lines(poses: "Mapping[str, Pose]") -> list[str]:
+    """Quaternions of poses by the names of their frames, notes on their angles, the convention."""
+    from scissorcal.recipe.euler_angles import CONVENTION, quaternion_words
+
+    lines = [f"quaternion, {name}: {quaternion_words(p.quaternion)}" for name, p in poses.items()]
+    notes = {name: pose.euler_angles.note for name, pose in poses.items()}
+    lines += [f"note, {name}: {note}" for name, note in notes.items() if note]
+    return [*lines, f"yaw, pitch, roll: {CONVENTION}"]

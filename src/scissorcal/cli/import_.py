@@ -10,12 +10,12 @@ import typer
 
 from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder, options_of
-from scissorcal.cli.output import Answer, command
+from scissorcal.cli.output import Answer, command, table
 from scissorcal.cli.progress import progress
-from scissorcal.cli.survey import survey_lines
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
+    from scissorcal.calibration.signals.survey import Survey
     from scissorcal.recording import Joint, Kind, Recording
 
 _CAMERA_FILES = (".yaml", ".yml", ".xml", ".json", ".ini")
@@ -153,49 +153,40 @@ def import_(
         table = replace(table, handle_radius_mm=radius_mm)
     measured = tuple(table.channels)
 
-    def import_one(file: Path) -> _Imported:
+    def import_one(file: Path) -> tuple["Recording", Answer]:
         recording = table.read(file, Joint(joint or (rig.joint if rig else "rotary")), kind)
         target = output or (workspace.new_recording(kind) if workspace else None)
         assert target is not None
         path = write_recording(recording, target)
         shown = workspace.relative(path) if workspace else str(path)
         planned = rig.joint if rig else recording.joint.kind
-        return _Imported(recording, path, shown, planned, measured)
+        return recording, _answer(recording, path, shown, planned, measured)
 
     if len(files) == 1:
-        return _answer(import_one(files[0]))
+        return import_one(files[0])[1]
     return _import_all(files, import_one)
 
 
-@dataclass(frozen=True)
-class _Imported:
-    """One log: what was read, where it was written, the recipe's joint, the columns it had."""
-
-    recording: "Recording"
-    path: Path
-    shown: str
-    planned: str
-    measured: tuple[str, ...]
-
-
-def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]") -> Answer:
+def _import_all(
+    files: Sequence[Path], import_one: Callable[[Path], tuple["Recording", Answer]]
+) -> Answer:
     """Import each log that can be read; raises InputError that names the others."""
-    lines, facts, paths, refused = [], [], [], []
+    lines, facts, refused = [], [], []
+    paths: list[Path] = []
     with progress() as tell:
         for done, file in enumerate(files):
             tell(done / len(files), f"{file.name}")
             try:
-                imported = import_one(file)
+                recording, answer = import_one(file)
             except InputError as error:
                 refused.append(str(error))
                 continue
-            answer = _answer(imported)
             first, *_ = answer.text.splitlines()
             lines.append(f"{file.name}: {first}")
-            particular = (*imported.recording.particular, *answer.result["survey"].notes)
+            particular = (*recording.particular, *answer.result["survey"].notes)
             lines += [f"  note: {said}" for said in particular]
             facts.append(answer.result)
-            paths.append(imported.path)
+            paths += answer.files
     if refused:
         refusal = InputError(
             f"{len(refused)} of {len(files)} logs were not imported; the other {len(paths)} were:"
@@ -207,27 +198,28 @@ def _import_all(files: Sequence[Path], import_one: "Callable[[Path], _Imported]"
     return Answer({"imported": facts}, "\n".join(lines), files=paths)
 
 
-def _answer(imported: _Imported) -> Answer:
+def _answer(
+    recording: "Recording", path: Path, shown: str, planned: str, measured: tuple[str, ...]
+) -> Answer:
     """What was imported; a note where the recipe plans for another joint than was recorded."""
     from scissorcal.calibration.signals.survey import survey
 
-    recording, joint = imported.recording, imported.recording.joint
-    notes = list(recording.notes)
-    if imported.planned != joint.kind:
+    joint, notes = recording.joint, list(recording.notes)
+    if planned != joint.kind:
         notes.append(
-            f'The recipe has a {imported.planned} joint: set joint = "{joint.kind}" in its '
+            f'The recipe has a {planned} joint: set joint = "{joint.kind}" in its '
             f"[rig] to plan for a {joint.kind} one."
         )
-    sensors = survey(recording, imported.measured)
+    sensors = survey(recording, measured)
     notes += sensors.notes
     lines = [
-        f"{imported.shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
+        f"{shown}: {len(recording.samples)} samples, {recording.duration_s:.1f} s, "
         f"{len(recording.strokes)} strokes, {joint.kind} joint",
         *survey_lines(sensors),
         *(f"note: {sentence}" for sentence in notes),
     ]
     result = {
-        "recording": imported.path,
+        "recording": path,
         "kind": recording.kind,
         "joint": joint.kind,
         "position_unit": joint.position_unit,
@@ -238,7 +230,7 @@ def _answer(imported: _Imported) -> Answer:
         "survey": sensors,
         "notes": notes,
     }
-    return Answer(result, "\n".join(lines), files=[imported.path])
+    return Answer(result, "\n".join(lines), files=[path])
 
 
 def _import_camera(file: Path, folder: Path | None) -> Answer:
@@ -278,3 +270,24 @@ def pairs(option: str, given: Sequence[str] | None) -> list[tuple[str, str]]:
             raise InputError(f"--{option} {channel.strip()} is given twice; give it once.")
         pairs.append((channel.strip(), value.strip()))
     return pairs
+
+
+def survey_lines(found: "Survey") -> list[str]:
+    """Rate and sensors, for people; angles in deg."""
+    import math
+
+    gaps = found.gaps
+    lost = f"{gaps.missing} samples missing in {gaps.places} gaps" if gaps.places else "no gap"
+    head = (
+        f"rate: {found.rate_Hz:.4g} Hz; {found.interval_low_ms:.4g} to "
+        f"{found.interval_high_ms:.4g} ms between samples (5 to 95 %), longest "
+        f"{found.longest_ms:.4g} ms; {lost}"
+    )
+    rows = [["sensor", "unit", "step", "lowest", "highest", "cut off low", "high", "dead band"]]
+    for one in found.sensors:
+        unit, factor = ("deg", 180.0 / math.pi) if one.unit == "rad" else (one.unit, 1.0)
+        values = [f"{factor * value:.4g}" for value in (one.low, one.high)]
+        step = "constant" if one.constant else f"{factor * one.step:.3g}" if one.step else "none"
+        shares = [f"{share:.1%}" for share in (one.at_low, one.at_high, one.dead)]
+        rows.append([one.channel, unit, step, *values, *shares])
+    return [head, table(rows, right=range(2, 8))]

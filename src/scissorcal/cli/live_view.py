@@ -94,7 +94,7 @@ class LiveView:
         """Show how far a capture is from the scene's tolerance, after each update of the fit."""
         self._approach.append(mark)
         if self._live is None:
-            echo(band_line(self._approach), err=True)
+            echo(_band_line(self._approach), err=True)
 
     def confirm(self, request: str) -> None:
         """Ask a person for what must be done, and wait until it is.
@@ -150,19 +150,19 @@ class LiveView:
         if self._trace and self._axis:
             drawn.append(Text(effort_plot(self._trace, self._axis)))
         if self._approach:
-            drawn.append(Text(band_line(self._approach)))
+            drawn.append(Text(_band_line(self._approach)))
         elif recorder and self._listed:
             drawn.append(recorder.coverage)
         return Group(*drawn)
 
 
-def band_line(marks: "Sequence[UntilMark]") -> str:
+def _band_line(marks: "Sequence[UntilMark]") -> str:
     """The last mark's sentence, and a bar for each: the share of places within the tolerance.
 
     >>> from scissorcal.recording.header import UntilMark
     >>> first = UntilMark("", 1, 1, 0.5, 1.0, 0.0, 0.2, 0.07, 0.95)
     >>> second = UntilMark("", 2, 1, 0.6, 0.9, 1.0, 0.05, 0.07, 0.95)
-    >>> band_line([first, second])[:2]
+    >>> _band_line([first, second])[:2]
     '▁█'
     """
     shares = [mark.within for mark in marks if mark.within is not None][-_BARS_SHOWN:]
@@ -170,7 +170,7 @@ def band_line(marks: "Sequence[UntilMark]") -> str:
     return f"{bars} {marks[-1].sentence}".strip()
 
 
-def effort_plot(points: "deque[tuple[float, float]]", of: "CoveredAxis") -> str:
+def effort_plot(points: deque[tuple[float, float]], of: "CoveredAxis") -> str:
     """Plot an axis's effort over its place with characters; the newest point is an o."""
     columns, rows = _TRACE_SIZE
     left, right = _range([point[0] for point in points])

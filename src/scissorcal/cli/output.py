@@ -4,9 +4,12 @@ A command's function returns an `Answer`. People read its text on stdout; with `
 one object alone, and the text goes to stderr with everything else that people read.
 """
 
+import contextlib
 import functools
 import inspect
 import json
+import os
+import shlex
 import sys
 import time
 import traceback
@@ -15,15 +18,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from scissorcal.cli.failures import INTERRUPTED, UNEXPECTED, unexpected, user_error
-from scissorcal.cli.log import log_command
 from scissorcal.cli.options import gathered, parameters_of
-from scissorcal.cli.terminal import drawn, echo, kept, printable_json, style
+from scissorcal.cli.terminal import drawn, echo, kept, printable, printable_json, style
 from scissorcal.errors import OldWordWarning
 from scissorcal.verdicts import Verdict, failed
 from scissorcal.workday.envelope import Envelope, plain
@@ -285,3 +288,33 @@ def _next_line(answer: Answer, running: _Running) -> str:
     except Exception:  # noqa: BLE001 - the command's own answer stands; 'plan' tells what is wrong
         following = "scissorcal plan"
     return f"next: {following or 'nothing is left to do'}"
+
+
+LOG_FILE = "scissorcal.log"
+
+
+def log_command(
+    workspace: Path, words: Sequence[str], code: int, seconds: float, error: str, trace: str
+) -> None:
+    """Append a line to scissorcal.log: UTC time, exit code, seconds, command, and its error.
+
+    ``trace`` (of a fault) follows, indented. A log that cannot be written stops no command.
+
+    >>> log_command(Path("/nowhere"), ["fit", "cut"], 0, 12.5, "", "")
+    """
+    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    line = f"{now}  exit {code}  {seconds:.1f} s  scissorcal {shlex.join(words)}"
+    if error:
+        line += f"  # {' '.join(error.split())}"
+    lines = [line, *(f"    {row}" for row in trace.splitlines())]
+    with (
+        contextlib.suppress(OSError),  # a full disk, a folder of somebody else, a symbolic link
+        open(workspace / LOG_FILE, "a", encoding="utf-8", opener=_own) as file,
+    ):
+        file.write(printable("\n".join(lines)) + "\n")
+
+
+def _own(path: str, flags: int) -> int:
+    """Open the log itself, and nothing that a symbolic link or a pipe of its name leads to."""
+    guards = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # Windows has neither
+    return os.open(path, flags | guards, 0o666)

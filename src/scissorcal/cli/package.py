@@ -9,7 +9,7 @@ from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder, Seed, TrustedKey
 from scissorcal.cli.output import Answer, command
-from scissorcal.cli.signing import SigningKey, signer_of
+from scissorcal.cli.report import SigningKey, signer_of
 
 if TYPE_CHECKING:
     from scissorcal.package import Manifest
@@ -149,12 +149,9 @@ def export(
     """
     from scissorcal.workday.runs.prototype import export_page
 
-    page = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
-    text = (
-        f"{page.path}: {page.bytes / 1e6:.2g} MB; open it in a browser, it needs no server and no "
-        "network"
-    )
-    return Answer({"page": page.path, "bytes": page.bytes}, text, files=[page.path])
+    size = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
+    text = f"{html}: {size / 1e6:.2g} MB; open it in a browser, it needs no server and no network"
+    return Answer({"page": html, "bytes": size}, text, files=[html])
 
 
 def _contents(manifest: "Manifest") -> str:

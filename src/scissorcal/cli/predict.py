@@ -1,5 +1,6 @@
 """``scissorcal predict``"""
 
+import math
 from typing import TYPE_CHECKING
 
 import typer
@@ -11,8 +12,7 @@ from scissorcal.cli.progress import progress
 from scissorcal.workday.options import PredictOptions
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.friction.predict import Band
-    from scissorcal.workday.runs.predict import PredictionOutcome
+    from scissorcal.calibration.friction.predict import Band, Prediction
 
 
 _OPTIONS = {
@@ -53,46 +53,37 @@ def predict(options: PredictOptions, folder: Folder = None) -> Answer:
     from scissorcal.workday.runs.predict import predict_workspace
 
     with progress() as tell:
-        outcome = predict_workspace(open_workspace(folder), options, tell)
-    what = options.what
-    return Answer(_facts(what, outcome), _text(what, outcome), files=outcome.files)
-
-
-def _facts(what: str, outcome: "PredictionOutcome") -> dict[str, object]:
-    found, band = outcome.prediction, outcome.band
-    return {
-        "what": what,
-        "candidate": outcome.candidate,
-        "effort_unit": outcome.effort_unit,
-        "position_unit": outcome.position_unit,
+        prediction, band, fit = predict_workspace(open_workspace(folder), options, tell)
+    result = {
+        "what": options.what,
+        "candidate": fit.candidate,
+        "effort_unit": fit.effort_unit,
+        "position_unit": fit.position_unit,
         "band": band,
         "promise": band.sentence,
-        "share_inside": _number(found.share_inside),
-        "rms_error": _number(found.rms_error),
-        "moving_s": _moving_s(outcome),
-        "samples": len(found.time_s),
+        "share_inside": prediction.share_inside,
+        "rms_error": prediction.rms_error,
+        "moving_s": _moving_s(prediction),
+        "samples": len(prediction.time_s),
     }
+    head = f"{options.what}: {fit.candidate}, over {_moving_s(prediction):.1f} s of motion"
+    files = [path for path in (options.table, options.plot) if path is not None]
+    lines = [head, *_lines(prediction, band, fit.effort_unit), *map(str, files)]
+    return Answer(result, "\n".join(lines), files=files)
 
 
-def _text(what: str, outcome: "PredictionOutcome") -> str:
-    found, band, unit = outcome.prediction, outcome.band, outcome.effort_unit
+def _lines(found: "Prediction", band: "Band", unit: str) -> list[str]:
     width = f"{band.level:.0%} band: +- {band.moving:.3g} {unit}"
     if band.resting is not None and band.resting != band.moving:
         width += f", {band.resting:.3g} {unit} near rest"
-    head = f"{what}: {outcome.candidate}, over {_moving_s(outcome):.1f} s of motion"
-    lines = [head, width, band.sentence, _new_recording(band, unit)]
-    inside = _number(found.share_inside)
-    if inside is None:
-        lines.append("measured: this file holds no effort to compare with")
-    else:
-        import numpy as np
+    lines = [width, band.sentence, _new_recording(band, unit)]
+    if math.isnan(found.share_inside):
+        return [*lines, "measured: this file holds no effort to compare with"]
+    import numpy as np
 
-        count = int(np.count_nonzero(np.isfinite(found.low) & np.isfinite(found.measured)))
-        lines.append(
-            f"measured: {inside:.1%} of {count} samples in the band, rms error "
-            f"{found.rms_error:.3g} {unit}"
-        )
-    return "\n".join([*lines, *(str(path) for path in outcome.files)])
+    count = int(np.count_nonzero(np.isfinite(found.low) & np.isfinite(found.measured)))
+    measured = f"measured: {found.share_inside:.1%} of {count} samples in the band"
+    return [*lines, f"{measured}, rms error {found.rms_error:.3g} {unit}"]
 
 
 def _new_recording(band: "Band", unit: str) -> str:
@@ -105,14 +96,10 @@ def _new_recording(band: "Band", unit: str) -> str:
     )
 
 
-def _moving_s(outcome: "PredictionOutcome") -> float:
+def _moving_s(found: "Prediction") -> float:
     """Time that the joint moves, in seconds."""
     import numpy as np
 
-    time, moving = outcome.prediction.time_s, outcome.prediction.moving
+    time = found.time_s
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    return float(np.count_nonzero(moving) * step)
-
-
-def _number(value: float) -> float | None:
-    return value if value == value else None
+    return float(np.count_nonzero(found.moving) * step)

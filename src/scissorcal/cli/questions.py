@@ -23,7 +23,7 @@ QUESTION = "\x1e"
 PATIENCE_s = 10.0
 """After the end of stdin until a command that does not end is terminated."""
 
-answers: "queue.Queue[bool] | None" = None
+answers: queue.Queue[bool] | None = None
 """What the program said, True for yes, False where it is gone; None where nobody listens."""
 
 
@@ -53,7 +53,7 @@ def ask(request: str) -> None:
         raise typer.Abort
 
 
-def _listen(heard: "queue.Queue[bool]") -> None:
+def _listen(heard: queue.Queue[bool]) -> None:
     """Read the file itself: a thread that waits in a buffer of Python would hold up its end."""
     rest = b""
     while block := _read():

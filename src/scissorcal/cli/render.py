@@ -83,14 +83,7 @@ def render(
         note(sentence)
     with LiveView(ask=not yes) as view:
         rendered = render_workspace(workspace, rig, options, view.operator)
-    result = asdict(rendered.result)
-    verdicts = rendered.result.verdicts
-    if rendered.tracked:
-        verdicts += rendered.tracked.verdicts
-    del result["verdicts"]
-    files = [rendered.recording] if rendered.recording else []
-    facts = {"rig": rendered.rig, "tracked": rendered.tracked.facts if rendered.tracked else None}
-    return Answer({**result, **facts}, _text(rendered), verdicts, files)
+    return Answer(rendered.facts, _text(rendered), rendered.verdicts, rendered.files)
 
 
 def _text(rendered: "RigRun[RenderResult]") -> str:

@@ -1,16 +1,48 @@
 """``scissorcal report``"""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import writes_in
 from scissorcal.cli.options import Folder
-from scissorcal.cli.output import Answer, command
-from scissorcal.cli.signing import SigningKey, passphrase
+from scissorcal.cli.output import Answer, command, is_interactive
+from scissorcal.errors import InputError
+
+if TYPE_CHECKING:
+    from scissorcal.package.review import KeySignature
+
+SigningKey = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Private Ed25519 key of OpenSSH that signs too: others can check who did.",
+    ),
+]
+
+
+def signer_of(key: Path | None) -> "Callable[[str], KeySignature] | None":
+    """What signs with a private key, None without one; raises as `keys.signer`."""
+    if key is None:
+        return None
+    from scissorcal.package.keys import signer
+
+    return signer(key, passphrase)
+
+
+def passphrase() -> str:
+    """Ask for a key's passphrase; InputError where nobody is there to be asked."""
+    if not is_interactive():
+        raise InputError(
+            "The key has a passphrase, and nobody is there to be asked for it: sign in a terminal, "
+            "or use a key without one."
+        )
+    return str(typer.prompt("Passphrase of the key", hide_input=True, err=True))
+
 
 _COMMANDS = {
     "compare": ("scissorcal.cli.report:compare", "Put two runs side by side."),
@@ -85,16 +117,15 @@ def compare(
       comparison/comparison.html and comparison/comparison.json show it
     """
     from scissorcal.report import panels_text
-    from scissorcal.workday.runs.compare import compare_runs
+    from scissorcal.workday.runs.report import compare_runs
 
-    done = compare_runs(first, second, output)
-    found = done.comparison
+    found, files = compare_runs(first, second, output)
     shown = [panel for panel in found.panels if panel.id.endswith("-parameters")]
     for panel in found.panels:
         if panel.id == "verdicts-all":
             changed = tuple(row for row in panel.rows if row.marked)
             shown.append(replace(panel, rows=changed))
-    text = f"{found.sentence}\n\n{panels_text(shown)}\n\n{done.html} and {done.json} show it"
+    text = f"{found.sentence}\n\n{panels_text(shown)}\n\n{files.html} and {files.json} show it"
     result = {
         "first": found.first,
         "second": found.second,
@@ -103,10 +134,10 @@ def compare(
             {"id": panel.id, "title": panel.title, "sentence": panel.sentence, "rows": panel.rows}
             for panel in found.panels
         ],
-        "html": done.html,
-        "json": done.json,
+        "html": files.html,
+        "json": files.json,
     }
-    return Answer(result, text, files=[done.html, done.json])
+    return Answer(result, text, files=[files.html, files.json])
 
 
 @command

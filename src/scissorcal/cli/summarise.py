@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from scissorcal.cli.import_ import TABLE, TableOptions
+from scissorcal.cli.import_ import TABLE, TableOptions, survey_lines
 from scissorcal.cli.options import options_of
 from scissorcal.cli.output import Answer, command
-from scissorcal.cli.survey import survey_lines
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:

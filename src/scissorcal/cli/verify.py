@@ -1,6 +1,6 @@
 """``scissorcal verify``"""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -10,7 +10,7 @@ from scissorcal.cli.options import RIG, Axis, Folder, options_of
 from scissorcal.cli.output import Answer, command, note
 from scissorcal.cli.progress import progress
 from scissorcal.errors import InputError
-from scissorcal.workday.options import VerifySettings
+from scissorcal.workday.options import Processes, VerifySettings
 
 if TYPE_CHECKING:
     from scissorcal.calibration.verify.result import CheckKind
@@ -35,14 +35,6 @@ _SETTINGS = {
     "spread": typer.Option(min=1.0, help="Width of the local prior, in posterior widths."),
     "seed": RIG["seed"],
 }
-
-
-@dataclass(frozen=True)
-class Processes:
-    """Where work is done: in ``workers`` processes of this computer, or on a ``cluster``."""
-
-    workers: int | None = None
-    cluster: str | None = None
 
 
 CLUSTER = typer.Option(
@@ -96,8 +88,7 @@ def verify(
     from scissorcal.report.subjects.trust import check_panels
     from scissorcal.workday.runs.verify import verify_workspace
 
-    workers, cluster = processes.workers, processes.cluster
-    if workers is not None and cluster is not None:
+    if processes.workers is not None and processes.cluster is not None:
         raise InputError("Give --workers or --cluster, not both: a cluster brings its workers.")
     if axis == "advance" and what != "friction":
         raise InputError(
@@ -107,9 +98,7 @@ def verify(
     wanted: tuple[FitKind, ...] = () if kind == "all" else (kind,)
     settings = replace(settings, checks=_checks(checks))
     with writes_in(folder, "scissorcal verify") as workspace, progress() as tell:
-        outcomes = verify_workspace(
-            workspace, wanted, settings, workers=workers, cluster=cluster, progress=tell
-        )
+        outcomes = verify_workspace(workspace, wanted, settings, processes, tell)
     for sentence in [sentence for outcome in outcomes for sentence in outcome.notes]:
         note(sentence)
     checked = [outcome.result for outcome in outcomes]

@@ -21,6 +21,7 @@ from .motion import Motion as Motion
 from .motion import Samples as Samples
 from .parts import Part as Part
 from .paths import Reference as Reference
+from .port_motion import open_motion as open_motion
 from .probe.probe import ProbeRefusedError as ProbeRefusedError
 from .recorder import Recorder as Recorder
 from .recorder import unloaded_sentence as unloaded_sentence

@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 ARMED_s = 60.0
 """After which a start that was not confirmed is forgotten."""
@@ -34,8 +34,7 @@ LEFT_s = 2.0
 """For the last words of a command that has ended."""
 
 
-@dataclass(frozen=True)
-class RigCommand:
+class RigCommand(NamedTuple):
     """A command that a page may start: its name, the words after ``scissorcal``, and what a person
     is asked before anything moves."""
 

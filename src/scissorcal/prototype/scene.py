@@ -180,7 +180,7 @@ def _centre(package: ModelPackage) -> Rows:
     return _rows(both)
 
 
-def _sliders(package: ModelPackage, meanings: Mapping[str, str]) -> "list[Slider]":
+def _sliders(package: ModelPackage, meanings: Mapping[str, str]) -> list[Slider]:
     record = package.manifest.provenance
     cut, friction = central_values(package)
     sliders = []
@@ -247,7 +247,7 @@ def _rows(law: Variations, *, only_changed: bool = False) -> Rows:
     )
 
 
-def _bands(package: ModelPackage) -> "list[Band]":
+def _bands(package: ModelPackage) -> list[Band]:
     """Both directions at the middle (geometric) of the scene's rates, with and without friction."""
     manifest = package.manifest
     opening = np.linspace(*manifest.ranges.opening_rad, OPENINGS)
@@ -288,7 +288,7 @@ def _pose_part(plate: PoseRecord | None) -> PosePart | None:
     return PosePart(position_m=plate.translation_m, rotation_vector_rad=(x, y, z))
 
 
-def _strokes(fit: FitResult) -> "list[Stroke]":
+def _strokes(fit: FitResult) -> list[Stroke]:
     series, strokes = fit.series, []
     for number in np.unique(series.stroke)[:MOST_STROKES]:
         points = np.flatnonzero(

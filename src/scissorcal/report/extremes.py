@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scissorcal.report.html import panel_section, parts_nav, prose, whole_page
 from scissorcal.report.numbers import short
 from scissorcal.report.panel import Axis, Chart, Look, Panel, Row, Series, count, number, words
 from scissorcal.verdicts import Check
@@ -39,17 +38,6 @@ def extremes_panels(tried: Tried, long_run: Judgement) -> list[Panel]:
     said = f"{long_run.outcome.capitalize()}: {long_run.sentence}."
     run = Panel("long-run", PART, "A long run", said)
     return [totals_panel(answers, [long_run.outcome]), run, refusals_panel(answers), *maps]
-
-
-def extremes_page(panels: Sequence[Panel], facts: str) -> str:
-    """The offline page: what was tried of what, in a sentence, then the panels."""
-    head = (
-        '<main><section id="decision" class="plain"><p class="kicker">Numerical stability</p>'
-        f'<h1>The extremes</h1><p class="finding">{prose(panels[0].sentence)}</p>'
-        f"<p>{prose(facts)}</p></section>{parts_nav([(p.id, p.title) for p in panels])}"
-    )
-    body = "".join(panel_section(panel, open_=True) for panel in panels)
-    return whole_page("Numerical stability at the extremes", f"{head}{body}</main>")
 
 
 def totals_panel(answers: Answers, outcomes: Sequence[str] = ()) -> Panel:

@@ -19,7 +19,6 @@ from scissorcal.recipe.requirements import CaptureKind, Requirements, requiremen
 from scissorcal.recipe.schema import Recipe
 from scissorcal.workday.facts import UNFINISHED, rendering
 from scissorcal.workday.index import FileIndex
-from scissorcal.workday.photograph_state import photograph_indexes, photographs_state
 from scissorcal.workday.recordings import (
     RecordingRow,
     counts_of,
@@ -29,7 +28,16 @@ from scissorcal.workday.recordings import (
     refuse_mixed_joints,
     why_unused,
 )
-from scissorcal.workday.states import CHANGED, WAITING, State, StepState, counted
+from scissorcal.workday.states import (
+    CHANGED,
+    WAITING,
+    State,
+    StepState,
+    counted,
+    photograph_indexes,
+    photographs_state,
+    remedy,
+)
 from scissorcal.workday.steps import BY_NAME, EFFORTS, STEPS, Step
 from scissorcal.workday.workspace import Workspace
 
@@ -281,7 +289,7 @@ class Engine:
             return made("incomplete", f"{facts['label']}; ran out of time", longer, **kept)
         notes = self._little_used(step)
         if failed:
-            command = self._remedy(step, failed, facts.get("effort", ""))
+            command = remedy(step, failed, facts.get("effort", ""), self.state)
             found = f"{facts['label']}; failed: {', '.join(failed)}"
             return made("failed", found, command, notes=notes, **kept)
         if facts.get("lacks"):
@@ -295,15 +303,10 @@ class Engine:
         if check and check.state == "failed":
             found = f"{facts['label']}; its trust check failed: {', '.join(check.failed)}"
             kept["failed"] = tuple(f"{check.name} {one}" for one in check.failed)
-            return made("failed", found, self._remedy(step, kept["failed"], ""), **kept)
+            return made("failed", found, remedy(step, kept["failed"], "", self.state), **kept)
         if check and check.state != "done":
             return made("unverified", facts["label"], check.command, notes=notes, **kept)
         return made("done", facts["label"], "", notes=notes, **kept)
-
-    def _remedy(self, step: Step, failed: tuple[str, ...], effort: str) -> str:
-        from scissorcal.workday.remedies import remedy  # a day on which all went well needs none
-
-        return remedy(step, failed, effort, self.state)
 
     def _failed_below(self, step: Step) -> StepState | None:
         """A fit that this fit builds on and that failed, if only by its trust check."""

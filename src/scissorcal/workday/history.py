@@ -1,22 +1,32 @@
-"""Earlier versions of results: kept when a new one is written, listed, and restored."""
+"""Earlier versions of results: kept when a new one is written, listed, and restored.
+
+A result that its workspace could not take is kept in another folder, and put in place later.
+"""
 
 import contextlib
+import errno
+import os
 import re
 import shutil
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scissorcal.errors import InputError, MissingError
+from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
+from scissorcal.calibration.result import Result
+from scissorcal.calibration.store import load, load_fit, save
+from scissorcal.errors import InputError, MissingError, file_error
 from scissorcal.files import discard_folder, part_of, put_beside, rename_folder
 from scissorcal.identity import file_digest
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.steps import BY_NAME, Step, steps_of
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.result import Result
+    from collections.abc import Callable
 
 HASH = 8
 """Digits of the content's digest in a version's name."""
@@ -94,9 +104,6 @@ def scatter_on_record(engine: Engine, step: Step) -> dict[str, float]:
     Only fits by the present version of the step count: another judged recordings in another way.
     Empty where none of them had several recordings that could be compared.
     """
-    from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
-    from scissorcal.calibration.store import load_fit
-
     for version in versions(engine, step.what):
         with contextlib.suppress(InputError):  # a version that is damaged shows nothing
             known = load_fit(version.path).diagnostics
@@ -122,7 +129,7 @@ def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:
         )
     (version,) = found
     if not version.current:
-        before = take_place(engine, f"fit {version.what}", version.path)
+        before = _take_place(engine, f"fit {version.what}", version.path)
         discard_folder(version.path.parent)
         return version, before
     folder = _version_folder(engine, version.path)
@@ -135,7 +142,7 @@ def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:
     return version, None
 
 
-def take_place(engine: Engine, name: str, source: Path) -> Path | None:
+def _take_place(engine: Engine, name: str, source: Path) -> Path | None:
     """Put the result ``source``, with what stands beside it, in use; the one in use is kept.
 
     Gives the folder of the one that was in use. Killed, or without space, it leaves one of the two
@@ -148,7 +155,7 @@ def take_place(engine: Engine, name: str, source: Path) -> Path | None:
 
 
 def save_version(
-    engine: Engine, name: str, result: "Result", draw: Callable[[Path], object] | None = None
+    engine: Engine, name: str, result: Result, draw: Callable[[Path], object] | None = None
 ) -> Path:
     """Keep the result that is there, then write the new one. Gives its path.
 
@@ -156,8 +163,6 @@ def save_version(
     fails, or is killed, the earlier result stays in use. Pictures and trust checks are never those
     of another result; after a kill they may stand in the result's version alone.
     """
-    from scissorcal.calibration.store import save
-
     path = engine.file(name)
     drawn = part_of(path.with_suffix(""))
     try:
@@ -264,3 +269,92 @@ def _beside(path: Path) -> tuple[Path, ...]:
 
 def _checks_beside(path: Path) -> tuple[Path, ...]:
     return (path.with_suffix(".verify.json"), path.with_suffix(".verify.partial.jsonl"))
+
+
+def save_anywhere(
+    engine: Engine,
+    step: Step,
+    result: Result,
+    draw: Callable[[Path], object] | None,
+    folder: Path | None,
+) -> None:
+    """Write a result into the workspace; where that cannot be written, into another folder.
+
+    That is ``folder``, else the system's folder for temporary files, else the home folder. Raises
+    InputError where the workspace did not take it, which names where it is kept (also as ``kept``)
+    and the command that puts it in place.
+    """
+    try:
+        save_version(engine, step.name, result, draw)
+    except OSError as error:
+        refusal = file_error(error, engine.file(step.name))
+        if refusal is None:
+            raise
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        when = "once there is space" if full else "once the workspace can be written"
+        raise _kept_elsewhere(str(refusal), when, step, result, folder) from None
+
+
+def refuse_unwritable(engine: Engine, folder: Path | None) -> None:
+    """Raise InputError before a long fit where its workspace may only be read."""
+    root = engine.workspace.root
+    if folder is None and not os.access(root, os.W_OK):
+        raise InputError(
+            f"{root} may only be read, so a fit could not be kept there: choose a folder for it "
+            "with --save-to FOLDER, or change the permissions. Nothing was fitted."
+        )
+
+
+def put_in_place(engine: Engine, path: Path) -> tuple[Step, Path | None]:
+    """Put a result that was kept elsewhere into the workspace; the one in use is kept.
+
+    Gives its step and the folder of the one that was in use. Raises InputError where ``path`` is no
+    result of a fit.
+    """
+    step = _step_of(path)
+    module, _, name = step.holds.partition(":")
+    found = load(path, getattr(import_module(module), name))
+    if found.what != step.what:
+        raise InputError(
+            f"{path} holds a fit of {found.what}, and its name begins with {step.what}-: give it "
+            f"a name that begins with {found.what}-. Nothing was changed."
+        )
+    return step, _take_place(engine, step.name, path)
+
+
+def _kept_elsewhere(
+    refusal: str, when: str, step: Step, result: Result, folder: Path | None
+) -> InputError:
+    name = f"{step.what}-{result.inputs_hash[:HASH]}-{os.urandom(2).hex()}.nc"
+    for place in _places(folder):
+        path = place / name
+        try:
+            save(result, path)
+        except OSError:
+            continue
+        error = InputError(
+            f"{refusal} The fit is kept in {path}: {when}, put it in place with "
+            f"'scissorcal fit restore {path}'."
+        )
+        error.kept = (path,)
+        return error
+    return InputError(f"{refusal} The fit could not be kept in another folder either: it is lost.")
+
+
+def _places(folder: Path | None) -> Iterator[Path]:
+    if folder is not None:
+        yield folder.absolute()
+    with contextlib.suppress(OSError):  # it tries each folder, and finds none where all are full
+        yield Path(tempfile.gettempdir())
+    with contextlib.suppress(RuntimeError):  # a user without a home folder
+        yield Path.home()
+
+
+def _step_of(path: Path) -> Step:
+    named = [step for step in steps_of("fit") if path.name.startswith(f"{step.what}-")]
+    if not named:
+        names = ", ".join(f"{step.what}-..." for step in steps_of("fit"))
+        raise InputError(
+            f"{path} does not tell by its name which fit it holds: it begins with one of {names}."
+        )
+    return max(named, key=lambda step: len(step.what))

@@ -7,9 +7,8 @@ import os
 import stat
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, NamedTuple
 
 from scissorcal.errors import InputError
 from scissorcal.files import host_name, try_lock
@@ -62,7 +61,7 @@ def writing(
         # A full disk, or a lock that another user made: the lock itself is held all the same.
         with contextlib.suppress(OSError):
             file.truncate(0)
-            file.write(json.dumps(asdict(holder)).encode())
+            file.write(json.dumps(holder._asdict()).encode())
         try:
             yield
         finally:
@@ -91,8 +90,7 @@ def _open(path: Path) -> IO[bytes]:
     return os.fdopen(handle, mode, buffering=0)
 
 
-@dataclass(frozen=True)
-class _Holder:
+class _Holder(NamedTuple):
     command: str
     host: str
     pid: int

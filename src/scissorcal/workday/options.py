@@ -116,7 +116,7 @@ class FitOptions:
     ``effort`` is the recipe's where not given. ``force`` fits again where nothing changed.
     ``critic`` asks for the critic of friction, at draft effort too; a stored fit without it is made
     again. Where the workspace cannot be written, a fit is kept in ``save_to``
-    (`workday.elsewhere`).
+    (`workday.history`).
     """
 
     effort: Literal["draft", "standard", "thorough"] | None = None
@@ -151,6 +151,30 @@ class VerifySettings:
     prior: Literal["local", "recipe"] = "local"
     spread: float = 3.0
     seed: int = 0
+
+
+@dataclass(frozen=True)
+class Processes:
+    """Where work is done: in ``workers`` processes of this computer, or on a ``cluster``.
+
+    One for each core where nothing is given.
+    """
+
+    workers: int | None = None
+    cluster: str | None = None
+
+
+@dataclass(frozen=True)
+class TradeOptions:
+    """Which knobs are measured, all if none is named; seconds for the whole run, None for no limit.
+
+    ``force`` measures these knobs again; measurements of others are kept.
+    """
+
+    knobs: list[str] | None = None
+    budget_s: float | None = None
+    seed: int = 0
+    force: bool = False
 
 
 @dataclass(frozen=True)

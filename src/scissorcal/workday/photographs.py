@@ -105,8 +105,8 @@ class Seen:
     words: str
     detection: "Detection | None" = None
     position: tuple[float, float] | None = None
-    drawn: "Callable[[Path], object] | None" = None
-    board: "CharucoBoard | MarkerBoard | Chessboard | None" = None
+    drawn: Callable[[Path], object] | None = None
+    board: CharucoBoard | MarkerBoard | Chessboard | None = None
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def take_photographs(
         for path in paths:
             try:
                 photo = read_photo(path, colour=False)
-                refuse_known(photo, before, writer)
+                _refuse_known(photo, before, writer)
                 sighting = look(path, photo)
             except InputError as error:
                 refused.append(str(error))
@@ -276,9 +276,9 @@ def detection_of(capture: PhotoCapture, photograph: Photograph) -> "Detection":
     )
 
 
-def refuse_known(photo: "Photo", before: Sequence[PhotoCapture], writer: PhotoWriter) -> None:
+def _refuse_known(photo: "Photo", before: Sequence[PhotoCapture], writer: PhotoWriter) -> None:
     """Raise InputError where a photograph was taken in before, or is given twice."""
-    known = already_there(before, photo.sha256)
+    known = _already_there(before, photo.sha256)
     if known is not None:
         raise InputError(
             f"{photo.source} was taken in before, as {known.parent.name}/{known.name}."
@@ -287,7 +287,7 @@ def refuse_known(photo: "Photo", before: Sequence[PhotoCapture], writer: PhotoWr
         raise InputError(f"{photo.source} is given twice.")
 
 
-def already_there(captures: Sequence[PhotoCapture], sha256: str) -> Path | None:
+def _already_there(captures: Sequence[PhotoCapture], sha256: str) -> Path | None:
     """Find a photograph of these bytes among captures."""
     for capture in captures:
         for photograph in capture.index.photographs:

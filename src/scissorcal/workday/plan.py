@@ -103,7 +103,7 @@ def _costs(engine: Engine) -> tuple[CaptureCost, ...]:
 def _choice(engine: Engine) -> "SceneChoice | None":
     if not engine.workspace.scene_choice_path.is_file():
         return None
-    from scissorcal.workday.scene_choice import known_scene_choice
+    from scissorcal.workday.runs.simplest import known_scene_choice
 
     return known_scene_choice(engine)
 

@@ -1,9 +1,14 @@
-"""Where the fits of a trust check run: here, in processes of this machine, or on a cluster."""
+"""Where fits and measurements run: here, in processes of this machine, or on a cluster.
+
+A cluster's worker answers with JSON text: values and errors, never pickles of ours.
+"""
 
 import gc
+import json
 import logging
 import multiprocessing
 import os
+import pickle
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
@@ -18,11 +23,14 @@ from concurrent.futures import (
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
 
+from scissorcal import errors
 from scissorcal.errors import DeviceError, InputError, ScissorcalError, needs_extra
-from scissorcal.workday.answers import answering, read_answer
+from scissorcal.foreign import parse_json
+from scissorcal.workday.options import Processes
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -38,7 +46,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 class Pool:
     """An executor, how many jobs it does at a time, and how many it is handed at once.
 
-    Where it is ``remote``, jobs answer in JSON text (`workday.answers`).
+    Where it is ``remote``, jobs answer in JSON text (`workday.pool`).
     """
 
     executor: Executor
@@ -56,8 +64,8 @@ class Pool:
         """Do ``job`` for every item and call ``finished`` here with each result, as they come.
 
         ``kind`` is the type of a result, to which a cluster's answers are held.
-        Raises what a job raised, ScissorcalError where a worker died, and DeviceError where the
-        cluster did.
+        Raises what a job raised, InputError where a worker lacks a module, ScissorcalError where a
+        worker died, and DeviceError where the cluster did.
         """
         todo = iter(items)
         running: set[Future[Any]] = set()
@@ -77,6 +85,11 @@ class Pool:
                     with self._connected():
                         found = future.result()
                     finished(read_answer(found, kind) if self.remote else found)
+        except ModuleNotFoundError as error:
+            raise InputError(
+                f"The cluster's workers lack {error.name}: install this version of scissorcal "
+                "where they run."
+            ) from error
         except BrokenProcessPool as error:
             raise ScissorcalError(
                 "A worker process was killed, most likely for want of memory. What was done is "
@@ -120,19 +133,25 @@ def _why_cluster_failed(error: Exception) -> str:
     return ""
 
 
+@lru_cache(maxsize=2)
+def unpacked(blob: bytes) -> Any:
+    """What many jobs share, as `pickle` packed it: a worker unpacks it once."""
+    return pickle.loads(blob)
+
+
 @contextmanager
-def open_pool(workers: int | None = None, cluster: str | None = None) -> Iterator[Pool]:
+def open_pool(processes: Processes) -> Iterator[Pool]:
     """Open processes of this machine, or the dask.distributed cluster at an address.
 
-    ``workers`` is the number of processes, all cores if not given; one worker is this process
+    One worker is this process
     itself. Processes are started afresh, with one thread of linear algebra each, and end when this
     one does, whatever ends it. Raises InputError where the cluster cannot be reached.
     """
-    if cluster is not None:
-        with _cluster(cluster) as pool:
+    if processes.cluster is not None:
+        with _cluster(processes.cluster) as pool:
             yield pool
         return
-    count = workers or usable_cores()
+    count = processes.workers or usable_cores()
     if count == 1:
         with _left_alone():
             yield Pool(_Here(), 1, ahead=1)
@@ -255,3 +274,65 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)
+
+
+REMEDY = "Check that its workers have this version of scissorcal, and who may reach it."
+
+_ERRORS = {
+    kind.__name__: kind
+    for kind in (
+        ScissorcalError,
+        errors.InputError,
+        errors.VerdictError,
+        errors.DeviceError,
+        errors.MissingError,
+    )
+}
+
+
+def answering(job: Callable[[T], Any]) -> Callable[[T], str]:
+    """``job`` such that it answers with JSON text, whether it ends or raises."""
+    return partial(_answer, job)
+
+
+def read_answer(answer: object, kind: Any) -> Any:
+    """The value of type ``kind`` in an answer; its type is checked as that of a foreign file.
+
+    Raises the error that the answer tells of, ModuleNotFoundError where a worker lacks a module,
+    and ScissorcalError where it is no answer.
+
+    >>> read_answer(answering(abs)(-2), int)
+    2
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    if not isinstance(answer, str):
+        raise ScissorcalError(f"The cluster sent no answer but {type(answer).__name__}. {REMEDY}")
+    message = parse_json(answer, "The cluster's answer", REMEDY)
+    if isinstance(message, dict) and "error" in message:
+        raise _error(str(message["error"]), str(message.get("sentence", "")))
+    try:
+        return TypeAdapter(kind).validate_python(message["value"])
+    except (ValidationError, KeyError, TypeError) as error:
+        raise ScissorcalError(
+            f"The cluster's answer is not of the kind that was asked for. {REMEDY}"
+        ) from error
+
+
+def _answer(job: Callable[[T], Any], item: T) -> str:
+    from pydantic_core import to_jsonable_python
+
+    try:
+        return json.dumps({"value": to_jsonable_python(job(item))})
+    except ModuleNotFoundError as error:
+        return json.dumps({"error": "ModuleNotFoundError", "sentence": error.name or str(error)})
+    except Exception as error:  # noqa: BLE001 - told to who asked, as text
+        return json.dumps({"error": type(error).__name__, "sentence": str(error)})
+
+
+def _error(name: str, sentence: str) -> Exception:
+    if name == "ModuleNotFoundError":
+        return ModuleNotFoundError(f"No module named {sentence!r}", name=sentence)
+    if name in _ERRORS:
+        return _ERRORS[name](sentence)
+    return ScissorcalError(f"A worker of the cluster failed: {name}: {sentence}")

@@ -51,7 +51,7 @@ def list_recordings(
     recipe at its capture names another rig, material or scene (`capture_facts`), and where one
     before it has the same content. An import carries no recipe and counts as of this one.
     """
-    excluded = exclusions(workspace)
+    excluded = _exclusions(workspace)
     first: dict[str, str] = {}
     rows = []
     for path in workspace.recordings(kind):
@@ -99,7 +99,7 @@ def used_recordings(
     rows = list_recordings(workspace, recipe, kind, index or FileIndex(workspace.root))
     for row in rows:
         if row.use == "unreadable":
-            raise InputError(f"{row.why} {exclude_hint(row.path)}")
+            raise InputError(f"{row.why} {_exclude_hint(row.path)}")
     used = [row.path for row in rows if row.use == "used"]
     found = tuple(
         replace(
@@ -118,7 +118,7 @@ def refuse_mixed_joints(rows: tuple[RecordingRow, ...]) -> None:
     if len(joints) > 1:
         raise InputError(
             f"One fit cannot use recordings of a rotary joint ({joints['rotary'].name}) and of a "
-            f"linear joint ({joints['linear'].name}). {exclude_hint(joints['linear'])}"
+            f"linear joint ({joints['linear'].name}). {_exclude_hint(joints['linear'])}"
         )
 
 
@@ -178,7 +178,7 @@ def exclude_recording(workspace: Workspace, name: str, why: str) -> Path:
     path = _named(workspace, name)
     if not why.strip():
         raise InputError("State the reason with --why: it is shown wherever the data are listed.")
-    noted = dict(exclusions(workspace))
+    noted = dict(_exclusions(workspace))
     noted[path.name] = {
         "why": why.strip(),
         "time_utc": datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
@@ -189,7 +189,7 @@ def exclude_recording(workspace: Workspace, name: str, why: str) -> Path:
 
 def include_recording(workspace: Workspace, name: str) -> Path:
     """Let fits use a recording again. Raises MissingError where it was not excluded."""
-    noted = dict(exclusions(workspace))
+    noted = dict(_exclusions(workspace))
     key = Path(name).name
     if key not in noted:
         listed = ", ".join(noted) or "none"
@@ -199,7 +199,7 @@ def include_recording(workspace: Workspace, name: str) -> Path:
     return workspace.captures_dir / key
 
 
-def exclusions(workspace: Workspace) -> Mapping[str, Mapping[str, str]]:
+def _exclusions(workspace: Workspace) -> Mapping[str, Mapping[str, str]]:
     """Reason and time of each excluded recording, by file name. InputError where damaged."""
     path = workspace.exclusions_path
     if not path.is_file():
@@ -214,7 +214,7 @@ def exclusions(workspace: Workspace) -> Mapping[str, Mapping[str, str]]:
         ) from None
 
 
-def exclude_hint(path: Path) -> str:
+def _exclude_hint(path: Path) -> str:
     """The command that goes on without a recording."""
     return f"Exclude one with 'scissorcal recording exclude {path.name} --why REASON'."
 
@@ -222,7 +222,7 @@ def exclude_hint(path: Path) -> str:
 def why_unused(workspace: Workspace, row: RecordingRow) -> str:
     """Say why fits do not use a recording."""
     if row.use == "unreadable":
-        return f"{row.why} {exclude_hint(row.path)}"
+        return f"{row.why} {_exclude_hint(row.path)}"
     reason = "recorded otherwise" if row.use == "other recipe" else row.use
     return f"{workspace.relative(row.path)} is not used ({reason}): {row.why}."
 

@@ -46,7 +46,7 @@ def changed_since(day: DayStates, review: "Review") -> tuple[str, ...]:
     return tuple(found)
 
 
-def _rests_on(day: DayStates) -> "list[Path]":
+def _rests_on(day: DayStates) -> list[Path]:
     root, files = day.workspace.root, []
     for step in STEPS:
         if step.kind not in COVERED or not day.shown(step.name):
@@ -57,7 +57,7 @@ def _rests_on(day: DayStates) -> "list[Path]":
     return [path for path in dict.fromkeys(files) if path.is_file()]
 
 
-def _photographs(day: DayStates, name: str) -> "list[Path]":
+def _photographs(day: DayStates, name: str) -> list[Path]:
     """The index files and photographs of a step's folders."""
     from scissorcal.workday.facts import photographs
 

@@ -38,7 +38,7 @@ def open_session(
     )
     with opened as link:
         if world:
-            set_line(link, line)
+            _set_line(link, line)
         yield RigSession(link, recipe, operator or Operator(), recipe_toml=recipe_toml)
 
 
@@ -75,7 +75,7 @@ def open_rig(
     from scissorcal.device.lockstep import LockstepLink
 
     with LockstepLink(_named(specimen), np.random.default_rng((seed, run))) as link:
-        set_line(link, line)
+        _set_line(link, line)
         yield link
 
 
@@ -91,13 +91,13 @@ def open_port(
 
     if device != SIM:
         with open_link(device, line.baud if line else DEFAULT_BAUD) as link:
-            set_line(link, line)
+            _set_line(link, line)
             yield link
         return
     from scissorcal.device.sim.process import SimProcess
 
     with SimProcess(_named(specimen), seed) as sim, open_link(sim.port) as link:
-        set_line(link, line)
+        _set_line(link, line)
         yield link
 
 
@@ -110,7 +110,7 @@ def _named(specimen: str | None) -> str:
     return specimen
 
 
-def set_line(link: "Link", line: "Line | None") -> None:
+def _set_line(link: "Link", line: "Line | None") -> None:
     """Tell the device how long it waits for commands until it brakes; nothing without a line."""
     from scissorcal.kernel import ConfigKey
 

@@ -1,9 +1,17 @@
-"""The states that a step of the day may be in."""
+"""The states of a step of the day, that of photographs among them, and what clears a failed one."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from scissorcal.errors import InputError
+from scissorcal.identity import digest
+from scissorcal.workday.facts import photographs, refuse_changed
+from scissorcal.workday.steps import BY_EFFORT, BY_NAME, Step
+from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -79,3 +87,72 @@ def counted(number: int, thing: str) -> str:
     ('1 photograph', '2 photographs')
     """
     return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def remedy(
+    step: Step, failed: Sequence[str], effort: str, state: Callable[[str], StepState]
+) -> str:
+    """The command that may clear the failed checks of a step's result.
+
+    A check of what the fit builds on leads to that step; one of the search to a longer search,
+    unless it was the longest; every other to new data.
+    """
+    if step.kind == "sign":
+        return "scissorcal report --anew"  # after what was rejected is corrected
+    if step.kind != "fit":
+        return step.command
+    if "foundations" in failed:
+        for item in step.inputs:
+            below = state(item.rstrip("?"))
+            if below.state in ("failed", "incomplete", "stale"):
+                return below.command
+    if set(failed) <= BY_EFFORT and effort != "thorough":
+        return f"{step.command} --effort thorough"
+    return BY_NAME[step.inputs[0]].command
+
+
+def photographs_state(day: DayStates, step: Step, why: str) -> StepState:
+    """The state of a step whose inputs are photographs."""
+    paths = photograph_indexes(day.workspace, step)
+    try:
+        read = [day.index.facts(path, "photographs", photographs) for path in paths]
+        for path, facts in zip(paths, read, strict=True):
+            refuse_changed(path.parent, facts["sha256"], day.index.digest)
+    except InputError as error:
+        return StepState(step.name, "failed", str(error), why, step.command)
+    first = [path for path in paths if path.parent.name.startswith(f"{step.photographs[0]}-")]
+    if not first:
+        return _without_photographs(day, step, why)
+    count = sum(int(facts["photographs"]) for facts in read)
+    return StepState(
+        step.name,
+        "done",
+        counted(count, "photograph"),
+        why,
+        files=tuple(day.workspace.relative(path.parent) for path in paths),
+        content=digest([facts["content"] for facts in read]),
+    )
+
+
+def photograph_indexes(workspace: Workspace, step: Step) -> list[Path]:
+    """Index files of the folders of photographs that count for a step."""
+    paths: list[Path] = []
+    for kind in step.photographs:
+        own = workspace.photograph_indexes(kind)
+        paths += own[-1:] if step.newest_only else own
+    return paths
+
+
+def _without_photographs(day: DayStates, step: Step, why: str) -> StepState:
+    """A camera may come from a file, which then takes the place of photographs."""
+    fit = f"fit {step.what}"
+    path = day.file(fit)
+    if step.what == "camera" and path.is_file():
+        try:
+            imported = day.facts(fit)["imported"]
+        except InputError:
+            imported = False
+        if imported:
+            files = (day.workspace.relative(path),)
+            return StepState(step.name, "done", "imported from a file", why, files=files)
+    return StepState(step.name, "missing", "no photographs yet", why, step.command)

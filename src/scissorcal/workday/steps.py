@@ -34,9 +34,9 @@ class Step:
     it has a result and is not waited for. ``settings`` are the parts of the recipe that the result
     depends on; ``version`` is raised whenever the same inputs would give another result.
     ``by_effort`` says that the result depends on the effort. ``file`` is where the result lies,
-    ``read`` gives its facts, ``holds`` names the type in it ("module:type"), ``run`` the module of
-    a fit (`workday.runs.fit.FitModule`).
-    ``verified_by`` names the step that checks it. ``optional`` steps are never what comes next.
+    ``read`` gives its facts, ``holds`` names the type in it ("module:type"), ``run`` the function
+    that fits ("module:function"). ``verified_by`` names the step that checks it. ``optional``
+    steps are never what comes next.
     Steps ``on_request`` may be done where the scene does not need them, and are then shown.
     ``photographs`` are the folders that a capture of photographs fills, the first one required;
     with ``newest_only`` earlier folders do not count.
@@ -207,7 +207,7 @@ STEPS: tuple[Step, ...] = (
         file=_in_fits("camera.nc"),
         read=facts.fit,
         holds="scissorcal.calibration.camera.result:CameraFit",
-        run="scissorcal.workday.runs.camera",
+        run="scissorcal.workday.runs.camera:fit",
     ),
     Step(
         "fit blade",
@@ -221,7 +221,7 @@ STEPS: tuple[Step, ...] = (
         file=_in_fits("blade.nc"),
         read=facts.fit,
         holds="scissorcal.calibration.edge.result:BladeResult",
-        run="scissorcal.workday.runs.blade",
+        run="scissorcal.workday.runs.blade:fit",
     ),
     Step(
         "fit plate",
@@ -234,7 +234,7 @@ STEPS: tuple[Step, ...] = (
         file=_in_fits("plate.nc"),
         read=facts.fit,
         holds="scissorcal.calibration.plate.result:PlateFit",
-        run="scissorcal.workday.runs.plate",
+        run="scissorcal.workday.runs.plate:fit",
     ),
     Step(
         "fit friction",
@@ -248,7 +248,7 @@ STEPS: tuple[Step, ...] = (
         file=_in_fits("friction.nc"),
         read=facts.fit,
         holds="scissorcal.calibration.result:FitResult",
-        run="scissorcal.workday.runs.friction",
+        run="scissorcal.workday.runs.friction:fit",
         verified_by="verify friction",
     ),
     Step(
@@ -263,7 +263,7 @@ STEPS: tuple[Step, ...] = (
         file=_in_fits("friction-advance.nc"),
         read=facts.fit,
         holds="scissorcal.calibration.result:FitResult",
-        run="scissorcal.workday.runs.friction_advance",
+        run="scissorcal.workday.runs.friction:fit_advance",
         verified_by="verify friction-advance",
         on_request=True,
     ),
@@ -279,7 +279,7 @@ STEPS: tuple[Step, ...] = (
         file=_in_fits("cut.nc"),
         read=facts.fit,
         holds="scissorcal.calibration.result:FitResult",
-        run="scissorcal.workday.runs.cut",
+        run="scissorcal.workday.runs.cut:fit",
         verified_by="verify cut",
     ),
     _trust_check("friction"),

@@ -4,6 +4,7 @@ Here the room of devices, which knows no fits, meets the room of fits, which kno
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +47,7 @@ MOVED_SDS = 1.0
 deviations."""
 
 
-@dataclass(frozen=True)
-class Limits:
+class Limits(NamedTuple):
     """At least so many strokes (pairs of sweeps), at most so many planned minutes.
 
     The first part runs in any case. Empty sweeps are at ``slowest_sweep`` (rad/s) and faster

@@ -12,10 +12,10 @@ from scissorcal.bench.extremes.compare import (
     compare_kernel,
     compare_model,
     compare_package,
+    strokes,
     table_friction,
 )
 from scissorcal.bench.extremes.exact_laws import NotComparedError
-from scissorcal.bench.extremes.long_runs import strokes
 from scissorcal.bench.extremes.states import QUANTITIES, State, blade_of_law, package_states
 from scissorcal.kernel import Kernel
 from scissorcal.model import Edge, Response

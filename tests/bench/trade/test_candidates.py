@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scissorcal.bench.trade.assemble import curve_of
-from scissorcal.bench.trade.candidate_fit import as_fitted
+from scissorcal.bench.trade.candidate_fit import as_fitted, needed_minutes
 from scissorcal.bench.trade.fits import PROCESSOR
 from scissorcal.bench.trade.knob import make_knob
 from scissorcal.bench.trade.knobs.candidates import (
@@ -15,15 +15,21 @@ from scissorcal.bench.trade.knobs.candidates import (
     RIPPLE_WORST,
     Closure,
     Damping,
+    Edge,
     Fracture,
     Friction,
     Response,
     candidate_sample,
+    projected,
 )
-from scissorcal.bench.trade.knobs.edge import Edge, projected
-from scissorcal.bench.trade.models import central_law, fitted_model, held_law, model_of_law
-from scissorcal.bench.trade.needed_minutes import needed_minutes
-from scissorcal.bench.trade.package_cost import BYTES, STEP
+from scissorcal.bench.trade.models import (
+    BYTES,
+    STEP,
+    central_law,
+    fitted_model,
+    held_law,
+    model_of_law,
+)
 from scissorcal.bench.trade.recommend import choices_of
 from scissorcal.bench.trade.torque import AVERAGE, WORST
 from scissorcal.package import fitted_candidate

@@ -17,7 +17,7 @@ from scissorcal.bench.trade.knobs.photographs import (
     Photographs,
     Plate,
 )
-from scissorcal.bench.trade.pictures import Resolution, factors_of, fit_edge, locate_plate
+from scissorcal.bench.trade.pictures import factors_of, fit_edge, locate_plate
 from scissorcal.bench.trade.point import Sample
 from scissorcal.bench.trade.torque import WORST
 from scissorcal.errors import InputError, MissingError
@@ -73,9 +73,9 @@ def test_a_photograph_that_shows_nothing_is_a_named_failure(photographed):
     with pytest.raises(InputError, match=r"\d.png"):
         Plate().measure(photographed, Plate().settings(photographed)[0], 0)
     with pytest.raises(InputError, match="cannot be read more coarsely"):
-        fit_edge(photographed, Resolution(1, 7), np.random.default_rng(0))
+        fit_edge(photographed, (1, 7), np.random.default_rng(0))
     with pytest.raises(MissingError, match="no photograph of the plate"):
-        locate_plate(replace(photographed, plate=None), Resolution(1), np.random.default_rng(0))
+        locate_plate(replace(photographed, plate=None), (1, 1), np.random.default_rng(0))
 
 
 def test_errors_of_an_edge_are_those_along_the_blade(photographed):

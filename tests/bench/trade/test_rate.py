@@ -10,12 +10,24 @@ import pytest
 from scissorcal.bench.trade import frame_time
 from scissorcal.bench.trade.assemble import curve_of
 from scissorcal.bench.trade.frame_time import frame_time_s
-from scissorcal.bench.trade.knobs.rate import ALONE, IN_HAND, NO_PORT, NO_RIG, Rate
-from scissorcal.bench.trade.models import compiled
+from scissorcal.bench.trade.knobs.rate import (
+    ALONE,
+    IN_HAND,
+    NO_PORT,
+    NO_RIG,
+    Rate,
+    known_rig,
+    margin,
+)
+from scissorcal.bench.trade.models import kernel_model
 from scissorcal.bench.trade.recommend import choices_of
-from scissorcal.bench.trade.rendered import continuous_torques, rendered_error
-from scissorcal.bench.trade.stability import known_rig, margin
-from scissorcal.bench.trade.strokes import PEAK_OVER_MEAN, Stroke, hand_strokes
+from scissorcal.bench.trade.rendered import (
+    PEAK_OVER_MEAN,
+    Stroke,
+    continuous_torques,
+    hand_strokes,
+    rendered_error,
+)
 from scissorcal.bench.trade.torque import AVERAGE, WORST
 from scissorcal.errors import ScissorcalError, needs_unix
 from scissorcal.kernel import estimated_rates
@@ -48,7 +60,7 @@ def test_a_system_without_the_loop_gives_its_reason(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(frame_time, "run_loop", refused)
     one = case()
     with pytest.raises(ScissorcalError, match="this system lacks"):
-        frame_time_s(compiled(one).tables, hand_strokes(one.recipe)[0], 1000.0, one.recipe.limits)
+        frame_time_s(kernel_model(one), hand_strokes(one.recipe)[0], 1000.0, one.recipe.limits)
 
 
 def test_estimated_rates_are_the_servos_low_pass_of_differences():
@@ -64,22 +76,20 @@ def test_estimated_rates_are_the_servos_low_pass_of_differences():
 def test_holding_errs_by_half_a_tick_of_the_torques_slope():
     """A smooth torque without friction: held over T it is off by T/2 |d(tau)/dt| on average."""
     one = pressing()
-    tables, limit = compiled(one).tables, one.recipe.limits.torque_Nm
+    tables, limit = kernel_model(one), one.recipe.limits.torque_Nm
     strokes = [replace(hand_strokes(one.recipe)[0], half_s=0.4)]
     continuous = continuous_torques(tables, strokes, limit)
     slope = np.abs(np.gradient(continuous[0].astype(float), 1.0 / 64_000.0)).mean()
     for rate_Hz in (125.0, 1000.0, 8000.0):
-        found = rendered_error(
-            tables, strokes, rate_Hz, continuous, limit=limit, cutoff_Hz=100.0, phase=0.0
-        )
-        assert found.moments == pytest.approx(0.5 / rate_Hz * slope, rel=0.05)
-        assert found.average <= found.moments * 1.01
-        assert found.largest == np.abs(continuous[0]).max()
+        found = rendered_error(tables, strokes, rate_Hz, limit)
+        assert found["moments"] == pytest.approx(0.5 / rate_Hz * slope, rel=0.05)
+        assert found["average"] <= found["moments"] * 1.01
+        assert found["largest"] == np.abs(continuous[0]).max()
 
 
 def test_the_loops_own_time_is_measured_and_an_early_end_is_an_error():
     one = case(kappa=0.75)
-    tables, limits = compiled(one).tables, one.recipe.limits
+    tables, limits = kernel_model(one), one.recipe.limits
     stroke = hand_strokes(one.recipe)[1]
     assert frame_time_s(tables, stroke, 1000.0, limits, frames=50) > 0.0
     nowhere = replace(stroke, wide=math.nan)
@@ -91,11 +101,12 @@ def test_needed_over_allowed_stiffness_is_proportional_to_the_tick():
     one = case(kappa=0.75)
     rig = known_rig(one)
     assert rig is not None
-    assert rig.encoder_step_rad == pytest.approx(4.8e-5)
-    tables = compiled(one).tables
-    slow, fast = (margin(one, tables, rig, rate) for rate in (500.0, 1000.0))
-    assert slow.in_hand == pytest.approx(2.0 * fast.in_hand)
-    assert slow.alone > slow.in_hand
+    facts, step_rad = rig
+    assert step_rad == pytest.approx(4.8e-5)
+    tables = kernel_model(one)
+    slow, fast = (margin(one, tables, facts, rate) for rate in (500.0, 1000.0))
+    assert slow["in_hand"] == pytest.approx(2.0 * fast["in_hand"])
+    assert slow["alone"] > slow["in_hand"]
     assert known_rig(replace(one, friction_fit=None)) is None
 
 

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.bench.trade import package_cost
+from scissorcal.bench.trade import models
 from scissorcal.bench.trade.knobs.tables import INSTRUCTIONS, TOLERANCES, Tables, _beyond
-from scissorcal.bench.trade.models import central, tables_of
-from scissorcal.bench.trade.package_cost import BYTES, STEP
+from scissorcal.bench.trade.models import BYTES, STEP, central, tables_of
 from scissorcal.bench.trade.point import Setting
 from scissorcal.bench.trade.torque import AVERAGE, WORST
 from scissorcal.errors import MissingError, ScissorcalError
@@ -96,7 +95,7 @@ def test_finer_tables_take_more_bytes_and_err_less():
 
 
 def test_a_measurement_has_costs_and_errors_and_says_what_was_not_measured(monkeypatch):
-    monkeypatch.setattr(package_cost, "cost_and_error", _without_counting)
+    monkeypatch.setattr(models, "cost_and_error", _without_counting)
     one, knob = case(kappa=0.75), pickle.loads(pickle.dumps(Tables()))
     sample = knob.measure(one, chosen(1e-3), 0)
     assert {BYTES, STEP, "knots"} <= set(sample.costs)
@@ -127,14 +126,14 @@ def test_what_cannot_be_measured_is_a_named_failure(monkeypatch):
     def fails(*_: object, **__: object) -> None:
         raise RuntimeError("cc failed with 1")
 
-    monkeypatch.setattr(package_cost, "cost_and_error", fails)
+    monkeypatch.setattr(models, "cost_and_error", fails)
     one = case()
     with pytest.raises(ScissorcalError, match="cc failed with 1"):
         Tables().measure(one, chosen(1e-2), 0)
     model = central(one)
     made = compile_model(model, one.recipe)
     with pytest.raises(ScissorcalError, match="could not be measured: cc failed with 1"):
-        package_cost.package_costs(one, model, made, np.random.default_rng(0))
+        models.package_costs(one, model, made, np.random.default_rng(0))
 
 
 def test_nothing_rendered_has_no_tables():

@@ -6,7 +6,7 @@ import pytest
 from scissorcal.bench.trade import together
 from scissorcal.bench.trade.fits import PROCESSOR, fits_outcome
 from scissorcal.bench.trade.knob import KNOBS, make_knob
-from scissorcal.bench.trade.package_cost import BYTES
+from scissorcal.bench.trade.models import BYTES
 from scissorcal.bench.trade.point import Quantity, Sample, Setting
 from scissorcal.bench.trade.together import PRESENT, RECOMMENDED, Together
 from scissorcal.bench.trade.torque import BAND_WORST, WORST

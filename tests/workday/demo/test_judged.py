@@ -8,7 +8,7 @@ import pytest
 from scissorcal.cli import demo
 from scissorcal.report import panel_text
 from scissorcal.workday.demo.day import DemoResult
-from scissorcal.workday.demo.judged import Judged
+from scissorcal.workday.demo.photographs import Judged
 
 WITHIN = Judged("coulomb_pos", "N m", 0.01331, 0.01334, 0.01327, 0.01341)
 BESIDE = Judged("plate x", "mm", 12.0, 10.0, 9.0, 11.0)

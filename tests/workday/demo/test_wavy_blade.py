@@ -7,13 +7,14 @@ import pytest
 from scissorcal.device.sim import specimen as specimens
 from scissorcal.errors import InputError
 from scissorcal.recipe import builtin_recipe
-from scissorcal.workday.demo.sim_photographs import specimen_blade
+from scissorcal.workday.demo import photographs
+from scissorcal.workday.demo.photographs import specimen_blade
 from tests.device.sim.build import specimen
 
 
 def test_a_wave_is_not_photographed_as_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     wavy = specimen(blade={"wave_mm": [(0, 0), (40, 0.5), (75, 0)]})
-    monkeypatch.setattr(specimens, "load_specimen", lambda name: wavy)
+    monkeypatch.setattr(photographs, "load_specimen", lambda name: wavy)
     with pytest.raises(InputError, match=r"has a wave \(blade\.wave_mm\)"):
         specimen_blade(builtin_recipe("paper-80gsm"))
 

@@ -8,7 +8,7 @@ from benchmarks.scissors import photographed
 from scissorcal.calibration import BladeResult, load
 from scissorcal.errors import InputError, MissingError
 from scissorcal.vision import render_blade_photographs
-from scissorcal.workday.demo.sim_photographs import specimen_blade
+from scissorcal.workday.demo.photographs import specimen_blade
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.photographs import BladeSetup, photo_captures

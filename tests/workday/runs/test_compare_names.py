@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from scissorcal.workday.runs.compare import shown_path
+from scissorcal.workday.runs.report import shown_path
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign import RECORDS
 from scissorcal.recipe import schemas_dir
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.options import VerifySettings
+from scissorcal.workday.options import Processes, VerifySettings
 from scissorcal.workday.plan import make_plan
 from scissorcal.workday.pool import open_pool
 from scissorcal.workday.records import RecordFile
@@ -44,7 +44,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 
 @pytest.fixture(scope="module")
 def whole(fitted: Workspace) -> VerifyResult:
-    (outcome,) = verify_workspace(fitted, ("friction",), FEW, workers=1)
+    (outcome,) = verify_workspace(fitted, ("friction",), FEW, processes=Processes(1))
     assert outcome.fitted == 7
     return outcome.result
 
@@ -115,7 +115,7 @@ def test_a_report_is_stale_once_its_check_is_another_or_gone(
 
 @pytest.mark.slow
 def test_two_workers_give_the_same_numbers(cleared: Workspace, whole: VerifyResult) -> None:
-    (outcome,) = verify_workspace(cleared, ("friction",), FEW, workers=2)
+    (outcome,) = verify_workspace(cleared, ("friction",), FEW, processes=Processes(2))
     assert without_times(outcome.result) == without_times(whole)
     records = cleared.verify_partial_path("friction").read_text(encoding="utf-8").splitlines()
     assert len(records) == 1 + 7
@@ -132,15 +132,15 @@ def test_a_stopped_run_goes_on_and_a_larger_one_takes_what_is_there(
             raise StoppedError
 
     with pytest.raises(StoppedError):
-        verify_workspace(cleared, ("friction",), FEW, workers=1, progress=stop)
+        verify_workspace(cleared, ("friction",), FEW, processes=Processes(1), progress=stop)
     partial = cleared.verify_partial_path("friction")
     with partial.open("ab") as stream:
         stream.write(b'{"kind": "simulated", "index": 3, "ra')
-    (outcome,) = verify_workspace(cleared, ("friction",), FEW, workers=1)
+    (outcome,) = verify_workspace(cleared, ("friction",), FEW, processes=Processes(1))
     assert outcome.fitted == 3
     assert without_times(outcome.result) == without_times(whole)
     more = replace(FEW, fits=5)
-    (outcome,) = verify_workspace(cleared, ("friction",), more, workers=1)
+    (outcome,) = verify_workspace(cleared, ("friction",), more, processes=Processes(1))
     assert outcome.fitted == 1
     assert outcome.result.calibration is not None
     assert whole.calibration is not None
@@ -156,8 +156,10 @@ def test_a_stopped_run_goes_on_and_a_larger_one_takes_what_is_there(
 
 def test_records_of_another_seed_are_put_aside_with_a_word(cleared: Workspace) -> None:
     one = VerifySettings(fits=1, checks=("sbc",))
-    verify_workspace(cleared, ("friction",), one, workers=1)
-    (outcome,) = verify_workspace(cleared, ("friction",), replace(one, seed=1), workers=1)
+    verify_workspace(cleared, ("friction",), one, processes=Processes(1))
+    (outcome,) = verify_workspace(
+        cleared, ("friction",), replace(one, seed=1), processes=Processes(1)
+    )
     assert outcome.fitted == 1
     (sentence,) = outcome.notes
     assert "made from other inputs" in sentence
@@ -167,7 +169,7 @@ def test_records_of_another_seed_are_put_aside_with_a_word(cleared: Workspace) -
 
 def test_checks_that_are_not_asked_for_are_not_made(cleared: Workspace) -> None:
     only = VerifySettings(checks=("prior",))
-    (outcome,) = verify_workspace(cleared, ("friction",), only, workers=1)
+    (outcome,) = verify_workspace(cleared, ("friction",), only, processes=Processes(1))
     assert outcome.fitted == 1
     assert (outcome.result.calibration, outcome.result.halves) == (None, None)
     assert [verdict.check for verdict in outcome.result.verdicts] == ["prior"]
@@ -189,7 +191,7 @@ def test_the_plan_offers_a_check_until_there_is_one(tmp_path: Path) -> None:
     fit_workspace(workspace, ("friction",))
     unverified = Engine.of(workspace).state("fit friction")
     assert (unverified.state, unverified.command) == ("unverified", "scissorcal verify friction")
-    verify_workspace(workspace, (), VerifySettings(checks=("prior",)), workers=1)
+    verify_workspace(workspace, (), VerifySettings(checks=("prior",)), processes=Processes(1))
     check = Engine.of(workspace).state("verify friction")
     assert (check.state, check.found) == ("incomplete", "prior; coverage was not counted")
     assert Engine.of(workspace).state("fit friction").state == "unverified"
@@ -199,7 +201,7 @@ def test_the_plan_offers_a_check_until_there_is_one(tmp_path: Path) -> None:
 def test_one_run_at_a_time(cleared: Workspace) -> None:
     path = cleared.verify_partial_path("friction")
     with RecordFile(path, "x"), pytest.raises(InputError, match="another run"):
-        verify_workspace(cleared, ("friction",), FEW, workers=1)
+        verify_workspace(cleared, ("friction",), FEW, processes=Processes(1))
 
 
 def test_a_damaged_result_is_refused(tmp_path: Path) -> None:
@@ -213,18 +215,18 @@ def test_an_unreachable_cluster_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
     pytest.importorskip("distributed")
     with (
         pytest.raises(InputError, match=r"No dask scheduler answers at nonsense://1"),
-        open_pool(cluster="nonsense://1"),
+        open_pool(Processes(cluster="nonsense://1")),
     ):
         pass
     with (
         pytest.raises(InputError, match=r"tls://127.0.0.1:1 asks for TLS, and dask knows no"),
-        open_pool(cluster="tls://127.0.0.1:1"),
+        open_pool(Processes(cluster="tls://127.0.0.1:1")),
     ):
         pass
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
     with (
         pytest.raises(InputError, match=r"pip install 'scissorcal\[cluster\]'"),
-        open_pool(cluster="tcp://127.0.0.1:1"),
+        open_pool(Processes(cluster="tcp://127.0.0.1:1")),
     ):
         pass
 
@@ -238,7 +240,7 @@ def test_a_cluster_gives_the_same_numbers(cleared: Workspace, whole: VerifyResul
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
         (outcome,) = verify_workspace(
-            cleared, ("friction",), FEW, cluster=cluster.scheduler_address
+            cleared, ("friction",), FEW, Processes(cluster=cluster.scheduler_address)
         )
     assert outcome.fitted == 7
     assert without_times(outcome.result) == without_times(whole)
@@ -247,12 +249,12 @@ def test_a_cluster_gives_the_same_numbers(cleared: Workspace, whole: VerifyResul
 KILLED = """
 import sys
 from pathlib import Path
-from scissorcal.workday.options import VerifySettings
+from scissorcal.workday.options import Processes, VerifySettings
 from scissorcal.workday.runs.verify import verify_workspace
 from scissorcal.workday.workspace import Workspace
 if __name__ == "__main__":
     many = VerifySettings(fits=500)
-    verify_workspace(Workspace(Path(sys.argv[1])), ("friction",), many, workers=2)
+    verify_workspace(Workspace(Path(sys.argv[1])), ("friction",), many, processes=Processes(2))
 """
 
 
@@ -272,7 +274,7 @@ def test_a_killed_run_loses_nothing_and_leaves_no_worker(
     running.send_signal(signal.SIGKILL)
     running.wait()
     before = [line for line in partial.read_bytes().splitlines(keepends=True) if b"\n" in line]
-    (outcome,) = verify_workspace(cleared, ("friction",), FEW, workers=1)
+    (outcome,) = verify_workspace(cleared, ("friction",), FEW, processes=Processes(1))
     assert partial.read_bytes().splitlines(keepends=True)[: len(before)] == before
     assert outcome.fitted <= 7 - 5 + 1
     assert without_times(outcome.result) == without_times(whole)
@@ -300,13 +302,13 @@ def is_running(pid: int) -> bool:
 def test_what_a_worker_raises_comes_through_and_a_dead_one_is_told() -> None:
     from scissorcal.errors import ScissorcalError
 
-    with open_pool(2) as pool:
+    with open_pool(Processes(2)) as pool:
         found: list[int] = []
         pool.work(abs, [-3, 2, -1, 0, 5, -6], found.append, int)
         assert sorted(found) == [0, 1, 2, 3, 5, 6]
         with pytest.raises(ZeroDivisionError):
             pool.work(_divide, [1, 0, 2], found.append, float)
-    with pytest.raises(ScissorcalError, match="fewer --workers"), open_pool(2) as pool:
+    with pytest.raises(ScissorcalError, match="fewer --workers"), open_pool(Processes(2)) as pool:
         pool.work(os._exit, [1], found.append, int)  # type: ignore[arg-type]
 
 
@@ -365,6 +367,7 @@ def test_what_is_no_file_holds_no_records(tmp_path: Path) -> None:
 DYING = """
 import subprocess, sys
 from scissorcal.errors import DeviceError
+from scissorcal.workday.options import Processes
 from scissorcal.workday.pool import open_pool
 if __name__ == "__main__":
     words = ("distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard")
@@ -383,7 +386,7 @@ if __name__ == "__main__":
             scheduler.kill()
 
     try:
-        with open_pool(cluster=address) as pool:
+        with open_pool(Processes(cluster=address)) as pool:
             pool.work(abs, range(-40, 0), finished, int)
         print("whole", len(found))
     except DeviceError as error:

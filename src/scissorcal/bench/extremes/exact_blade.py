@@ -118,8 +118,8 @@ class Turned:
         None where the edge stands upright before it comes to lie over the contact.
         """
         scout, goal = self.scout, float(contact)
-        outwards = self.x_at(mp.mpf(0)) < contact
-        least = scout.run_at(0.0)
+        outwards = self._x_at(mp.mpf(0)) < contact
+        least = scout._run_at(0.0)
         ahead = deque(scout.pieces(0.0, outwards) if least > 0.0 else ())
         while ahead:
             low, high = ahead.popleft()
@@ -130,10 +130,10 @@ class Turned:
             if run <= 0.0:
                 ahead.extendleft([(middle, high), (low, middle)])
                 continue
-            x = scout.x_at(high)
+            x = scout._x_at(high)
             if x >= goal if outwards else x <= goal:
                 ends = sorted((mp.mpf(low), mp.mpf(high)))  # of floats, so a little wider
-                place = root(lambda s: self.x_at(s) - contact, ends[0] - wide, ends[1] + wide)
+                place = root(lambda s: self._x_at(s) - contact, ends[0] - wide, ends[1] + wide)
                 within = scout.least_run(*sorted((low, float(place))))
                 return self.spot(place), min(least, within)
             least = min(least, run)
@@ -204,19 +204,19 @@ class Turned:
             return force * spot.x / mp.sqrt(1 + spot.taper**2)
         return force * spot.lever
 
-    def x_at(self, s: Number) -> Number:
+    def _x_at(self, s: Number) -> Number:
         """x of a station."""
         return s * self.cosine - self.law.edge.at(s)[0] * self.sine
 
-    def run_at(self, s: Number) -> Number:
+    def _run_at(self, s: Number) -> Number:
         """dx/ds at a station."""
         return self.cosine - self.law.edge.at(s)[1] * self.sine
 
     def least_run(self, low: Number, high: Number) -> Number:
         """Least dx/ds between two stations of one piece, where it is a parabola."""
         inner = 1e-12 * (high - low)  # both ends as the piece between them has them
-        first, last = self.run_at(low + inner), self.run_at(high - inner)
-        bend = 2 * (first + last - 2 * self.run_at((low + high) / 2))
+        first, last = self._run_at(low + inner), self._run_at(high - inner)
+        bend = 2 * (first + last - 2 * self._run_at((low + high) / 2))
         least = min(first, last)
         if bend > 0:
             t = (1 - (last - first) / bend) / 2

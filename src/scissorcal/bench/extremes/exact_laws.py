@@ -144,16 +144,10 @@ class Power:
         return self.reference * (force / self.force) ** (1 / self.exponent)
 
 
-@dataclass(frozen=True)
-class Exponential:
+class Exponential(Power):
     """force (exp(b delta) - 1) / (exp(b reference) - 1) with b = exponent / reference."""
 
-    force: Number
-    exponent: Number
-    reference: Number
-
     def at(self, delta: Number) -> Number:
-        """Force at an indentation > 0."""
         a = self.exponent * delta / self.reference
         if a > 700:
             raise NotComparedError(TOO_LARGE)
@@ -186,7 +180,7 @@ class TableForce:
 
 
 Curve = FormulaEdge | TableCurve
-Force = Power | Exponential | TableForce
+Force = Power | TableForce
 
 
 def scouted(law: Law) -> Law:

@@ -1,9 +1,10 @@
 """From records to curves: spreads, errors, the Pareto front and the recommended setting."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from statistics import median
+from typing import NamedTuple
 
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.knob import SAME_FITS, Knob, make_knob, scene_knobs
@@ -14,10 +15,9 @@ from scissorcal.bench.trade.next_capture import (
     next_capture,
     upper_limit,
 )
-from scissorcal.bench.trade.pareto import pareto_front
 from scissorcal.bench.trade.point import Curve, Error, Point, Sample, Setting, Spread
-from scissorcal.bench.trade.recommend import Captures, recommend
-from scissorcal.bench.trade.study import Record, sample_of
+from scissorcal.bench.trade.recommend import Captures, barred, recommend, unsimulated
+from scissorcal.bench.trade.study import Record, Task, records_of, sample_of
 from scissorcal.bench.trade.torque import BAND_WORST, WORST
 
 SCATTERING = (BAND_WORST,)
@@ -125,8 +125,7 @@ def reference_of(case: Case, knob: Knob, records: Sequence[Record]) -> tuple[Sam
     return found.sample, found.against
 
 
-@dataclass(frozen=True)
-class _Reference:
+class _Reference(NamedTuple):
     """What errors are counted against: in words, its label and sample (none where it has neither).
 
     ``gaps`` say of each more accurate setting why it is not the reference; empty without any.
@@ -249,3 +248,62 @@ def _with_front(knob: Knob, points: Sequence[Point]) -> tuple[Point, ...]:
     )
     on = {point.setting.label for point, flag in zip(able, flags, strict=True) if flag}
     return tuple(replace(point, front=point.setting.label in on) for point in points)
+
+
+def pareto_front(costs: Sequence[float], errors: Sequence[float]) -> tuple[bool, ...]:
+    """Which of the points (n,) no other one dominates: lower in one, no higher in the other.
+
+    >>> pareto_front([1.0, 2.0, 3.0], [0.5, 0.6, 0.1])
+    (True, False, True)
+    """
+    points = list(zip(costs, errors, strict=True))
+    return tuple(
+        not any(a <= cost and b <= error and (a, b) != (cost, error) for a, b in points)
+        for cost, error in points
+    )
+
+
+def without_prospect(case: Case, names: Sequence[str], records: Iterable[Record]) -> set[Task]:
+    """The tasks of the knobs named that can lead to no recommendation; all others come first.
+
+    A setting can be recommended where the error is one of torque and it is cheaper than the present
+    one; the present setting and the reference are needed beside it. Once every cheaper setting of a
+    knob that was measured fails a check, or needs more than is allowed, the others of it wait.
+    Repeats wait too: they tell how certain a cost is, and the first measurement tells most of it.
+    """
+    every, found = list(records), set[Task]()
+    for name in names:
+        knob = make_knob(name)
+        settings = knob.settings(case)
+        place = next(i for i, one in enumerate(settings) if one.present)
+        cheaper = {one.label for one in settings[:place]} if knob.of_torque else set[str]()
+        best = max(settings, key=lambda one: one.accuracy)
+        wanted = {*cheaper, settings[place].label, best.label} if cheaper else set[str]()
+        own = records_of(case, name, every)
+        bad = barred(measured_curve(case, knob, own))
+        tried = cheaper & {record["label"] for record in own}
+        if tried and tried <= bad:
+            wanted = set()
+        for setting in settings:
+            for repeat in range(knob.repeats(case, setting)):
+                if repeat or setting.label not in wanted:
+                    found.add(Task(name, setting.label, repeat))
+    return found
+
+
+def to_simulate(
+    case: Case, names: Sequence[str], records: Sequence[Record]
+) -> list[tuple[str, str]]:
+    """Of each knob named, the setting that is to be tried on simulated captures next, if any.
+
+    As (knob, label): the cheapest one that would be recommended if it holds there.
+    """
+    limit, found = limit_of(case), []
+    for name in names:
+        knob = make_knob(name)
+        curve = measured_curve(case, knob, records_of(case, name, records))
+        judged = on_captures(curve, records)
+        point = unsimulated(judged, limit, captures_of(case, knob, records))
+        if point is not None:
+            found.append((name, point.setting.label))
+    return found

@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 
-from scissorcal.bench.trade.strokes import Stroke
+from scissorcal.bench.trade.rendered import Stroke
 from scissorcal.errors import ScissorcalError
 from scissorcal.kernel import (
     LoopBlock,

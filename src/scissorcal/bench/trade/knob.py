@@ -9,7 +9,7 @@ from scissorcal.bench.trade.point import Error, Sample, Setting
 
 KNOBS: Mapping[str, str] = {
     "effort": "scissorcal.bench.trade.knobs.effort:Effort",
-    "window": "scissorcal.bench.trade.knobs.window:Window",
+    "window": "scissorcal.bench.trade.knobs.effort:Window",
     "capture": "scissorcal.bench.trade.knobs.capture:Capture",
     "tables": "scissorcal.bench.trade.knobs.tables:Tables",
     "rate": "scissorcal.bench.trade.knobs.rate:Rate",
@@ -18,7 +18,7 @@ KNOBS: Mapping[str, str] = {
     "response": "scissorcal.bench.trade.knobs.candidates:Response",
     "damping": "scissorcal.bench.trade.knobs.candidates:Damping",
     "closure": "scissorcal.bench.trade.knobs.candidates:Closure",
-    "edge": "scissorcal.bench.trade.knobs.edge:Edge",
+    "edge": "scissorcal.bench.trade.knobs.candidates:Edge",
     "photographs": "scissorcal.bench.trade.knobs.photographs:Photographs",
     "plate": "scissorcal.bench.trade.knobs.photographs:Plate",
 }

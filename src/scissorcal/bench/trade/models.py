@@ -1,12 +1,11 @@
-"""The model of a case: that of its fits, that of a package of them, and their tables."""
-
-from dataclasses import dataclass
+"""The model of a case: of its fits, of a package of them; its tables and what they cost."""
 
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
+from scissorcal.bench.trade.point import Quantity
 from scissorcal.calibration.result import FitResult
-from scissorcal.errors import MissingError
+from scissorcal.errors import MissingError, ScissorcalError
 from scissorcal.kernel import ModelTables
 from scissorcal.package.compile import (
     TOLERANCE,
@@ -20,15 +19,7 @@ from scissorcal.package.friction_tables import rendered_fits
 from scissorcal.package.simplest.law import Law
 from scissorcal.package.simplest.model import simplest_model
 from scissorcal.package.smallest_tables import smallest_tables
-
-
-@dataclass(frozen=True)
-class CompiledCase:
-    """A model, its tables by file name, and the same as the kernel takes them."""
-
-    model: ExactModel
-    compiled: Compiled
-    tables: ModelTables
+from scissorcal.package.table_cost import CostAndError, cost_and_error
 
 
 def nothing_rendered(case: Case) -> str:
@@ -103,17 +94,20 @@ def model_of_law(law: Law) -> ExactModel:
     return central_model(law.cut, law.friction)
 
 
-def compiled(case: Case, model: ExactModel | None = None) -> CompiledCase:
-    """Compile a model, by default the one that a package holds, to float32 tables of one tolerance.
+def compiled(case: Case, model: ExactModel) -> Compiled:
+    """Compile a model to float32 tables of one tolerance.
 
     The case's tolerance, or the fixed one: without a search for the smallest tables, so that models
     compare.
     """
-    model = model or central(case)
     tolerance = TOLERANCE if case.table_tolerance is None else case.table_tolerance
-    found = compile_model(model, case.recipe, tolerance=tolerance)
-    tables = kernel_tables(found.mechanics, scene_ranges(case.recipe), found.arrays)
-    return CompiledCase(model, found, tables)
+    return compile_model(model, case.recipe, tolerance=tolerance)
+
+
+def kernel_model(case: Case) -> ModelTables:
+    """The model that a package of a case's fits holds, `compiled`, as the kernel takes it."""
+    found = compiled(case, central(case))
+    return kernel_tables(found.mechanics, scene_ranges(case.recipe), found.arrays)
 
 
 def tables_of(case: Case, model: ExactModel) -> Compiled:
@@ -126,3 +120,45 @@ def tables_of(case: Case, model: ExactModel) -> Compiled:
         return smallest_tables(model, case.recipe, number_format=case.number_format)
     tolerance = TOLERANCE if case.table_tolerance is None else case.table_tolerance
     return compile_model(model, case.recipe, tolerance=tolerance, number_format=case.number_format)
+
+
+BYTES, STEP = "table bytes", "step"
+
+TIMINGS = 5
+"""Repeats of a timing, whose median counts."""
+
+
+def package_costs(
+    case: Case, model: ExactModel, made: Compiled, rng: np.random.Generator
+) -> dict[str, Quantity]:
+    """Bytes of the tables, and the time of a step (ns) where a compiler measures it.
+
+    Raises what `measured_tables` raises.
+    """
+    cost = measured_tables(case, model, made, rng, count_instructions=False).cost
+    costs = {BYTES: Quantity(float(cost.bytes), "B")}
+    if cost.stroke_ns is not None:
+        costs[STEP] = Quantity(cost.stroke_ns.median, "ns")
+    return costs
+
+
+def measured_tables(
+    case: Case,
+    model: ExactModel,
+    made: Compiled,
+    rng: np.random.Generator,
+    *,
+    count_instructions: bool = True,
+) -> CostAndError:
+    """What `package.table_cost` measures of tables; ScissorcalError where the compiler fails."""
+    try:
+        return cost_and_error(
+            model,
+            case.recipe,
+            made,
+            rng,
+            repeats=TIMINGS,
+            count_instructions=count_instructions,
+        )
+    except RuntimeError as error:
+        raise ScissorcalError(f"The step could not be measured: {error}") from error

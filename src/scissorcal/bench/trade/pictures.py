@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
@@ -22,13 +21,8 @@ from scissorcal.vision.targets.detect import find_any_board
 LEAST_WIDTH_PX = 400
 LARGEST_FACTOR = 8
 
-
-@dataclass(frozen=True)
-class Resolution:
-    """How many photographs, and by which factor each side of them is read more coarsely."""
-
-    count: int
-    factor: int = 1
+Resolution = tuple[int, int]
+"""How many photographs, and by which factor each side of them is read more coarsely."""
 
 
 def factors_of(width: int, height: int) -> tuple[int, ...]:
@@ -112,13 +106,13 @@ def _picked(
     photographed: Sequence[Photographed], resolution: Resolution, rng: np.random.Generator
 ) -> list[tuple[Photographed, Path]]:
     every = [(one, path) for one in photographed for path in one.paths]
-    rows = np.sort(rng.permutation(len(every))[: resolution.count])
+    rows = np.sort(rng.permutation(len(every))[: resolution[0]])
     return [every[row] for row in rows]
 
 
 def _read(path: Path, resolution: Resolution, *, colour: bool) -> Photo:
     try:
-        return read_photo(path, colour=colour).reduced(resolution.factor)
+        return read_photo(path, colour=colour).reduced(resolution[1])
     except ValueError as error:
         raise InputError(f"{path.name} cannot be read more coarsely: {error}.") from error
 

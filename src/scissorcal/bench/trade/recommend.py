@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from scissorcal.bench.trade.point import TIMES_S, Curve, Point
 
@@ -13,8 +14,7 @@ in the median of 24 settings of the virtual rig, and further where other work ru
 setting with one repeat does not show that."""
 
 
-@dataclass(frozen=True)
-class Captures:
+class Captures(NamedTuple):
     """How much captures of one specimen differ, as far as they were simulated.
 
     ``needed`` says that a setting must have been tried on simulated captures before it takes the

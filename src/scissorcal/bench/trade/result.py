@@ -5,6 +5,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
+from pydantic import TypeAdapter, ValidationError
+
 from scissorcal.bench.trade.point import Curve, Spread
 from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign import read_json
@@ -52,8 +54,6 @@ def read_trade(path: Path) -> Trade:
 
     Raises MissingError where there is none, InputError where it is of another version or damaged.
     """
-    from pydantic import TypeAdapter, ValidationError
-
     if not path.is_file():
         raise MissingError(f"There is no {path} yet: run 'scissorcal bench trade' first.")
     try:

@@ -14,9 +14,9 @@ from scissorcal.bench.trade.fits import (
     fits_errors,
     fits_outcome,
 )
-from scissorcal.bench.trade.models import held_law, model_of_law, tables_of
-from scissorcal.bench.trade.package_cost import package_costs
-from scissorcal.bench.trade.pictures import Resolution, fit_edge
+from scissorcal.bench.trade.knob import make_knob
+from scissorcal.bench.trade.models import held_law, model_of_law, package_costs, tables_of
+from scissorcal.bench.trade.pictures import fit_edge
 from scissorcal.bench.trade.point import Error, Quantity, Sample, Setting
 from scissorcal.bench.trade.torque import WORST, model_torque, scene_places
 from scissorcal.package.average import AverageTorque
@@ -97,7 +97,7 @@ class Together:
         if "photographs" not in setting.value:
             return chosen, 0.0
         _, own = _choice(case, "photographs", setting.value["photographs"])
-        resolution = Resolution(own.value["count"], own.value["factor"])
+        resolution = own.value["count"], own.value["factor"]
         rng = np.random.default_rng([case.seed, repeat])
         edge, seconds = fit_edge(case, resolution, rng)
         return replace(chosen, edge=edge.edge_posterior), seconds
@@ -120,8 +120,6 @@ def expected_chain_s(case: Case) -> float:
 
 def _choice(case: Case, name: str, label: str) -> tuple[Any, Setting]:
     """A knob and one of its settings."""
-    from scissorcal.bench.trade.knob import make_knob
-
     knob = make_knob(name)
     return knob, next(one for one in knob.settings(case) if one.label == label)
 

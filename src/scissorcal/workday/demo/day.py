@@ -3,20 +3,33 @@
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from scissorcal.aliases import Progress
+from scissorcal.calibration import FitResult
+from scissorcal.calibration.result import Effort
+from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.device import capture as rig_capture
+from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.session import RigSession
+from scissorcal.device.sim.specimen import Specimen, load_specimen
+from scissorcal.device.sim.truth import average_torque, true_parameters, varied
 from scissorcal.errors import InputError, ScissorcalError
+from scissorcal.package import ModelPackage, open_package
 from scissorcal.recipe.load import read_text
+from scissorcal.recipe.schema import Recipe
+from scissorcal.render import Rendering, RenderResult, open_writer, render
+from scissorcal.render.rig_facts import rig_facts, with_probe
 from scissorcal.verdicts import Verdict
-from scissorcal.workday.demo.judged import Judged
 from scissorcal.workday.demo.photographs import (
+    Judged,
     fit_photographs,
     judge_photographs,
     photograph,
 )
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.options import FitOptions, VerifySettings
+from scissorcal.workday.options import FitOptions, Processes, VerifySettings
 from scissorcal.workday.pool import open_pool, usable_cores
 from scissorcal.workday.runs.fit import FitOutcome, fit_workspace
 from scissorcal.workday.runs.package import build_workspace_package
@@ -24,19 +37,6 @@ from scissorcal.workday.runs.probe import ensure_probed
 from scissorcal.workday.runs.report import write_workspace_report
 from scissorcal.workday.runs.verify import VerifyOutcome, verify_workspace
 from scissorcal.workday.workspace import Workspace, create_workspace
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from scissorcal.calibration import FitResult
-    from scissorcal.calibration.result import Effort
-    from scissorcal.calibration.verify.result import VerifyResult
-    from scissorcal.device.lockstep import LockstepLink
-    from scissorcal.device.sim.specimen import Specimen
-    from scissorcal.package import ModelPackage
-    from scissorcal.recipe.schema import Recipe
-    from scissorcal.render import RenderResult
-
 
 RENDER_S = 30.0
 RIG_FITS = {"rotary": ("friction", "cut"), "linear": ("friction",)}
@@ -59,8 +59,8 @@ class DemoResult:
     judged: tuple[Judged, ...]
     torque_error: float
     candidates: tuple[str, ...]
-    rendering: "RenderResult"
-    verified: "tuple[VerifyResult, ...]"
+    rendering: RenderResult
+    verified: tuple[VerifyResult, ...]
     verdicts: tuple[Verdict, ...]
     files: tuple[Path, ...]
 
@@ -76,7 +76,7 @@ def run_demo(
     *,
     recipe_name: str = "paper-photographed",
     seed: int = 0,
-    effort: "Effort | None" = None,
+    effort: Effort | None = None,
     fits: int,
     progress: Progress | None = None,
 ) -> DemoResult:
@@ -89,8 +89,6 @@ def run_demo(
     ``fits`` to simulated data verify each fit, 0 for none; thorough ones are left to the command.
     Raises InputError where the recipe has no specimen or the folder is a workspace already.
     """
-    from scissorcal.device.lockstep import LockstepLink
-
     tell = progress or (lambda done, sentence: None)
     workspace = create_workspace(folder, recipe_name)
     recipe = workspace.recipe()
@@ -138,7 +136,7 @@ def make_day(
     *,
     seed: int = 0,
     capture: int = 0,
-    effort: "Effort | None" = None,
+    effort: Effort | None = None,
     progress: Progress | None = None,
 ) -> tuple[tuple[FitOutcome, ...], tuple[FitOutcome, ...]]:
     """Capture and fit all that a new workspace's scene needs, on a virtual rig.
@@ -149,7 +147,7 @@ def make_day(
     """
     tell = progress or (lambda done, sentence: None)
     recipe = workspace.recipe()
-    with open_pool(min(2, usable_cores())) as pool:
+    with open_pool(Processes(min(2, usable_cores()))) as pool:
         tell(0.0, "capturing friction and cuts, beside the photographs where a second core is free")
         captured = pool.executor.submit(_capture, workspace.root, seed, capture)
         photograph(workspace, recipe, seed, _part(tell, 0.05, 0.3))
@@ -167,7 +165,7 @@ def make_day(
     return geometry, fit_workspace(workspace, what, FitOptions(effort, seed=seed), progress=part)
 
 
-def judge(fit: "FitResult", specimen: "Specimen") -> tuple[Judged, ...]:
+def judge(fit: FitResult, specimen: Specimen) -> tuple[Judged, ...]:
     """Put each parameter of a fit beside the specimen's truth.
 
     The truth is expressed in the fit's own terms: friction expanded at its centre; the force at
@@ -189,7 +187,7 @@ def judge(fit: "FitResult", specimen: "Specimen") -> tuple[Judged, ...]:
     )
 
 
-def torque_error(package: "ModelPackage", specimen: "Specimen", recipe: "Recipe") -> float:
+def torque_error(package: ModelPackage, specimen: Specimen, recipe: Recipe) -> float:
     """Relative rms of rendered against true average torque over the scene.
 
     The kernel closes the blades over the scene's openings at three of its rates, step by step as
@@ -199,10 +197,6 @@ def torque_error(package: "ModelPackage", specimen: "Specimen", recipe: "Recipe"
     takes the ripple out. Ranges where the true torque exceeds the recipe's limit do not count: no
     model is rendered there, but the limit. Raises InputError where that leaves no place.
     """
-    import numpy as np
-
-    from scissorcal.device.sim.truth import average_torque
-
     low, high = recipe.scene.opening_rad
     slow, fast = recipe.scene.opening_rate_rad_per_s
     nearest, farthest = recipe.scene.contact_m
@@ -234,20 +228,15 @@ def torque_error(package: "ModelPackage", specimen: "Specimen", recipe: "Recipe"
     return float(np.sqrt(np.mean(difference**2) / np.mean(size[counts] ** 2)))
 
 
-def specimen_of(recipe: "Recipe", seed: int) -> "Specimen":
+def specimen_of(recipe: Recipe, seed: int) -> Specimen:
     """The specimen that a day of a seed captures."""
     return _drawn(recipe, seed)[0]
 
 
 def _drawn(
-    recipe: "Recipe", seed: int, capture: int = 0
-) -> tuple["Specimen", list["np.random.Generator"]]:
+    recipe: Recipe, seed: int, capture: int = 0
+) -> tuple[Specimen, list[np.random.Generator]]:
     """The specimen of a seed, and streams of noise for one of its captures and for rendering."""
-    import numpy as np
-
-    from scissorcal.device.sim.specimen import load_specimen
-    from scissorcal.device.sim.truth import varied
-
     rng = np.random.default_rng(seed)
     specimen = varied(load_specimen(recipe.specimen or recipe.name), rng)
     return specimen, rng.spawn(2 * capture + 2)[-2:]
@@ -255,10 +244,6 @@ def _drawn(
 
 def _capture(root: Path, seed: int, capture: int = 0) -> None:
     """Capture friction and cuts of a seed's specimen; another process may do it."""
-    from scissorcal.device import capture as rig_capture
-    from scissorcal.device.lockstep import LockstepLink
-    from scissorcal.device.session import RigSession
-
     workspace = Workspace(root)
     recipe, text = workspace.recipe(), read_text(workspace.recipe_path)
     specimen, streams = _drawn(recipe, seed, capture)
@@ -269,9 +254,7 @@ def _capture(root: Path, seed: int, capture: int = 0) -> None:
                 rig_capture.capture(session, kind, writer)
 
 
-def _truth_for(fit: "FitResult", specimen: "Specimen") -> dict[str, float]:
-    from scissorcal.device.sim.truth import true_parameters
-
+def _truth_for(fit: FitResult, specimen: Specimen) -> dict[str, float]:
     if fit.what == "friction":
         center = fit.structure["angle_center"]
         sides = true_parameters(specimen, angle_center=center)
@@ -306,13 +289,8 @@ def _mean_share(truth: dict[str, float]) -> float:
 
 
 def _render(
-    workspace: Workspace, recipe: "Recipe", link: "LockstepLink"
-) -> "tuple[ModelPackage, RenderResult, Path]":
-    from scissorcal.device.session import RigSession
-    from scissorcal.package import open_package
-    from scissorcal.render import Rendering, open_writer, render
-    from scissorcal.render.rig_facts import rig_facts, with_probe
-
+    workspace: Workspace, recipe: Recipe, link: LockstepLink
+) -> tuple[ModelPackage, RenderResult, Path]:
     package = open_package(workspace.package_path(recipe), warn=False)
     text = read_text(workspace.recipe_path)
     session = ensure_probed(workspace, RigSession(link, recipe, recipe_toml=text))

@@ -1,13 +1,28 @@
 """The demo's photographs: rendered, taken in and fitted as a lab's own would be, then judged."""
 
+import math
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from scissorcal.aliases import Progress
+from scissorcal.device.sim.specimen import Specimen, load_specimen
+from scissorcal.errors import InputError
 from scissorcal.recipe.requirements import requirements
+from scissorcal.recipe.schema import Recipe
 from scissorcal.recording.probe import NORMAL_90
-from scissorcal.workday.demo.judged import Judged
+from scissorcal.vision.geometry.pose import Pose, difference
+from scissorcal.vision.sim import BladeShape
+from scissorcal.vision.sim.sim_camera import (
+    render_blade_photographs,
+    render_board_photographs,
+    render_card_photographs,
+    render_plate_photographs,
+    sim_plate_scene,
+)
+from scissorcal.vision.targets.boards import CAMERA_BOARD
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.photographs import BladeSetup
@@ -17,25 +32,57 @@ from scissorcal.workday.runs.fit import FitOutcome, fit_workspace, load_result
 from scissorcal.workday.runs.plate import capture_plate
 from scissorcal.workday.workspace import Workspace
 
-if TYPE_CHECKING:
-    from scissorcal.device.sim.specimen import Specimen
-    from scissorcal.recipe.schema import Recipe
+
+def specimen_blade(recipe: Recipe) -> BladeShape:
+    """Shape of the specimen's blade. Raises InputError where the recipe names no specimen."""
+    if recipe.specimen is None:
+        raise InputError(
+            f'The recipe "{recipe.name}" names no specimen, so there is no virtual blade to '
+            'photograph: add specimen = "...", or give photographs with --image.'
+        )
+    blade = load_specimen(recipe.specimen).blade
+    if blade.wave_mm is not None:
+        raise InputError(
+            f'The blade of the specimen "{recipe.specimen}" has a wave (blade.wave_mm), and the '
+            "virtual camera draws lines and arcs only: take it out, or give photographs with "
+            "--image."
+        )
+    taper = math.radians(blade.taper_deg)
+    return BladeShape(
+        length_m=1e-3 * blade.length_mm,
+        offset_m=1e-3 * blade.offset_mm,
+        taper_rad=taper,
+        curvature_per_m=blade.curvature_per_m,
+        back_m=-1e-3 * blade.offset_mm,
+        back_slope=-math.tan(taper),
+    )
 
 
-def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Progress) -> None:
+@dataclass(frozen=True)
+class Judged:
+    """An estimate in ``unit`` with its 90 % interval, of a fit's parameter or of photographs.
+
+    ``truth`` is None where the chosen law has no such thing.
+    """
+
+    name: str
+    unit: str
+    truth: float | None
+    estimate: float
+    low: float
+    high: float
+
+    @property
+    def inside(self) -> bool | None:
+        """Whether the truth lies in the interval; None where there is no truth."""
+        return None if self.truth is None else self.low <= self.truth <= self.high
+
+
+def photograph(workspace: Workspace, recipe: Recipe, seed: int, progress: Progress) -> None:
     """Render the photographs that the scene requires, and take them in.
 
     They show the specimen's own blade, and targets at places that only the renderer knows.
     """
-    from scissorcal.vision.sim.sim_camera import (
-        render_blade_photographs,
-        render_board_photographs,
-        render_card_photographs,
-        render_plate_photographs,
-    )
-    from scissorcal.vision.targets.boards import CAMERA_BOARD
-    from scissorcal.workday.demo.sim_photographs import specimen_blade
-
     wanted = [item.name for item in requirements(recipe).geometry]
     for index, what in enumerate(wanted):
         share = index / len(wanted)
@@ -60,7 +107,7 @@ def photograph(workspace: Workspace, recipe: "Recipe", seed: int, progress: Prog
 
 
 def fit_photographs(
-    workspace: Workspace, recipe: "Recipe", seed: int, progress: Progress
+    workspace: Workspace, recipe: Recipe, seed: int, progress: Progress
 ) -> tuple[FitOutcome, ...]:
     """Fit what the scene requires of its photographs, in order."""
     wanted = [item.name for item in requirements(recipe).geometry]
@@ -69,7 +116,7 @@ def fit_photographs(
 
 
 def judge_photographs(
-    workspace: Workspace, recipe: "Recipe", specimen: "Specimen", seed: int
+    workspace: Workspace, recipe: Recipe, specimen: Specimen, seed: int
 ) -> tuple[Judged, ...]:
     """Put the edge's height and slope and the plate's place beside what was rendered.
 
@@ -84,9 +131,7 @@ def judge_photographs(
     return tuple(rows)
 
 
-def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[Judged]:
-    import numpy as np
-
+def _judge_edge(workspace: Workspace, specimen: Specimen) -> list[Judged]:
     fit = load_result(Engine.of(workspace), "blade").blades[0]
     edges = fit.edge_posterior.with_values(fit.draws)
     blade, length = specimen.blade, fit.edge_posterior.edge.length_m
@@ -113,12 +158,7 @@ def _judge_edge(workspace: Workspace, specimen: "Specimen") -> list[Judged]:
     return rows
 
 
-def _judge_plate(workspace: Workspace, recipe: "Recipe", seed: int) -> list[Judged]:
-    import numpy as np
-
-    from scissorcal.vision.geometry.pose import Pose, difference
-    from scissorcal.vision.sim.sim_camera import sim_plate_scene
-
+def _judge_plate(workspace: Workspace, recipe: Recipe, seed: int) -> list[Judged]:
     fit = load_result(Engine.of(workspace), "plate")
     rendered = sim_plate_scene(recipe, seed).rig_plate
     truth = Pose.from_matrix(rendered.rotation, rendered.shift_m)

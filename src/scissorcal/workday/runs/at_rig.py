@@ -2,11 +2,12 @@
 
 from abc import ABC, abstractmethod
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from scissorcal.recipe.load import read_text
+from scissorcal.verdicts import Verdict
 from scissorcal.workday.options import RigOptions
 from scissorcal.workday.rigs import open_session
 from scissorcal.workday.runs.probe import ensure_probed
@@ -33,6 +34,24 @@ class RigRun(Generic[Result]):
     recording: Path | None
     rig: str
     tracked: "TrackedRun | None" = None
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """The run for an answer in JSON, without its verdicts."""
+        result: Any = self.result
+        facts = {name: value for name, value in asdict(result).items() if name != "verdicts"}
+        return {**facts, "rig": self.rig, "tracked": self.tracked.facts if self.tracked else None}
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Those of the result and of the track."""
+        result: Any = self.result
+        return (*result.verdicts, *(self.tracked.verdicts if self.tracked else ()))
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What was written."""
+        return (self.recording,) if self.recording else ()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -4,18 +4,48 @@ import math
 import pickle
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime
-from functools import lru_cache
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from scissorcal.aliases import Progress
+from scissorcal.bench.trade import knob as knobs
+from scissorcal.bench.trade.assemble import (
+    curve_of,
+    limit_of,
+    measured_curve,
+    reference_of,
+    refits,
+    to_simulate,
+    without_prospect,
+)
+from scissorcal.bench.trade.case import Case
+from scissorcal.bench.trade.knob import PRESENT_ALIKE, make_knob
+from scissorcal.bench.trade.next_capture import CAPTURES
+from scissorcal.bench.trade.point import Curve, Quantity, Spread
+from scissorcal.bench.trade.recommend import choices_of, together_sentence
+from scissorcal.bench.trade.result import FORMAT, Trade
+from scissorcal.bench.trade.schedule import Schedule
+from scissorcal.bench.trade.study import (
+    PRESENT_TASK,
+    Task,
+    capture_tasks,
+    key_of,
+    knob_of,
+    records_of,
+    run_task,
+    setting_of,
+    tasks_of,
+)
+from scissorcal.bench.trade.together import RECOMMENDED, TOGETHER, Together
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
 from scissorcal.identity import VERSION
+from scissorcal.report.build import twin_text
+from scissorcal.report.trade import trade_page
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.pool import Pool, open_pool
+from scissorcal.workday.options import Processes, TradeOptions
+from scissorcal.workday.pool import Pool, open_pool, unpacked
 from scissorcal.workday.records import Record, RecordFile
 from scissorcal.workday.runs.bench_case import (
     LOCAL_KNOBS,
@@ -28,14 +58,6 @@ from scissorcal.workday.runs.bench_case import (
 )
 from scissorcal.workday.workspace import Workspace
 
-if TYPE_CHECKING:
-    from scissorcal.bench.trade.case import Case
-    from scissorcal.bench.trade.point import Curve
-    from scissorcal.bench.trade.result import Trade
-    from scissorcal.bench.trade.schedule import Schedule
-    from scissorcal.bench.trade.study import Task
-
-
 FINISH_S = 2.0
 """Time within a budget for writing the results."""
 
@@ -47,70 +69,41 @@ STRETCH = 2.0
 """All recommended settings are begun where this many times the time left is expected for them."""
 
 
-@dataclass(frozen=True)
-class TradeSettings:
-    """Which knobs, all if none is named; seconds for the whole run, without limit if None.
-
-    ``force`` measures these knobs again; measurements of others are kept.
-    """
-
-    knobs: tuple[str, ...] = ()
-    budget_s: float | None = None
-    seed: int = 0
-    force: bool = False
-
-
-@dataclass(frozen=True)
-class TradeOutcome:
-    """The result, its files, and what to say on the side."""
-
-    trade: "Trade"
-    html: Path
-    json: Path
-    notes: tuple[str, ...] = ()
-
-
 def trade_workspace(
     workspace: Workspace,
-    settings: TradeSettings | None = None,
-    *,
-    workers: int | None = None,
-    cluster: str | None = None,
+    chosen: TradeOptions = TradeOptions(),
+    processes: Processes = Processes(),
     progress: Progress | None = None,
     began: float | None = None,
-) -> TradeOutcome:
+) -> tuple[Trade, tuple[str, ...]]:
     """Measure how cost buys accuracy on a workspace's own recordings, scene and fits.
 
     Each measurement is kept in bench/trade.partial.jsonl as soon as it is made, so that a killed
     run goes on where it was and nothing is measured twice on the same inputs and computer, unless
     ``force``; what failed is tried again by the next run. Knobs that read photographs are left out
     on a cluster. ``began`` is the time (of `time.time`) from which the budget counts. The page is
-    written to bench/trade.html, its JSON twin to bench/trade.json.
+    written to bench/trade.html, its JSON twin to bench/trade.json. Gives the result, and sentences
+    to say on the side.
 
     Raises MissingError where a fit that the scene needs is missing or stale, InputError where a
     knob is unknown or not of this scene, the budget is too small for any measurement, the cluster
     cannot be used, or another run holds the file.
     """
-    from scissorcal.bench.trade.knob import KNOBS
-    from scissorcal.report.build import twin_text
-    from scissorcal.report.trade import trade_page
-
     start = time.time() if began is None else began
-    chosen = settings or TradeSettings()
     tell = progress or (lambda done, sentence: None)
     tell(0.0, "reading recordings and fits")
     engine = Engine.of(workspace)
     case = load_case(engine, chosen.seed)
-    names = wanted_knobs(case, chosen.knobs, on_cluster=cluster is not None)
-    shown = names if chosen.knobs else tuple(KNOBS)
+    names = wanted_knobs(case, chosen.knobs or (), on_cluster=processes.cluster is not None)
+    shown = names if chosen.knobs else tuple(knobs.KNOBS)
     deadline = None if chosen.budget_s is None else start + chosen.budget_s - FINISH_S
     inputs = inputs_hash(engine, case)
     with RecordFile(workspace.trade_partial_path, inputs) as file:
         if chosen.force:
-            file.keep([one for one in file.records if not _forced(one, chosen.knobs)])
-        left_out = {} if cluster is None else dict.fromkeys(LOCAL_KNOBS, ON_A_CLUSTER)
+            file.keep([one for one in file.records if not _forced(one, chosen.knobs or ())])
+        left_out = {} if processes.cluster is None else dict.fromkeys(LOCAL_KNOBS, ON_A_CLUSTER)
         run = _Run(case, file, chosen.budget_s, deadline, tell, left_out)
-        with open_pool(workers, cluster) as pool:
+        with open_pool(processes) as pool:
             together = None
             for keep_time in (True, False):  # time that was kept and not needed goes to the knobs
                 if run.measure(pool, names, keep_time=keep_time) or keep_time:
@@ -125,7 +118,7 @@ def trade_workspace(
     ):
         with replacing(path) as part:
             part.write_text(text, encoding="utf-8")
-    return TradeOutcome(trade, workspace.trade_html, workspace.trade_json, notes)
+    return trade, notes
 
 
 class _Run:
@@ -136,15 +129,13 @@ class _Run:
 
     def __init__(
         self,
-        case: "Case",
+        case: Case,
         file: RecordFile,
         budget_s: float | None,
         deadline: float | None,
         tell: Progress,
         left_out: Mapping[str, str],
     ) -> None:
-        from scissorcal.bench.trade.study import key_of
-
         self._case, self._file, self._tell = case, file, tell
         self._budget_s, self._deadline = budget_s, deadline
         self._blob = pickle.dumps(case)
@@ -156,14 +147,10 @@ class _Run:
     @property
     def _records(self) -> list[Record]:
         """The newest record of each task."""
-        from scissorcal.bench.trade.study import key_of
-
         return list({key_of(record): record for record in self._file.records}.values())
 
     def _known(self) -> list[Record]:
         """Records of the tasks that are not measured again."""
-        from scissorcal.bench.trade.study import key_of
-
         return [record for record in self._records if key_of(record) not in self._failed]
 
     def measure(self, pool: Pool, names: Sequence[str], *, keep_time: bool = True) -> bool:
@@ -172,31 +159,10 @@ class _Run:
         Of a budget some is left for all recommended settings at once. With ``keep_time`` some is
         left for simulated captures too, and only what can lead to a recommendation is measured.
         """
-        from scissorcal.bench.trade.next_capture import CAPTURES
-        from scissorcal.bench.trade.prospects import without_prospect
-        from scissorcal.bench.trade.schedule import Schedule
-        from scissorcal.bench.trade.study import (
-            PRESENT_TASK,
-            key_of,
-            knob_of,
-            setting_of,
-            tasks_of,
-        )
-        from scissorcal.bench.trade.together import TOGETHER, Together
-
         together = Together(())
         present = together.settings(self._case)[0]
-        tasks = tasks_of(self._case, names)
-        known = {key_of(record) for record in self._known()}
-        left = [task for task in tasks if task.key not in known]
-        expected = {}
-        for task in tasks:
-            knob = knob_of(task)
-            setting = setting_of(knob, self._case, task.label)
-            expected[task] = knob.expected_s(self._case, setting)
-        schedule = Schedule(left, expected, self._deadline)
-        for record in self._known():
-            schedule.learn(record)
+        schedule = self._schedule(tasks_of(self._case, names), self._known())
+        planned = len(schedule.left)
 
         def reserve() -> float:
             # without the present fits there is nothing to compare all settings at once with
@@ -215,8 +181,8 @@ class _Run:
 
         order()
         before = self.made
-        self._work(pool, schedule, len(left), order)
-        if not self._file.records and self._budget_s is not None and left and not keep_time:
+        self._work(pool, schedule, order)
+        if not self._file.records and self._budget_s is not None and planned and not keep_time:
             fixed = self._budget_s - (self._deadline or 0.0) + self._began
             least = max(fixed + 2.0 * schedule.least_s(), 3.0 * self._budget_s)
             raise InputError(
@@ -230,11 +196,6 @@ class _Run:
 
         The present settings come before all others, which are compared with them in pairs.
         """
-        from scissorcal.bench.trade.assemble import refits
-        from scissorcal.bench.trade.knob import make_knob
-        from scissorcal.bench.trade.prospects import to_simulate
-        from scissorcal.bench.trade.study import capture_tasks
-
         if self._case.friction_fit is None:
             return
         if any(refits(make_knob(name)) for name in names):
@@ -244,29 +205,31 @@ class _Run:
             if not self._captured(pool, sorted(tasks, key=lambda task: task.repeat)):
                 return
 
-    def _captured(self, pool: Pool, tasks: "Sequence[Task]") -> bool:
+    def _captured(self, pool: Pool, tasks: Sequence[Task]) -> bool:
         """Measure simulated captures that have no record yet; whether any was."""
-        from scissorcal.bench.trade.schedule import Schedule
-        from scissorcal.bench.trade.study import key_of, knob_of, setting_of
-
         known = {key_of(record) for record in self._records}
         left = [task for task in tasks if task.key not in known]
-        expected = {}
-        for task in left:
-            knob = knob_of(task)
-            expected[task] = knob.expected_s(self._case, setting_of(knob, self._case, task.label))
-        schedule = Schedule(left, expected, self._deadline, share=1.0)
-        for record in self._known():
-            schedule.learn(record)
         before = self.made
-        self._work(pool, schedule, len(left))
+        self._work(pool, self._schedule(left, (), share=1.0))
         return self.made > before
 
-    def curves(self, names: Sequence[str]) -> "tuple[Curve, ...]":
-        """The curves of the knobs named, from all records; of those left out, why."""
-        from scissorcal.bench.trade.assemble import curve_of, limit_of
-        from scissorcal.bench.trade.knob import make_knob
+    def _schedule(
+        self, tasks: Sequence[Task], records: Sequence[Record], **limits: Any
+    ) -> Schedule:
+        """The tasks that none of the records is of, with what all known records tell of times."""
+        known = {key_of(record) for record in records}
+        expected = {}
+        for task in tasks:
+            knob = knob_of(task)
+            expected[task] = knob.expected_s(self._case, setting_of(knob, self._case, task.label))
+        left = [task for task in tasks if task.key not in known]
+        schedule = Schedule(left, expected, self._deadline, **limits)
+        for record in self._known():
+            schedule.learn(record)
+        return schedule
 
+    def curves(self, names: Sequence[str]) -> tuple[Curve, ...]:
+        """The curves of the knobs named, from all records; of those left out, why."""
         case, limit = self._case, limit_of(self._case)
         found = []
         for name in names:
@@ -277,18 +240,11 @@ class _Run:
             found.append(curve)
         return tuple(found)
 
-    def together(self, pool: Pool, curves: "Sequence[Curve]") -> "Curve | None":
+    def together(self, pool: Pool, curves: Sequence[Curve]) -> Curve | None:
         """Measure the present and all recommended settings.
 
         None where they are the same, but for settings that this measurement does not hold.
         """
-        from scissorcal.bench.trade.assemble import measured_curve, reference_of
-        from scissorcal.bench.trade.knob import make_knob
-        from scissorcal.bench.trade.recommend import choices_of, together_sentence
-        from scissorcal.bench.trade.schedule import Schedule
-        from scissorcal.bench.trade.study import PRESENT_TASK, Task, key_of
-        from scissorcal.bench.trade.together import RECOMMENDED, TOGETHER, Together
-
         effort = make_knob("effort")
         reference, against = reference_of(self._case, effort, self._of("effort"))
         choices = choices_of(curves)
@@ -305,39 +261,24 @@ class _Run:
             if not make_knob(name).combined
         ]
         tasks = [PRESENT_TASK, Task(TOGETHER, RECOMMENDED, choices=changed)]
-        known = {key_of(record) for record in self._known()}
-        left = [task for task in tasks if task.key not in known]
-        knob = Together(changed)
-        expected = {
-            task: knob.expected_s(self._case, setting)
-            for task in tasks
-            for setting in knob.settings(self._case)
-            if setting.label == task.label
-        }
         # nothing else waits for the time that is left, so it is used even where it may not do
-        schedule = Schedule(left, expected, self._deadline, share=STRETCH, stretch=STRETCH)
-        for record in self._known():
-            schedule.learn(record)
-        self._work(pool, schedule, len(left))
+        schedule = self._schedule(tasks, self._known(), share=STRETCH, stretch=STRETCH)
+        self._work(pool, schedule)
         keys = {task.key for task in tasks}
         own = [record for record in self._of(TOGETHER) if key_of(record) in keys]
-        curve = measured_curve(self._case, knob, own, reference)
+        curve = measured_curve(self._case, Together(changed), own, reference)
         sentences = (together_sentence(curve, apart),)
         return replace(curve, against=against, sentences=sentences) if own else None
 
     def result(
         self,
         engine: Engine,
-        curves: "tuple[Curve, ...]",
-        together: "Curve | None",
+        curves: tuple[Curve, ...],
+        together: Curve | None,
         seconds: float,
         workers: int,
-    ) -> "Trade":
+    ) -> Trade:
         """Everything that was found, with the sentences that it ends in."""
-        from scissorcal.bench.trade.assemble import limit_of
-        from scissorcal.bench.trade.point import Quantity, Spread
-        from scissorcal.bench.trade.result import FORMAT, Trade
-
         records = self._records
         sentences = [
             f"{curve.title}: {curve.sentences[0]}"
@@ -378,28 +319,23 @@ class _Run:
         )
 
     def _of(self, name: str) -> list[Record]:
-        from scissorcal.bench.trade.study import records_of
-
         return records_of(self._case, name, self._records)
 
     def _work(
         self,
         pool: Pool,
-        schedule: "Schedule",
-        count: int,
+        schedule: Schedule,
         learned: Callable[[], None] = lambda: None,
     ) -> None:
         """Make measurements, keep each, and call ``learned`` after it.
 
         Within a budget no worker is handed a second one.
         """
-        from scissorcal.bench.trade.study import key_of
-
         jobs = (
             (self._blob, task, self._deadline and self._deadline - schedule.reserve())
             for task in schedule
         )
-        done = 0
+        done, count = 0, len(schedule.left)
 
         def keep(record: Record | None) -> None:
             nonlocal done
@@ -418,32 +354,16 @@ class _Run:
             self._tell(share, f"{record['knob']}: {record['label']}")
 
         handed = pool if self._deadline is None else replace(pool, ahead=1)
-        try:
-            handed.work(_do, jobs, keep, dict[str, Any] | None)
-        except ModuleNotFoundError as error:
-            raise InputError(
-                f"The cluster's workers lack {error.name}: install this version of scissorcal "
-                "where they run."
-            ) from error
+        handed.work(_do, jobs, keep, dict[str, Any] | None)
 
 
-def _do(job: "tuple[bytes, Task, float | None]") -> Record | None:
-    from scissorcal.bench.trade.study import run_task
-
+def _do(job: tuple[bytes, Task, float | None]) -> Record | None:
     blob, task, end = job
-    record = run_task(_unpacked(blob), task, end)
+    record = run_task(unpacked(blob), task, end)
     return record and {**record, "machine": machine()}
 
 
 def _forced(record: Record, names: Sequence[str]) -> bool:
     """Whether a record is of one of the knobs named, or of the settings that they have now."""
-    from scissorcal.bench.trade.knob import PRESENT_ALIKE
-    from scissorcal.bench.trade.study import PRESENT_TASK, key_of
-
     alike = key_of(record) == PRESENT_TASK.key and any(name in PRESENT_ALIKE for name in names)
     return not names or record["knob"] in names or alike
-
-
-@lru_cache(maxsize=2)
-def _unpacked(blob: bytes) -> Any:
-    return pickle.loads(blob)

@@ -5,21 +5,24 @@ import platform
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from scissorcal.bench.trade import knob as knobs
+from scissorcal.bench.trade.case import Case, Photographed
+from scissorcal.bench.trade.knob import make_knob, scene_knobs
+from scissorcal.bench.trade.models import held_law, nothing_rendered
+from scissorcal.calibration.store import load
+from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError
 from scissorcal.identity import VERSION, digest
+from scissorcal.kernel import Capability
+from scissorcal.recording import Recording
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.envelope import plain
+from scissorcal.workday.photographs import BladeSetup, photo_captures
 from scissorcal.workday.recordings import used_recordings
-from scissorcal.workday.runs.bench_photographs import with_photographs
 from scissorcal.workday.runs.cut import edge_of_photographs
-from scissorcal.workday.runs.fit import load_result
+from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.workspace import FitKind
-
-if TYPE_CHECKING:
-    from scissorcal.bench.trade.case import Case, Photographed
-    from scissorcal.recording import Recording
 
 ALGORITHM = 4
 """Raised whenever a measurement of the same inputs would mean something else."""
@@ -33,14 +36,11 @@ ON_A_CLUSTER = (
 )
 
 
-def load_case(engine: Engine, seed: int = 0) -> "Case":
+def load_case(engine: Engine, seed: int = 0) -> Case:
     """What a workspace gives to a benchmark: recipe, used recordings and current fits.
 
     Raises MissingError with the command that must come first.
     """
-    from scissorcal.bench.trade.case import Case
-    from scissorcal.bench.trade.models import held_law, nothing_rendered
-
     kinds: tuple[FitKind, ...] = ("friction", "cut")
     needed = [kind for kind in kinds if engine.needed(f"fit {kind}")]
     if not needed:
@@ -69,21 +69,17 @@ def load_case(engine: Engine, seed: int = 0) -> "Case":
     )
     if case.cut_fit is not None and not nothing_rendered(case):
         case = replace(case, held=held_law(case, case.cut_fit, case.friction_fit))
-    return with_photographs(case, engine)
+    return _with_photographs(case, engine)
 
 
-def wanted_knobs(
-    case: "Case", wanted: Sequence[str], *, on_cluster: bool = False
-) -> tuple[str, ...]:
+def wanted_knobs(case: Case, wanted: Sequence[str], *, on_cluster: bool = False) -> tuple[str, ...]:
     """The knobs to measure, less `LOCAL_KNOBS` on a cluster.
 
     InputError for one that is unknown, that the scene does not have, or that no cluster measures.
     """
-    from scissorcal.bench.trade.knob import KNOBS, make_knob, scene_knobs
-
     for name in wanted:
-        if name not in KNOBS:
-            raise InputError(f"--knob {name} is no knob; choose from {', '.join(KNOBS)}.")
+        if name not in knobs.KNOBS:
+            raise InputError(f"--knob {name} is no knob; choose from {', '.join(knobs.KNOBS)}.")
         if why := make_knob(name).missing(case):
             raise InputError(f"--knob {name}: this scene does not have it. {why}")
         if on_cluster and name in LOCAL_KNOBS:
@@ -94,9 +90,6 @@ def wanted_knobs(
 
 def coverage_notes(engine: Engine) -> list[str]:
     """What trust checks of this workspace found of the intervals' coverage, where there are any."""
-    from scissorcal.calibration.store import load
-    from scissorcal.calibration.verify.result import VerifyResult
-
     found = []
     for name in ("verify friction", "verify cut"):
         if engine.needed(name) and engine.state(name).state in ("done", "failed"):
@@ -124,13 +117,13 @@ def machine() -> str:
     return f"{name}, {os.cpu_count()} cores, {platform.system()}"
 
 
-def inputs_hash(engine: Engine, case: "Case") -> str:
+def inputs_hash(engine: Engine, case: Case) -> str:
     """Identity of all that a measurement depends on, this computer among it.
 
     Recordings, fits and photographs count by their content, wherever their files stand.
     """
 
-    def taken(one: "Photographed") -> object:
+    def taken(one: Photographed) -> object:
         return plain(replace(one, paths=())), [engine.index.digest(path) for path in one.paths]
 
     by_content = {
@@ -156,7 +149,24 @@ def inputs_hash(engine: Engine, case: "Case") -> str:
     )
 
 
-def _virtual(recording: "Recording") -> bool:
-    from scissorcal.kernel import Capability
-
+def _virtual(recording: Recording) -> bool:
     return bool(int(recording.device.get("capabilities", 0)) & Capability.SIMULATOR)
+
+
+def _with_photographs(case: Case, engine: Engine) -> Case:
+    """The case with the workspace's photographs of the blade and the plate, and its camera.
+
+    Of the plate only the newest capture counts, as in its fit. A camera counts where its fit is
+    current. Raises InputError where a capture's index is damaged.
+    """
+    blades = []
+    for capture in photo_captures(engine.workspace, "blade"):
+        setup = capture.index.blade or BladeSetup()
+        paths = tuple(capture.path(photograph) for photograph in capture.index.photographs)
+        blades.append(Photographed(paths, case.simulated, **setup.model_dump()))
+    plate = None
+    for capture in photo_captures(engine.workspace, "plate")[-1:]:
+        paths = tuple(capture.path(photograph) for photograph in capture.index.photographs)
+        plate = Photographed(paths, case.simulated)
+    camera = load_result(engine, "camera").camera if available(engine, ["camera"]) else None
+    return replace(case, photographs=tuple(blades), camera=camera, plate=plate)

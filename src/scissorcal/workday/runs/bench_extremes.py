@@ -3,34 +3,34 @@
 import json
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from pydantic import TypeAdapter
 
 from scissorcal.aliases import Progress
+from scissorcal.bench.extremes.compare import (
+    compare_kernel,
+    compare_model,
+    compare_package,
+    strokes,
+)
+from scissorcal.bench.extremes.states import package_states
 from scissorcal.files import replacing
 from scissorcal.identity import VERSION
-
-if TYPE_CHECKING:
-    from scissorcal.package import ModelPackage
-    from scissorcal.report.panel import Panel
+from scissorcal.package import ModelPackage
+from scissorcal.report.extremes import extremes_panels
+from scissorcal.report.html import panels_page
+from scissorcal.report.panel import Panel
 
 FORMAT = "scissorcal-extremes/2"
 
 
 def run_extremes(
-    package: "ModelPackage", folder: Path, *, size: float, seed: int, progress: Progress
-) -> "tuple[list[Panel], tuple[Path, Path]]":
+    package: ModelPackage, folder: Path, *, size: float, seed: int, progress: Progress
+) -> tuple[list[Panel], tuple[Path, Path]]:
     """Try a package and write extremes.html and extremes.json into ``folder``: panels, and paths.
 
     The same package, size and seed try the same states.
     """
-    from pydantic import TypeAdapter
-
-    from scissorcal.bench.extremes.compare import compare_kernel, compare_model, compare_package
-    from scissorcal.bench.extremes.long_runs import strokes
-    from scissorcal.bench.extremes.states import package_states
-    from scissorcal.report.extremes import extremes_page, extremes_panels
-    from scissorcal.report.panel import Panel
-
     manifest, tables = package.manifest, package.tables
     scene = manifest.ranges.opening_rad, manifest.ranges.contact_m[0]
     states, tried = package_states(package, size, seed), []
@@ -48,15 +48,21 @@ def run_extremes(
         "seed": seed,
         "states": len(states),
     }
-    said = (
-        f"{len(states)} states of the package {manifest.name} ({manifest.content_hash[:12]}), seed "
-        f"{seed}. Made {now:%Y-%m-%d %H:%M %Z} by scissorcal {VERSION}."
+    package_words = f"the package {manifest.name} ({manifest.content_hash[:12]})"
+    shown = {"tried": f"{len(states)} states of {package_words}, seed {seed}"}
+    page = panels_page(
+        "Numerical stability",
+        "The extremes",
+        panels,
+        made=(now, VERSION),
+        facts=shown,
+        findings=[panels[0].sentence],
     )
     plain = TypeAdapter(list[Panel]).dump_python(panels, mode="json", exclude_defaults=True)
     twin = json.dumps(facts | {"panels": plain}, ensure_ascii=False, allow_nan=False) + "\n"
     folder.mkdir(parents=True, exist_ok=True)
     html, twin_path = folder / "extremes.html", folder / "extremes.json"
-    for path, text in ((twin_path, twin), (html, extremes_page(panels, said))):
+    for path, text in ((twin_path, twin), (html, page)):
         with replacing(path) as part:
             part.write_text(text, encoding="utf-8")
     return panels, (html, twin_path)

@@ -3,11 +3,24 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+from scissorcal.aliases import Progress
+from scissorcal.calibration.camera.checks import verdict_there
+from scissorcal.calibration.camera.result import CameraFit
+from scissorcal.calibration.edge.checks import CAMERA, pair_verdicts
+from scissorcal.calibration.edge.fit import Blade, fit_blade
+from scissorcal.calibration.edge.result import BladeFit, BladeResult, SeenPair
+from scissorcal.calibration.fit_pictures import edge_picture
 from scissorcal.errors import InputError
 from scissorcal.verdicts import Verdict
+from scissorcal.vision.blade.photo import BladePhoto, Laid, by_blade, photograph_laid
+from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.overlay import write_picture
+from scissorcal.vision.photo import Photo, read_photo
 from scissorcal.vision.targets.boards import BLADE_MAT
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.photographs import (
     BladeSetup,
     PhotoCapture,
@@ -16,17 +29,8 @@ from scissorcal.workday.photographs import (
     photo_captures,
     take_photographs,
 )
+from scissorcal.workday.runs.fit import Made, Request, load_result
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.aliases import Progress
-    from scissorcal.calibration.camera.result import CameraFit
-    from scissorcal.calibration.edge.result import BladeFit, SeenPair
-    from scissorcal.vision.blade.photo import BladePhoto
-    from scissorcal.vision.geometry.camera import Camera
-    from scissorcal.vision.photo import Photo
-    from scissorcal.workday.engine import Engine
-    from scissorcal.workday.runs.fit import Made, Request
 
 STREAM = 3
 
@@ -42,12 +46,10 @@ def capture_blade(
     One that cannot be used is left out with its reason. Raises InputError, and keeps nothing, where
     none is left.
     """
-    from scissorcal.workday.engine import Engine
-
     engine = Engine.of(workspace)
     _refuse_other_setup(photo_captures(workspace, "blade"), setup)
 
-    def look(path: Path, photo: "Photo") -> Seen:
+    def look(path: Path, photo: Photo) -> Seen:
         found = _measured(engine, photo, setup)
         if not found.measured:
             raise InputError(
@@ -59,17 +61,13 @@ def capture_blade(
     return take_photographs(workspace, "blade", paths, look, tell, blade=setup)
 
 
-def fit(engine: "Engine", request: "Request") -> "Made":
+def fit(engine: Engine, request: Request) -> Made:
     """Fit the edge to all photographs of the blade; draw it over each of them.
 
     Uses the workspace's camera where there is one.
     """
-    from scissorcal.calibration.edge.checks import pair_verdicts
-    from scissorcal.calibration.edge.result import BladeResult
-    from scissorcal.workday.runs.fit import Made
-
     captures = photo_captures(engine.workspace, "blade")
-    seen = _all_measured(engine, captures, request.progress)
+    seen = _all_measured(engine, captures, request.run.tell)
     fits = _fits(seen, captures, engine, request)
     openings = tuple(_pair(one) for one in seen if one.scissors is not None)
     sources = tuple(one.photo.source for one in seen)
@@ -78,9 +76,7 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     return Made(result, lambda folder: _draw(seen, fits, folder))
 
 
-def _pair(one: "BladePhoto") -> "SeenPair":
-    from scissorcal.calibration.edge.result import SeenPair
-
+def _pair(one: BladePhoto) -> SeenPair:
     opening = one.scissors.opening if one.scissors else 0.0
     if one.lengths is None:
         return SeenPair(one.photo.source, opening)
@@ -90,37 +86,28 @@ def _pair(one: "BladePhoto") -> "SeenPair":
     )
 
 
-def _measured(engine: "Engine", photo: "Photo", setup: BladeSetup) -> "BladePhoto":
-    from scissorcal.vision.blade.photo import Laid, photograph_laid
-
+def _measured(engine: Engine, photo: Photo, setup: BladeSetup) -> BladePhoto:
     scale = setup.scale_mm_per_px * 1e-3 if setup.scale_mm_per_px else None
     laid = Laid(setup.both, setup.mat, setup.edge_side, scale, setup.pivot_px)
     camera = _camera(engine) if setup.mat else None
     return photograph_laid(photo, camera, laid, engine.recipe.fit.blade.priors)
 
 
-def _camera(engine: "Engine") -> "Camera | None":
+def _camera(engine: Engine) -> Camera | None:
     """The workspace's camera, where it has one."""
     fitted = _camera_fit(engine)
     return None if fitted is None else fitted.camera
 
 
-def _camera_fit(engine: "Engine") -> "CameraFit | None":
-    from scissorcal.workday.runs.fit import load_result
-
+def _camera_fit(engine: Engine) -> CameraFit | None:
     if not engine.file("fit camera").is_file():
         return None
     fitted: CameraFit = load_result(engine, "camera")
     return fitted
 
 
-def _camera_verdicts(engine: "Engine", seen: Sequence["BladePhoto"]) -> tuple[Verdict, ...]:
+def _camera_verdicts(engine: Engine, seen: Sequence[BladePhoto]) -> tuple[Verdict, ...]:
     """How well the camera is known where the edges were; none where no fitted camera was used."""
-    import numpy as np
-
-    from scissorcal.calibration.camera.checks import verdict_there
-    from scissorcal.calibration.edge.checks import CAMERA
-
     fitted = _camera_fit(engine)
     edges = [(one.photo, own) for one in seen for own in one.measured if own.metric]
     mats = any(capture.index.board for capture in photo_captures(engine.workspace, "blade"))
@@ -146,10 +133,8 @@ def _refuse_other_setup(before: Sequence[PhotoCapture], setup: BladeSetup) -> No
 
 
 def _all_measured(
-    engine: "Engine", captures: Sequence[PhotoCapture], tell: "Progress"
-) -> tuple["BladePhoto", ...]:
-    from scissorcal.vision.photo import read_photo
-
+    engine: Engine, captures: Sequence[PhotoCapture], tell: Progress
+) -> tuple[BladePhoto, ...]:
     seen: list[BladePhoto] = []
     count = sum(len(capture.index.photographs) for capture in captures)
     for capture in captures:
@@ -162,16 +147,11 @@ def _all_measured(
 
 
 def _fits(
-    seen: Sequence["BladePhoto"],
+    seen: Sequence[BladePhoto],
     captures: Sequence[PhotoCapture],
-    engine: "Engine",
-    request: "Request",
-) -> tuple["BladeFit", ...]:
-    import numpy as np
-
-    from scissorcal.calibration.edge.fit import Blade, fit_blade
-    from scissorcal.vision.blade.photo import by_blade
-
+    engine: Engine,
+    request: Request,
+) -> tuple[BladeFit, ...]:
     lengths = [c.index.blade.length_mm for c in captures if c.index.blade]
     known = next((1e-3 * length for length in lengths if length), None)
     sides = by_blade(seen)
@@ -184,7 +164,7 @@ def _fits(
     for index, (name, measured) in enumerate(sides.items()):
 
         def part(done: float, sentence: str, index: int = index, name: str = name) -> None:
-            request.progress(0.6 + 0.4 * (index + done) / len(sides), f"{name}: {sentence}")
+            request.run.tell(0.6 + 0.4 * (index + done) / len(sides), f"{name}: {sentence}")
 
         fits.append(
             fit_blade(
@@ -199,10 +179,7 @@ def _fits(
     return tuple(fits)
 
 
-def _draw(seen: Sequence["BladePhoto"], fits: Sequence["BladeFit"], folder: Path) -> None:
-    from scissorcal.calibration.fit_pictures import edge_picture
-    from scissorcal.vision.overlay import write_picture
-
+def _draw(seen: Sequence[BladePhoto], fits: Sequence[BladeFit], folder: Path) -> None:
     by_name = {found.name: found for found in fits}
     for number, one in enumerate(seen, start=1):
         name = f"{number:03d}-{Path(one.photo.source).stem}.png"

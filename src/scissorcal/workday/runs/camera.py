@@ -3,12 +3,26 @@
 from collections.abc import Callable, Iterable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+from scissorcal.calibration.camera.bundle import SeenBoard
+from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera, imported_camera, seen_board
+from scissorcal.calibration.camera.result import CameraFit
+from scissorcal.calibration.fit_pictures import left_over, residual_chart, uncertainty_chart
 from scissorcal.errors import InputError
-from scissorcal.vision.overlay import ViewCoverage, detection_words
+from scissorcal.vision.camera_files import CameraFile, read_camera_file
+from scissorcal.vision.overlay import (
+    ViewCoverage,
+    detection_overlay,
+    detection_words,
+    residual_overlay,
+    write_picture,
+)
 from scissorcal.vision.photo import Photo, PictureShape, read_photo, same_shape
 from scissorcal.vision.targets.boards import CharucoBoard, Chessboard
+from scissorcal.vision.targets.detect import find_board
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import save_version
 from scissorcal.workday.photographs import (
     PhotoCapture,
@@ -18,15 +32,8 @@ from scissorcal.workday.photographs import (
     photo_captures,
     take_photographs,
 )
+from scissorcal.workday.runs.fit import Made, Request
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.calibration.camera.bundle import SeenBoard
-    from scissorcal.calibration.camera.fit import CameraPhoto
-    from scissorcal.calibration.camera.result import CameraFit
-    from scissorcal.vision.camera_files import CameraFile
-    from scissorcal.workday.engine import Engine
-    from scissorcal.workday.runs.fit import Made, Request
 
 CameraBoard = CharucoBoard | Chessboard
 
@@ -49,9 +56,6 @@ def capture_camera(
     board, or has another size than those before it, is left out with its reason. Raises InputError,
     and keeps nothing, where none is left.
     """
-    from scissorcal.vision.overlay import detection_overlay, write_picture
-    from scissorcal.vision.targets.detect import find_board
-
     before = photo_captures(workspace, "camera")
     _refuse_other_board(before, board)
     coverage = _coverage_of(before)
@@ -73,16 +77,11 @@ def capture_camera(
     return taken, coverage
 
 
-def fit(engine: "Engine", request: "Request") -> "Made":
+def fit(engine: Engine, request: Request) -> Made:
     """Fit the camera to all photographs of boards; draw residuals and uncertainty.
 
     Both are charts of matplotlib; a note replaces them where that is not installed.
     """
-    import numpy as np
-
-    from scissorcal.calibration.camera.fit import fit_camera, seen_board
-    from scissorcal.workday.runs.fit import Made
-
     captures = photo_captures(engine.workspace, "camera")
     photos = _photos(captures)
     rng = np.random.default_rng([request.seed, STREAM])
@@ -92,7 +91,7 @@ def fit(engine: "Engine", request: "Request") -> "Made":
         rng=rng,
         priors=priors,
         inputs_hash=request.inputs_hash,
-        progress=request.progress,
+        progress=request.run.tell,
     )
     boards = [seen_board(photo.name, photo.detection, priors) for photo in photos]
     charts = find_spec("matplotlib") is not None
@@ -103,15 +102,12 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     )
 
 
-def import_camera(engine: "Engine", file: Path) -> tuple["CameraFit", "CameraFile", Path]:
+def import_camera(engine: Engine, file: Path) -> tuple[CameraFit, CameraFile, Path]:
     """Import a camera file of OpenCV, ROS or Kalibr as the workspace's camera.
 
     Raises InputError where the file is none, or the workspace has photographs of a board: a fit to
     them states its uncertainty, and a file does not.
     """
-    from scissorcal.calibration.camera.fit import imported_camera
-    from scissorcal.vision.camera_files import read_camera_file
-
     if photo_captures(engine.workspace, "camera"):
         raise InputError(
             f"{engine.workspace.captures_dir} has photographs for the camera, so {file} was not "
@@ -147,9 +143,7 @@ def _coverage_of(captures: Sequence[PhotoCapture]) -> ViewCoverage:
     return coverage
 
 
-def _photos(captures: Sequence[PhotoCapture]) -> list["CameraPhoto"]:
-    from scissorcal.calibration.camera.fit import CameraPhoto
-
+def _photos(captures: Sequence[PhotoCapture]) -> list[CameraPhoto]:
     return [
         CameraPhoto(photo.source, photo.width, photo.height, detection_of(capture, photo))
         for capture in captures
@@ -158,21 +152,14 @@ def _photos(captures: Sequence[PhotoCapture]) -> list["CameraPhoto"]:
 
 
 def _draw(
-    found: "CameraFit",
-    boards: Sequence["SeenBoard"],
+    found: CameraFit,
+    boards: Sequence[SeenBoard],
     captures: Sequence[PhotoCapture],
     folder: Path,
     *,
     charts: bool,
 ) -> None:
     """Draw the worst photographs, and charts of residuals and uncertainty where ``charts``."""
-    from scissorcal.calibration.fit_pictures import (
-        left_over,
-        residual_chart,
-        uncertainty_chart,
-    )
-    from scissorcal.vision.overlay import residual_overlay, write_picture
-
     if charts:
         residual_chart(found, boards, folder / "residuals.png")
         uncertainty_chart(found, folder / "uncertainty.png")

@@ -1,10 +1,14 @@
 """Take a capture into a workspace: rig, recording, and what is kept when something goes wrong."""
 
 import shutil
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, NamedTuple
 
+from scissorcal.calibration.design.state import fitted_cut
+from scissorcal.device.capture import CaptureReport, capture, capture_by_parts, open_writer, planned
+from scissorcal.device.session import Operator, RigSession
+from scissorcal.device.trajectory import refuse_without_motor
 from scissorcal.errors import InputError
 from scissorcal.recipe.load import parse_recipe, read_text, with_designed_captures
 from scissorcal.recipe.requirements import (
@@ -14,26 +18,25 @@ from scissorcal.recipe.requirements import (
     refuse_long,
     requirements,
 )
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording import Recording
+from scissorcal.recording.header import UNTIL_MARK, UntilMark
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import CaptureOptions, RigOptions
+from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.rigs import open_session
+from scissorcal.workday.runs.cut import edge_of_photographs
 from scissorcal.workday.runs.design import designed_for
+from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.runs.probe import ensure_probed, last_probe
 from scissorcal.workday.runs.sweep_speeds import (
     sliding_below_encoder,
     sweep_bounds,
     with_usable_sweeps,
 )
+from scissorcal.workday.stock import seconds_at_rig
+from scissorcal.workday.until import Earlier, Limits, UntilTolerance
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.device.capture import CaptureReport
-    from scissorcal.device.session import Operator, RigSession
-    from scissorcal.recipe.schema import Recipe
-    from scissorcal.recording import Recording
-    from scissorcal.recording.header import UntilMark
-    from scissorcal.workday.engine import Engine
-    from scissorcal.workday.until import Earlier
-
 
 ADVANCE: Literal["friction-advance"] = "friction-advance"
 
@@ -43,17 +46,16 @@ THEN = (
 )
 
 
-@dataclass(frozen=True)
-class Captured:
+class Captured(NamedTuple):
     """A finished capture: its file, its report, and the rig it was taken from.
 
     ``until`` says how far a capture until the tolerance got.
     """
 
     path: Path
-    report: "CaptureReport"
+    report: CaptureReport
     rig: str
-    until: "UntilMark | None" = None
+    until: UntilMark | None = None
 
 
 def capture_into(
@@ -61,7 +63,7 @@ def capture_into(
     kind: CaptureKind,
     rig: RigOptions,
     options: CaptureOptions = CaptureOptions(),
-    operator: "Operator | None" = None,
+    operator: Operator | None = None,
 ) -> Captured:
     """Record friction or cuts from a rig into captures/<kind>-<stamp>.mcap.
 
@@ -76,10 +78,6 @@ def capture_into(
     without an advance motor or without travel, before anything moves; MissingError where one until
     the tolerance lacks a fit that it builds on; and what the capture itself raises.
     """
-    from scissorcal.device.capture import capture, open_writer, planned
-    from scissorcal.device.trajectory import refuse_without_motor
-    from scissorcal.workday.engine import Engine
-
     _refuse_at_odds(kind, options)
     recipe = workspace.recipe()
     if kind != ADVANCE and not requirements(recipe).needs_capture(kind):
@@ -139,8 +137,8 @@ def _refuse_at_odds(kind: CaptureKind, options: CaptureOptions) -> None:
 
 
 def _with_captures(
-    workspace: Workspace, session: "RigSession", kind: CaptureKind, options: CaptureOptions
-) -> "RigSession":
+    workspace: Workspace, session: RigSession, kind: CaptureKind, options: CaptureOptions
+) -> RigSession:
     """The session whose recipe lists what is captured now: as designed, and as the rig can."""
     recipe, say = session.recipe, session.operator.say
     if kind == ADVANCE:
@@ -161,7 +159,7 @@ def _with_captures(
     return session
 
 
-def _with_list(workspace: Workspace, session: "RigSession", recipe: "Recipe") -> "RigSession":
+def _with_list(workspace: Workspace, session: RigSession, recipe: Recipe) -> RigSession:
     """The session with another list of captures in its recipe, and in the recipe's text."""
     text = with_designed_captures(recipe, session.recipe_toml)
     parsed = parse_recipe(text, str(workspace.recipe_path), judged=False)
@@ -169,29 +167,25 @@ def _with_list(workspace: Workspace, session: "RigSession", recipe: "Recipe") ->
 
 
 def _capture_until(
-    session: "RigSession",
+    session: RigSession,
     kind: DesignedKind,
     path: Path,
     options: CaptureOptions,
-    earlier: "Earlier",
-) -> "tuple[CaptureReport, UntilMark]":
+    earlier: Earlier,
+) -> tuple[CaptureReport, UntilMark]:
     """Record strokes until the band of the torque is within the scene's tolerance.
 
     After each stroke the recording gets a mark with how far it is: the last one of an interrupted
     capture shows that the tolerance was not reached.
     """
-    from scissorcal.device.capture import capture_by_parts, open_writer, planned
-    from scissorcal.recording.header import UNTIL_MARK
-    from scissorcal.workday.stock import seconds_at_rig
-    from scissorcal.workday.until import Limits, UntilTolerance
-
     recipe, identity = session.recipe, session.identity
     minutes = options.max_minutes
     if minutes is None:
         minutes = seconds_at_rig(recipe, planned(recipe, identity, kind)) / 60.0
     limits = Limits(minutes, options.at_least)
     if kind == "friction":
-        limits = replace(limits, slowest_sweep=sweep_bounds(recipe, identity, session.probe)[1])
+        slowest = sweep_bounds(recipe, identity, session.probe)[1]
+        limits = limits._replace(slowest_sweep=slowest)
     choice = UntilTolerance(kind, recipe, identity, earlier, limits)
     with open_writer(session, kind, path, by_parts=True) as writer:
 
@@ -208,15 +202,10 @@ def _capture_until(
     return report, choice.marks[-1]
 
 
-def _earlier(engine: "Engine", kind: DesignedKind) -> "Earlier":
+def _earlier(engine: Engine, kind: DesignedKind) -> Earlier:
     """The fits that are current and their recordings; a cut needs the fit of friction."""
-    from scissorcal.calibration.design.state import fitted_cut
-    from scissorcal.workday.recordings import used_recordings
-    from scissorcal.workday.runs.cut import edge_of_photographs
-    from scissorcal.workday.runs.fit import available, load_result
-    from scissorcal.workday.until import Earlier
 
-    def used(what: DesignedKind) -> "tuple[Recording, ...]":
+    def used(what: DesignedKind) -> tuple[Recording, ...]:
         there = any(row.use == "used" for row in engine.recordings(what))
         recordings = used_recordings(engine.workspace, engine.recipe, what, engine.index)
         return recordings if there else ()

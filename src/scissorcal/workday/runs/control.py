@@ -3,12 +3,26 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+from scissorcal.calibration.result import FitResult
+from scissorcal.control.control_result import ControlResult
+from scissorcal.control.follow import Job, control
+from scissorcal.control.mechanics import FASTEST_rad_per_s, RigMechanics
+from scissorcal.control.path_file import SurfacePoints, read_path
+from scissorcal.control.settings import Material, ask_for_plate
+from scissorcal.device.session import Operator, RigSession, rig_facts
 from scissorcal.errors import InputError, MissingError
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import PATH
+from scissorcal.model.blade_point import BladePoint
+from scissorcal.model.edge import Edge
+from scissorcal.model.friction import FrictionLaw, friction_torque
 from scissorcal.recipe.euler_angles import quaternion_words
+from scissorcal.recipe.plate_surface import plate_surface
+from scissorcal.recording import Joint, RecordingFacts, RecordingWriter
+from scissorcal.tracking.plate_pose import PoseSource, fixed_pose
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, ControlOptions, RigOptions
 from scissorcal.workday.runs.at_rig import RigRun, RigTask, run_at_rig
@@ -16,19 +30,8 @@ from scissorcal.workday.runs.cut import blade_edge
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.runs.friction import angle_centre, axis_of_fit
 from scissorcal.workday.tracking.stated_pose import stated_pose
+from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.calibration.result import FitResult
-    from scissorcal.control.control_result import ControlResult
-    from scissorcal.control.mechanics import RigMechanics
-    from scissorcal.control.path_file import SurfacePoints
-    from scissorcal.device.session import Operator, RigSession
-    from scissorcal.model.edge import Edge
-    from scissorcal.model.friction import FrictionLaw
-    from scissorcal.recording import RecordingWriter
-    from scissorcal.tracking.plate_pose import PoseSource
-    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
 LATE_TICKS = 2.0
 """Where no probe measured the delay: one tick for line and host, one for the motor."""
@@ -44,9 +47,9 @@ def control_workspace(
     workspace: Workspace,
     rig: RigOptions,
     options: ControlOptions,
-    operator: "Operator | None" = None,
-    source: "PoseSource | None" = None,
-) -> "RigRun[ControlResult]":
+    operator: Operator | None = None,
+    source: PoseSource | None = None,
+) -> RigRun[ControlResult]:
     """Press on the plate and follow a path with a rig.
 
     The plate stands where ``source`` says, or the options do. A person is asked for the plate
@@ -59,8 +62,6 @@ def control_workspace(
     twice or the camera does not go with the device, and what `scissorcal.control.follow.control`
     raises.
     """
-    from scissorcal.control.path_file import read_path
-
     engine = Engine.of(workspace)
     points = read_path(options.path_file).stated(options.force_N, 1e-3 * options.speed_mm_per_s)
     if source is not None and (options.pose is not None or options.camera != NONE):
@@ -92,21 +93,16 @@ class _ControlTask(RigTask["ControlResult"]):
     kind = "control"
     engine: Engine
     options: ControlOptions
-    points: "SurfacePoints"
+    points: SurfacePoints
     tracked: bool
-    fits: "tuple[FitResult, FitResult]"
-    edge: "Edge"
+    fits: tuple[FitResult, FitResult]
+    edge: Edge
 
-    def prepare(self, session: "RigSession") -> None:
-        from scissorcal.control.settings import ask_for_plate
-
+    def prepare(self, session: RigSession) -> None:
         if self.tracked:
             ask_for_plate(session)
 
-    def open_writer(self, session: "RigSession", path: Path) -> "RecordingWriter":
-        from scissorcal.device.session import rig_facts
-        from scissorcal.recording import Joint, RecordingFacts, RecordingWriter
-
+    def open_writer(self, session: RigSession, path: Path) -> RecordingWriter:
         identity, sign = session.identity, session.recipe.rig.motor_sign
         writer = RecordingWriter(
             path,
@@ -123,14 +119,10 @@ class _ControlTask(RigTask["ControlResult"]):
 
     def do(
         self,
-        session: "RigSession",
-        writer: "RecordingWriter | None",
-        source: "PoseSource | None",
-    ) -> "ControlResult":
-        from scissorcal.control.follow import Job, control
-        from scissorcal.control.settings import Material
-        from scissorcal.recipe.plate_surface import plate_surface
-
+        session: RigSession,
+        writer: RecordingWriter | None,
+        source: PoseSource | None,
+    ) -> ControlResult:
         assert source is not None
         recipe = session.recipe
         touch = recipe.plate.touch
@@ -158,10 +150,8 @@ class _ControlTask(RigTask["ControlResult"]):
         return f"as it was stated, ({place}) mm, {turn}"
 
 
-def _camera(engine: Engine, rig: RigOptions, options: ControlOptions) -> "TrackingCamera | None":
+def _camera(engine: Engine, rig: RigOptions, options: ControlOptions) -> TrackingCamera | None:
     """The camera that follows the plate; None without one."""
-    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
-
     if options.camera == NONE:
         return None
     if options.pose is not None:
@@ -169,11 +159,7 @@ def _camera(engine: Engine, rig: RigOptions, options: ControlOptions) -> "Tracki
     return TrackingCamera(engine, options.camera, rig)
 
 
-def _pose_source(engine: Engine, pose: str | None) -> "PoseSource":
-    import numpy as np
-
-    from scissorcal.tracking.plate_pose import fixed_pose
-
+def _pose_source(engine: Engine, pose: str | None) -> PoseSource:
     if pose is not None:
         stated = stated_pose(pose)
         return fixed_pose(stated.matrix, np.asarray(stated.translation_m))
@@ -192,17 +178,12 @@ def _pose_source(engine: Engine, pose: str | None) -> "PoseSource":
     )
 
 
-def _fits(engine: Engine) -> "tuple[FitResult, FitResult]":
+def _fits(engine: Engine) -> tuple[FitResult, FitResult]:
     """The fits of friction of both axes; MissingError with what to run."""
     return load_result(engine, "friction"), load_result(engine, "friction-advance")
 
 
-def _mechanics(
-    fits: "tuple[FitResult, FitResult]", edge: "Edge", session: "RigSession"
-) -> "RigMechanics":
-    from scissorcal.control.mechanics import RigMechanics
-    from scissorcal.model.blade_point import BladePoint
-
+def _mechanics(fits: tuple[FitResult, FitResult], edge: Edge, session: RigSession) -> RigMechanics:
     recipe, probe = session.recipe, session.probe
     assert probe is not None
     tick_s = session.identity.tick_us * 1e-6
@@ -220,13 +201,8 @@ def _mechanics(
     )
 
 
-def _sliding_sd(fit: "FitResult", law: "FrictionLaw") -> float:
+def _sliding_sd(fit: FitResult, law: FrictionLaw) -> float:
     """Standard deviation of the opening's friction while it slides slowly, N m."""
-    import numpy as np
-
-    from scissorcal.control.mechanics import FASTEST_rad_per_s
-    from scissorcal.model.friction import FrictionLaw, friction_torque
-
     rates, centre = SLOW * FASTEST_rad_per_s * np.array([-1.0, 1.0]), angle_centre(fit)
     drawn = {p.name: fit.draws[:, [i]] for i, p in enumerate(fit.parameters)}
     sliding = friction_torque(FrictionLaw.of_fit(drawn, centre), centre, rates)
@@ -234,7 +210,7 @@ def _sliding_sd(fit: "FitResult", law: "FrictionLaw") -> float:
     return math.hypot(float(np.std(sliding, axis=0).max()), LACK_OF_FIT * level)
 
 
-def _note(done: "ControlResult", pose_origin: str) -> str:
+def _note(done: ControlResult, pose_origin: str) -> str:
     figures = done.figures
     return (
         f"Followed {figures.way_mm:.1f} mm of path with {done.wanted_N:g} N, the plate standing "

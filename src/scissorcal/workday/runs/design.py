@@ -10,13 +10,15 @@ from scissorcal.foreign import read_foreign, reading
 from scissorcal.foreign.formats import STATE
 from scissorcal.identity import digest
 from scissorcal.recipe.requirements import DesignedKind
+from scissorcal.workday.engine import Engine
+from scissorcal.workday.recordings import used_recordings
+from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
     from scissorcal.calibration.design import CaptureList, Stock, TorqueKnowledge
     from scissorcal.kernel import Identity
     from scissorcal.recipe.schema import Recipe
-    from scissorcal.workday.engine import Engine
 
 FORMAT: Literal["scissorcal-capture-design/1"] = "scissorcal-capture-design/1"
 ASSUMED_RIG = (
@@ -87,7 +89,6 @@ def design_captures(workspace: Workspace, identity: "Identity | None" = None) ->
     a linear joint, which no capture drives, and what planning raises.
     """
     from scissorcal.calibration.design import choose_captures, expected_band, knowledge_after
-    from scissorcal.workday.engine import Engine
     from scissorcal.workday.stock import capture_stock, listed_captures
 
     engine = Engine.of(workspace)
@@ -102,7 +103,7 @@ def design_captures(workspace: Workspace, identity: "Identity | None" = None) ->
     listed = expected_band(known.plus(*information, new_recording=True))
     design = CaptureDesign(
         format=FORMAT,
-        inputs=inputs_of(engine),
+        inputs=_inputs_of(engine),
         tolerance=0.01 * recipe.scene.tolerance_percent,
         confidence=0.01 * recipe.scene.confidence_percent,
         rows=tuple(
@@ -143,7 +144,6 @@ def designed_for(
     itself: a person who captures all the same wants a recording.
     """
     from scissorcal.calibration.design.choice import first_captures
-    from scissorcal.workday.engine import Engine
     from scissorcal.workday.stock import capture_stock, designed_recipe
 
     engine = Engine.of(workspace)
@@ -158,7 +158,7 @@ def designed_for(
     return designed_recipe(engine.recipe, captures), sentence
 
 
-def stored_design(engine: "Engine") -> CaptureDesign | None:
+def stored_design(engine: Engine) -> CaptureDesign | None:
     """The list that was designed last, if it is for the recipe and the fits as they are now."""
     path = engine.workspace.design_path
     if not path.is_file():
@@ -170,10 +170,10 @@ def stored_design(engine: "Engine") -> CaptureDesign | None:
             found = TypeAdapter(CaptureDesign).validate_json(read_foreign(path, STATE))
     except InputError:
         return None  # of another version, or damaged: 'plan --explain' designs it again
-    return found if found.inputs == inputs_of(engine) else None
+    return found if found.inputs == _inputs_of(engine) else None
 
 
-def inputs_of(engine: "Engine") -> str:
+def _inputs_of(engine: Engine) -> str:
     """Identity of what a design is made from: the recipe, and the fits that are there."""
     fits = {what: engine.state(f"fit {what}").content for what in ("friction", "cut")}
     return digest({"format": FORMAT, "recipe": engine.recipe.model_dump(), "fits": fits})
@@ -186,7 +186,7 @@ def _chosen(known: "TorqueKnowledge", stock: "Stock") -> tuple["CaptureList", st
     return found.captures, found.sentence
 
 
-def _known(engine: "Engine") -> tuple["TorqueKnowledge", Any, tuple[str, ...]]:
+def _known(engine: Engine) -> tuple["TorqueKnowledge", Any, tuple[str, ...]]:
     """What is known of the torque, the states of friction and cut, and what was assumed."""
     from scissorcal.calibration.design.state import (
         expected_cut,
@@ -195,9 +195,7 @@ def _known(engine: "Engine") -> tuple["TorqueKnowledge", Any, tuple[str, ...]]:
         fitted_friction,
     )
     from scissorcal.package.scene_slopes import torque_knowledge
-    from scissorcal.workday.recordings import used_recordings
     from scissorcal.workday.runs.cut import edge_of_photographs
-    from scissorcal.workday.runs.fit import available, load_result
 
     recipe = engine.recipe
     if recipe.rig.joint == "linear":

@@ -4,39 +4,37 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Any
 
 from scissorcal.aliases import Progress
+from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
+from scissorcal.calibration.result import Effort, FitResult
+from scissorcal.calibration.store import load
 from scissorcal.errors import InputError, MissingError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine, refuse_other_fit
+from scissorcal.workday.options import FitOptions
 from scissorcal.workday.states import WAITING, StepState
 from scissorcal.workday.steps import BY_NAME, Step, steps_of
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.result import Effort
-    from scissorcal.workday.options import FitOptions
+    from scissorcal.calibration.fit_model import FitRun
 
 Stop = Callable[[], bool]
 
 
 @dataclass(frozen=True)
 class Request:
-    """How a fit is to be made: effort, seed, identity of its inputs, and who follows it.
+    """How a fit is to be made: effort, seed, identity of its inputs, and who follows its ``run``.
 
-    ``checkpoint`` is a file from which a thorough fit that was interrupted goes on, ``last_model``
-    the model that the stored fit chose, empty where there is none. ``stop`` says whether the time
-    allowed is used up, ``critic`` asks for the critic of friction at any effort.
+    ``critic`` asks for the critic of friction at any effort.
     """
 
-    effort: "Effort"
+    effort: Effort
     seed: int
     inputs_hash: str
-    checkpoint: Path
-    last_model: str
-    progress: Progress
-    stop: Stop
+    run: "FitRun"
     critic: bool = False
 
 
@@ -50,12 +48,6 @@ class Made:
     result: Any
     draw: Callable[[Path], None] | None = None
     notes: tuple[str, ...] = ()
-
-
-class FitModule(Protocol):
-    """What a module of runs/ gives for its fit: the computation."""
-
-    def fit(self, engine: Engine, request: Request) -> Made: ...
 
 
 @dataclass(frozen=True)
@@ -81,7 +73,7 @@ class FitOutcome:
 def fit_workspace(
     workspace: Workspace,
     wanted: Sequence[str] = (),
-    options: "FitOptions | None" = None,
+    options: FitOptions | None = None,
     *,
     progress: Progress | None = None,
     stop: Stop | None = None,
@@ -131,9 +123,7 @@ def steps_to_fit(engine: Engine, wanted: Sequence[str] = ()) -> list[Step]:
     return [step for step in steps_of("fit") if step.name in names]
 
 
-def for_step(
-    options: "FitOptions | None", step: Step, wanted: Sequence[str]
-) -> "FitOptions | None":
+def for_step(options: FitOptions | None, step: Step, wanted: Sequence[str]) -> FitOptions | None:
     """The options of one fit: it is forced, and its critic asked, only where it is wanted."""
     if options is None:
         return None
@@ -144,14 +134,14 @@ def for_step(
 def fit_step(
     engine: Engine,
     step: Step,
-    options: "FitOptions | None" = None,
+    options: FitOptions | None = None,
     *,
     progress: Progress | None = None,
     stop: Stop | None = None,
 ) -> FitOutcome:
     """Run one fit, or read it back where its identity is the stored one's, unless forced."""
-    from scissorcal.workday.elsewhere import refuse_unwritable, save_anywhere
-    from scissorcal.workday.options import FitOptions
+    from scissorcal.calibration.fit_model import FitRun
+    from scissorcal.workday.history import refuse_unwritable, save_anywhere
 
     options = options or FitOptions()
     chosen: Effort = options.effort or engine.recipe.fit.effort
@@ -165,22 +155,16 @@ def fit_step(
             return FitOutcome(step.what, result, path, pictures_beside(path), True, state)
     _refuse_without_data(engine, BY_NAME[step.inputs[0]])
     refuse_unwritable(engine, options.save_to)
-    request = Request(
-        effort=chosen,
-        seed=options.seed,
-        inputs_hash=identity,
-        checkpoint=path.with_name(f"{step.what}-{identity[:12]}.chains"),
-        last_model=str(stored.get("model", "")),
-        progress=progress or (lambda done, sentence: None),
-        stop=stop or (lambda: False),
-        critic=options.critic,
-    )
-    made = cast(FitModule, import_module(step.run)).fit(engine, request)
+    checkpoint = path.with_name(f"{step.what}-{identity[:12]}.chains")
+    run = FitRun(progress, checkpoint, str(stored.get("model", "")) or None, stop)
+    module, _, name = step.run.partition(":")
+    fit: Callable[[Engine, Request], Made] = getattr(import_module(module), name)
+    made = fit(engine, Request(chosen, options.seed, identity, run, options.critic))
     result = _on_record(engine, step, made.result)
     save_anywhere(engine, step, result, made.draw, options.save_to)
     state = engine.state(step.name)
     if state.state != "incomplete":
-        request.checkpoint.unlink(missing_ok=True)
+        checkpoint.unlink(missing_ok=True)
     drawn = pictures_beside(path)
     return FitOutcome(step.what, result, path, drawn, False, state, made.notes)
 
@@ -230,8 +214,6 @@ def _on_record(engine: Engine, step: Step, result: Any) -> Any:
 
     The latter is for a fit of one recording.
     """
-    from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
-    from scissorcal.calibration.result import FitResult
     from scissorcal.workday.history import scatter_on_record
 
     if not isinstance(result, FitResult):
@@ -292,8 +274,6 @@ def _unasked(result: Any) -> bool:
 
 
 def _load(step: Step, path: Path) -> Any:
-    from scissorcal.calibration.store import load
-
     module, _, name = step.holds.partition(":")
     found = load(path, getattr(import_module(module), name))
     refuse_other_fit(step, path, found.what)

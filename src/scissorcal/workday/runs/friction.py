@@ -2,67 +2,59 @@
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
+from scissorcal.calibration.fit_model import FrictionRun
+from scissorcal.calibration.friction.advance import fit_friction_advance
+from scissorcal.calibration.friction.fit import fit_friction
+from scissorcal.calibration.result import FitResult
 from scissorcal.errors import MissingError
+from scissorcal.model.friction import AxisLaw
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.facts import UNFINISHED
 from scissorcal.workday.recordings import used_recordings
+from scissorcal.workday.runs.fit import Made, Request
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    pass
 
-    from scissorcal.calibration.result import FitResult
-    from scissorcal.model.friction import AxisLaw
-    from scissorcal.recipe.requirements import CaptureKind
-    from scissorcal.workday.engine import Engine
-    from scissorcal.workday.runs.fit import Made, Request
-
-STREAM = 0
-"""Which stream of random numbers of a seed is this fit's."""
+STREAM, STREAM_ADVANCE = 0, 5
+"""Which streams of random numbers of a seed are these fits'."""
 
 
-def fit(engine: "Engine", request: "Request") -> "Made":
+def fit(engine: Engine, request: Request) -> Made:
     """Fit friction to the used recordings of empty motion."""
-    from scissorcal.calibration.friction.fit import fit_friction
-
-    return fitted(fit_friction, engine.recipe.fit.friction, "friction", STREAM, engine, request)
+    return _fitted(engine, request, "friction")
 
 
-def fitted(
-    fit_by: "Callable[..., FitResult]",
-    settings: object,
-    kind: "CaptureKind",
-    stream: int,
-    engine: "Engine",
-    request: "Request",
-) -> "Made":
-    """Fit an axis by its function and settings to the used recordings of a kind."""
-    import numpy as np
+def fit_advance(engine: Engine, request: Request) -> Made:
+    """Fit mass and friction to the used recordings of the carriage's empty motion."""
+    return _fitted(engine, request, "friction-advance")
 
-    from scissorcal.calibration.fit_model import FrictionRun
-    from scissorcal.workday.runs.fit import Made
 
-    request.progress(0.0, f"{kind}: reading recordings")
-    result = fit_by(
-        used_recordings(engine.workspace, engine.recipe, kind, engine.index),
-        settings,
-        effort=request.effort,
-        rng=np.random.default_rng([request.seed, stream]),
-        run=FrictionRun(
-            progress=request.progress,
-            checkpoint=request.checkpoint,
-            last_chosen=request.last_model or None,
-            stop=request.stop,
-            critic=request.critic,
-            tolerance=0.01 * engine.recipe.scene.tolerance_percent,
-        ),
-    )
+def _fitted(
+    engine: Engine, request: Request, kind: Literal["friction", "friction-advance"]
+) -> Made:
+    request.run.tell(0.0, f"{kind}: reading recordings")
+    recordings = used_recordings(engine.workspace, engine.recipe, kind, engine.index)
+    tolerance = 0.01 * engine.recipe.scene.tolerance_percent
+    run = FrictionRun(**vars(request.run), critic=request.critic, tolerance=tolerance)
+    settings, effort = engine.recipe.fit, request.effort
+    if kind == "friction":
+        rng = np.random.default_rng([request.seed, STREAM])
+        result = fit_friction(recordings, settings.friction, effort=effort, rng=rng, run=run)
+    else:
+        rng = np.random.default_rng([request.seed, STREAM_ADVANCE])
+        result = fit_friction_advance(recordings, settings.advance, effort=effort, rng=rng, run=run)
     return Made(finished(result, request))
 
 
-def finished(result: "FitResult", request: "Request") -> "FitResult":
+def finished(result: FitResult, request: Request) -> FitResult:
     """The result with the identity of its inputs; marked as unfinished where time ran out."""
-    if not (result.rejected and request.stop()):
+    stop = request.run.stop
+    if not (result.rejected and stop and stop()):
         return replace(result, inputs_hash=request.inputs_hash)
     note = (
         "The time allowed was used up before the fit was finished. Run 'scissorcal fit' again with "
@@ -72,10 +64,8 @@ def finished(result: "FitResult", request: "Request") -> "FitResult":
     return replace(result, inputs_hash=marked, notes=(*result.notes, note))
 
 
-def axis_of_fit(fit: "FitResult", unit: str) -> "AxisLaw":
+def axis_of_fit(fit: FitResult, unit: str) -> AxisLaw:
     """One axis from its fit of friction, at the medians of the posterior; ``unit`` of inertia."""
-    from scissorcal.model.friction import AxisLaw
-
     values = {p.name: p.q50 for p in (*fit.parameters, *fit.nuisance)}
     if not values.get("inertia", 0.0) > 0.0:
         raise MissingError(
@@ -85,9 +75,7 @@ def axis_of_fit(fit: "FitResult", unit: str) -> "AxisLaw":
     return AxisLaw.of_fit(values, angle_centre(fit), 0.0)
 
 
-def angle_centre(fit: "FitResult") -> float:
+def angle_centre(fit: FitResult) -> float:
     """The angle (rad) about which a fit's friction changes along the stroke."""
-    import numpy as np
-
     centre = float(fit.structure.get("angle_center", float("nan")))
     return centre if math.isfinite(centre) else float(np.nanmedian(fit.series.opening))

@@ -3,11 +3,22 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+import numpy as np
+
+from scissorcal.calibration.camera.result import CameraFit
+from scissorcal.calibration.plate.fit import PosePhoto, fit_plate, plate_target
+from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.errors import InputError, VerdictError
+from scissorcal.vision.geometry.camera import Camera
+from scissorcal.vision.geometry.rig_frame import RigPose, card_view, locate_rig
+from scissorcal.vision.overlay import residual_overlay, write_picture
+from scissorcal.vision.photo import Photo, read_photo
 from scissorcal.vision.rig_positions import RigPositions, position_of
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP, RIG_MARKERS, MarkedBoard
+from scissorcal.vision.targets.detect import find_any_board
+from scissorcal.workday.engine import Engine
 from scissorcal.workday.photographs import (
     PhotoCapture,
     Seen,
@@ -16,16 +27,8 @@ from scissorcal.workday.photographs import (
     photo_captures,
     take_photographs,
 )
+from scissorcal.workday.runs.fit import Made, Request, load_result
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.calibration.camera.result import CameraFit
-    from scissorcal.calibration.plate.result import PlateFit
-    from scissorcal.vision.geometry.camera import Camera
-    from scissorcal.vision.geometry.rig_frame import RigPose
-    from scissorcal.vision.photo import Photo
-    from scissorcal.workday.engine import Engine
-    from scissorcal.workday.runs.fit import Made, Request
 
 AXES_M = 0.03
 """Length at which the axes of the plate's frame are drawn."""
@@ -43,14 +46,12 @@ def capture_plate(
     The first photograph says which target it is; one that shows another, or none, is left out with
     its reason. Raises InputError, and keeps nothing, where none is left.
     """
-    from scissorcal.vision.targets.detect import find_any_board
-
     kind: Literal["plate", "rig"] = "plate" if positions is None else "rig"
     boards: tuple[MarkedBoard, ...] = (
         (PLATE_BOARD, PLATE_STRIP) if positions is None else (RIG_MARKERS,)
     )
 
-    def look(path: Path, photo: "Photo") -> Seen:
+    def look(path: Path, photo: Photo) -> Seen:
         nonlocal boards
         position = None if positions is None else position_of(path, positions)
         detection = find_any_board(photo, boards)
@@ -64,15 +65,12 @@ def capture_plate(
     return take_photographs(workspace, kind, paths, look, tell)
 
 
-def fit(engine: "Engine", request: "Request") -> "Made":
+def fit(engine: Engine, request: Request) -> Made:
     """Fit the plate's pose to the newest photographs of it; draw residuals over each.
 
     The plate may have been moved between captures, so that only the newest counts. With photographs
     of the rig's card the pose is in the rig's frame too.
     """
-    from scissorcal.calibration.plate.fit import PosePhoto, fit_plate, plate_target
-    from scissorcal.workday.runs.fit import Made, load_result
-
     fitted: CameraFit = load_result(engine, "camera")
     camera = fitted.camera
     newest = photo_captures(engine.workspace, "plate")[-1:]
@@ -95,15 +93,11 @@ def fit(engine: "Engine", request: "Request") -> "Made":
     return Made(result, lambda folder: _draw(newest, result, camera, engine, folder))
 
 
-def locate_workspace_rig(engine: "Engine", camera: "Camera") -> "RigPose | None":
+def locate_workspace_rig(engine: Engine, camera: Camera) -> RigPose | None:
     """Locate the rig from the newest photographs of its card, None where there are none.
 
     Raises VerdictError where they do not determine where it stands.
     """
-    import numpy as np
-
-    from scissorcal.vision.geometry.rig_frame import card_view, locate_rig
-
     captures = photo_captures(engine.workspace, "rig")[-1:]
     views = []
     for capture in captures:
@@ -121,7 +115,7 @@ def locate_workspace_rig(engine: "Engine", camera: "Camera") -> "RigPose | None"
         raise VerdictError(f"{captures[0].folder}: {error}.") from None
 
 
-def _refuse_other_camera(capture: PhotoCapture, camera: "Camera") -> None:
+def _refuse_other_camera(capture: PhotoCapture, camera: Camera) -> None:
     for photo in capture.index.photographs:
         if (photo.width, photo.height) != (camera.width, camera.height):
             raise InputError(
@@ -133,17 +127,11 @@ def _refuse_other_camera(capture: PhotoCapture, camera: "Camera") -> None:
 
 def _draw(
     captures: Sequence[PhotoCapture],
-    found: "PlateFit",
-    camera: "Camera",
-    engine: "Engine",
+    found: PlateFit,
+    camera: Camera,
+    engine: Engine,
     folder: Path,
 ) -> None:
-    import numpy as np
-
-    from scissorcal.calibration.plate.fit import plate_target
-    from scissorcal.vision.overlay import residual_overlay, write_picture
-    from scissorcal.vision.photo import read_photo
-
     pose = found.camera_plate.after(plate_target(engine.recipe))
     axes = camera.project(found.camera_plate.apply(AXES_M * np.eye(4, 3, -1)))
     for capture in captures:

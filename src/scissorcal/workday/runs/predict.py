@@ -1,25 +1,34 @@
 """What a workspace's friction fit predicts of a motion, with a band, as table and plot."""
 
-from dataclasses import dataclass, replace
+import csv
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from scissorcal.aliases import Progress
+from scissorcal.calibration import friction_experiment
+from scissorcal.calibration.friction.predict import (
+    Band,
+    Prediction,
+    effort_band,
+    load_band,
+    predict_effort,
+    predict_far_load,
+)
+from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError, needs_extra
 from scissorcal.files import replacing
 from scissorcal.foreign import open_foreign, reading
 from scissorcal.foreign.formats import LOG
+from scissorcal.recording import ImportOptions, Joint, Recording, import_table, read_recording
+from scissorcal.recording.layout import column_name
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import PredictOptions
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.calibration.friction.predict import Band, Prediction
-    from scissorcal.recording import Joint, Recording
-
 
 CHANNELS = ("opening", "motor_torque", "handle_force", "torque_command", "force_command")
 _LONGEST_HEADING = 100_000
@@ -28,34 +37,15 @@ PLOTS = (".svg", ".png")
 MOST_POINTS = 4000
 
 
-@dataclass(frozen=True)
-class PredictionOutcome:
-    """A prediction, its band, the law that made it, the effort's unit and what was written."""
-
-    prediction: "Prediction"
-    band: "Band"
-    candidate: str
-    effort_unit: str
-    position_unit: str
-    files: tuple[Path, ...]
-
-
 def predict_workspace(
     workspace: Workspace, options: PredictOptions, progress: Progress | None = None
-) -> PredictionOutcome:
+) -> tuple[Prediction, Band, FitResult]:
     """Predict the effort of empty motion, or the load at a tool's far end, for one file.
 
-    The band is calibrated on the friction recordings of the workspace. Raises MissingError where
-    the fit is missing or stale, InputError for files that are no motion.
+    Gives the prediction, its band and the fit that made it. The band is calibrated on the friction
+    recordings of the workspace. Raises MissingError where the fit is missing or stale, InputError
+    for files that are no motion.
     """
-    from scissorcal.calibration import friction_experiment
-    from scissorcal.calibration.friction.predict import (
-        effort_band,
-        load_band,
-        predict_effort,
-        predict_far_load,
-    )
-
     tell = progress or (lambda done, sentence: None)
     level, table, plot = options.level, options.table, options.plot
     _refuse_files(table, plot)
@@ -65,7 +55,7 @@ def predict_workspace(
     settings = recipe.fit.friction
     tell(0.0, "prediction: reading recordings")
     own = used_recordings(workspace, recipe, "friction", engine.index)
-    given = read_motion(options.motion, own[0].joint, own[0].handle_radius_m)
+    given = _read_motion(options.motion, own[0].joint, own[0].handle_radius_m)
     tell(0.2, "prediction: calibrating the band on what the fit had not seen")
     design = friction_experiment(own, settings, fit)
     if options.what == "load":
@@ -76,26 +66,19 @@ def predict_workspace(
         band = effort_band(design, fit, level)
         tell(0.8, "prediction: weighing the motion")
         found = predict_effort(fit, band, (given,), settings.cutoff_Hz)
-    files = []
     if table is not None:
         _write_table(found, table, fit.position_unit, fit.effort_unit)
-        files.append(table)
     if plot is not None:
         _write_plot(found, band, plot, fit.effort_unit)
-        files.append(plot)
     tell(1.0, "prediction: done")
-    return PredictionOutcome(
-        found, band, fit.candidate, fit.effort_unit, fit.position_unit, tuple(files)
-    )
+    return found, band, fit
 
 
-def read_motion(path: Path, joint: "Joint", handle_radius_m: float) -> "Recording":
+def _read_motion(path: Path, joint: Joint, handle_radius_m: float) -> Recording:
     """Read a recording, or a table of motion with units in its headings.
 
     Raises InputError where columns are missing, or the joint is of another kind than ``joint``.
     """
-    from scissorcal.recording import read_recording
-
     if not path.is_file():
         raise InputError(f"{path} does not exist: name a recording (.mcap) or a table of motion.")
     if path.suffix.lower() not in TABLES:
@@ -110,10 +93,7 @@ def read_motion(path: Path, joint: "Joint", handle_radius_m: float) -> "Recordin
     return read
 
 
-def _read_table(path: Path, joint: "Joint", handle_radius_m: float) -> "Recording":
-    from scissorcal.recording import ImportOptions, import_table
-    from scissorcal.recording.layout import column_name
-
+def _read_table(path: Path, joint: Joint, handle_radius_m: float) -> Recording:
     headings = _headings(path)
     opening = column_name("opening", joint)
     missing = [name for name in ("time_s", opening) if name not in headings]
@@ -146,7 +126,6 @@ def _headings(path: Path) -> list[str]:
         from scissorcal.recording.table_file import parquet_headings
 
         return parquet_headings(path)
-    import csv
 
     with open_foreign(path, LOG) as file:
         first = file.readline(_LONGEST_HEADING)
@@ -168,9 +147,7 @@ def _refuse_files(table: Path | None, plot: Path | None) -> None:
         raise needs_extra("--plot", "matplotlib", "plots", "give --table FILE.csv")
 
 
-def _write_table(found: "Prediction", path: Path, position: str, effort: str) -> None:
-    import csv
-
+def _write_table(found: Prediction, path: Path, position: str, effort: str) -> None:
     unit = effort.replace(" ", "")
     head = ["time_s", f"opening_{position}", f"opening_rate_{position}_per_s", "moving"]
     head += [f"{name}_{unit}" for name in ("measured", "predicted", "low", "high")]
@@ -183,8 +160,7 @@ def _write_table(found: "Prediction", path: Path, position: str, effort: str) ->
             writer.writerow(["" if value != value else value for value in row])
 
 
-def _write_plot(found: "Prediction", band: "Band", path: Path, unit: str) -> None:
-    import numpy as np
+def _write_plot(found: Prediction, band: Band, path: Path, unit: str) -> None:
     from matplotlib.figure import Figure
 
     thin = slice(None, None, max(1, -(-len(found.time_s) // MOST_POINTS)))

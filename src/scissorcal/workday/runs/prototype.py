@@ -1,16 +1,29 @@
 """The page of a workspace's package: what it shows, and what it may start on a rig."""
 
+import asyncio
+import signal
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scissorcal.device.capture import CLEAR_REQUEST
+from scissorcal.device.trajectory import EMPTY_REQUEST
 from scissorcal.errors import InputError, MissingError, needs_extra
+from scissorcal.files import replacing
 from scissorcal.identity import VERSION
+from scissorcal.kernel import Capability
+from scissorcal.package import open_package
+from scissorcal.prototype.document import ensure_page, page_of, policy_of
+from scissorcal.prototype.page_parts import Hand, LayersPart, Numbers, layers_part
+from scissorcal.prototype.rig_commands import RigCommand
+from scissorcal.prototype.scene import Scene, scene_of
 from scissorcal.recipe.load import read_text
+from scissorcal.recipe.plate_layers import drawn_layers
+from scissorcal.recording import Recording, read_header, read_recording
+from scissorcal.render.engine import REQUEST
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, PrototypeOptions
 from scissorcal.workday.rigs import SIM
@@ -19,11 +32,7 @@ from scissorcal.workday.runs.render import package_warnings
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
-    from scissorcal.prototype.page_parts import Hand, LayersPart
-    from scissorcal.prototype.rig_commands import RigCommand
-    from scissorcal.prototype.scene import Scene
     from scissorcal.prototype.server import PrototypeServer
-    from scissorcal.recording import Recording
 
 SIM_REQUEST = "The virtual rig moves by itself: nobody has to keep clear."
 TRACK_REQUEST = (
@@ -35,25 +44,14 @@ HAND_POINTS = 1500
 LONGEST_HAND_s = 60.0
 
 
-@dataclass(frozen=True)
-class Exported:
-    """An offline page: its file and its size."""
-
-    path: Path
-    bytes: int
-
-
 def workspace_scene(
     workspace: Workspace, package_path: Path | None = None, now: datetime | None = None
-) -> "Scene":
+) -> Scene:
     """What a page shows of the workspace's package (or another): with measured strokes and hands.
 
     Raises MissingError where there is no package, with the command that builds it, and what opening
     one raises.
     """
-    from scissorcal.package import open_package
-    from scissorcal.prototype.scene import scene_of
-
     path = package_path or workspace.package_path(workspace.recipe())
     if package_path is None and not path.is_file():
         command = Engine.of(workspace).leads_to("package build")
@@ -79,14 +77,11 @@ def workspace_scene(
     return scene.model_copy(update={"recipe": recipe, "drawn_plate": workspace_plate(workspace)})
 
 
-def workspace_plate(workspace: Workspace) -> "LayersPart | None":
+def workspace_plate(workspace: Workspace) -> LayersPart | None:
     """The plate whose outlines stand in files, which a page cannot read; None where there are none.
 
     None, too, where a file is gone or wrong: the page then says what it cannot draw.
     """
-    from scissorcal.prototype.page_parts import layers_part
-    from scissorcal.recipe.plate_layers import drawn_layers
-
     recipe = workspace.recipe()
     if not recipe.plate.drawings:
         return None
@@ -99,9 +94,6 @@ def workspace_plate(workspace: Workspace) -> "LayersPart | None":
 
 def _origin(workspace: Workspace) -> tuple[str, ...]:
     """A sentence where recordings of the workspace come from a virtual rig, as they state."""
-    from scissorcal.kernel import Capability
-    from scissorcal.recording import read_header
-
     paths = [*workspace.recordings("friction"), *workspace.recordings("cut")]
     stated = []
     for path in paths:
@@ -119,13 +111,11 @@ def _origin(workspace: Workspace) -> tuple[str, ...]:
     )
 
 
-def workspace_hands(workspace: Workspace) -> "tuple[Hand, ...]":
+def workspace_hands(workspace: Workspace) -> tuple[Hand, ...]:
     """How the blades were moved in the newest recordings of a cut and of a rendering.
 
     Of several sheets it is the first. A recording that cannot be read gives none.
     """
-    from scissorcal.recording import read_recording
-
     found = []
     for kind in ("cut", "render"):
         paths = workspace.recordings("cut" if kind == "cut" else "render")
@@ -138,9 +128,7 @@ def workspace_hands(workspace: Workspace) -> "tuple[Hand, ...]":
     return tuple(found)
 
 
-def _hand(recording: "Recording") -> "Hand | None":
-    from scissorcal.prototype.page_parts import Hand, Numbers
-
+def _hand(recording: Recording) -> Hand | None:
     samples = recording.samples
     numbers = [stroke.index for stroke in recording.strokes if stroke.sheet <= 0]
     own = np.flatnonzero(np.isin(samples["stroke"], numbers))
@@ -165,13 +153,8 @@ def _hand(recording: "Recording") -> "Hand | None":
 
 def rig_commands(
     workspace: Workspace, device: str, *, camera: str = NONE, package_path: Path | None = None
-) -> "tuple[RigCommand, ...]":
+) -> tuple[RigCommand, ...]:
     """The commands of a rig that a page may start, with the sentence that each asks first."""
-    from scissorcal.device.capture import CLEAR_REQUEST
-    from scissorcal.device.trajectory import EMPTY_REQUEST
-    from scissorcal.prototype.rig_commands import RigCommand
-    from scissorcal.render.engine import REQUEST
-
     sim = device == SIM
     on = ("--device", device, "--workspace", str(workspace.root))
     paced = (*on, "--realtime") if sim else on
@@ -198,7 +181,6 @@ def prototype_server(workspace: Workspace, options: PrototypeOptions) -> "Protot
     the page was not built and cannot be, and what `workspace_scene` raises.
     """
     _require_aiohttp()
-    from scissorcal.prototype.document import ensure_page, page_of, policy_of
     from scissorcal.prototype.server import PrototypeServer
 
     device, camera, package_path = options.device, options.camera, options.package_path
@@ -224,8 +206,6 @@ def serve(server: "PrototypeServer", ready: Callable[[str], None]) -> str:
     ``ready`` is told the address with its token. A command that the page started is ended first.
     Raises InputError where the port is taken.
     """
-    import asyncio
-    import signal
 
     async def run() -> str:
         over = asyncio.Event()
@@ -242,15 +222,12 @@ def serve(server: "PrototypeServer", ready: Callable[[str], None]) -> str:
 
 def export_page(
     workspace: Workspace, path: Path, package_path: Path | None = None, *, overwrite: bool = False
-) -> Exported:
-    """Write the package's page as one file that needs no server and no network.
+) -> int:
+    """Write the package's page as one file that needs no server and no network; gives its bytes.
 
     Raises InputError where the file is there already, unless ``overwrite``, or is not named as a
     page, and what `workspace_scene` raises.
     """
-    from scissorcal.files import replacing
-    from scissorcal.prototype.document import page_of
-
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path} would not open in a browser: name a file that ends in .html.")
     if path.is_dir() or (path.exists() and not overwrite):
@@ -259,7 +236,7 @@ def export_page(
     data = page_of(scene).encode("utf-8")
     with replacing(path) as part:
         part.write_bytes(data)
-    return Exported(path, len(data))
+    return len(data)
 
 
 def _require_aiohttp() -> None:

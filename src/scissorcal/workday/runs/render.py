@@ -2,38 +2,43 @@
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from scissorcal.device.session import Operator, RigSession
 from scissorcal.errors import InputError, MissingError, ScissorcalError, VerdictError
 from scissorcal.files import replacing
+from scissorcal.package import ModelPackage, open_package
+from scissorcal.package.keys import read_public_keys
+from scissorcal.recipe.plate_surface import CLAMPED_deg_per_s, CLAMPED_mm_per_s, PlateTracking
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording import RecordingWriter
+from scissorcal.render import (
+    Rendering,
+    RenderResult,
+    RigFacts,
+    VirtualStrokes,
+    open_writer,
+    render,
+)
+from scissorcal.render.rig_facts import fitted_facts, refuse_other_rig, rig_facts, with_probe
+from scissorcal.tracking.plate_pose import PoseSource
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, RenderOptions, RigOptions
 from scissorcal.workday.runs.at_rig import RigRun, RigTask, run_at_rig
 from scissorcal.workday.runs.fit import available, load_result
+from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from scissorcal.device.session import Operator, RigSession
-    from scissorcal.package import ModelPackage
-    from scissorcal.recipe.plate_surface import PlateTracking
-    from scissorcal.recipe.schema import Recipe
-    from scissorcal.recording import RecordingWriter
-    from scissorcal.render import RenderResult, RigFacts
-    from scissorcal.tracking.plate_pose import PoseSource
-    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 
 
 def render_workspace(
     workspace: Workspace,
     rig: RigOptions,
     options: RenderOptions = RenderOptions(),
-    operator: "Operator | None" = None,
-    source: "PoseSource | None" = None,
-) -> "RigRun[RenderResult]":
+    operator: Operator | None = None,
+    source: PoseSource | None = None,
+) -> RigRun[RenderResult]:
     """Render the workspace's package (or another) on a rig, within the recipe's limits.
 
     A rig without a probe that counts is probed first (`ensure_probed`). ``source`` tracks a plate
@@ -45,9 +50,6 @@ def render_workspace(
     camera is named for a known pose or does not go with the device, VerdictError where nobody
     trusted signed the package, and what opening them and the rendering raise.
     """
-    from scissorcal.package import open_package
-    from scissorcal.package.keys import read_public_keys
-
     recipe, of_workspace = workspace.recipe(), options.package_path is None
     package = open_package(options.package_path or workspace.package_path(recipe), warn=False)
     if options.trusted_key:
@@ -78,19 +80,15 @@ class _RenderTask(RigTask["RenderResult"]):
 
     kind = "render"
     workspace: Workspace
-    package: "ModelPackage"
+    package: ModelPackage
     options: RenderOptions
     stale: str
 
-    def check(self, session: "RigSession") -> None:
-        from scissorcal.render.rig_facts import refuse_other_rig
-
+    def check(self, session: RigSession) -> None:
         if not self.options.allow_mismatch:
             refuse_other_rig(self.package, session.identity)
 
-    def open_writer(self, session: "RigSession", path: Path) -> "RecordingWriter":
-        from scissorcal.render import open_writer
-
+    def open_writer(self, session: RigSession, path: Path) -> RecordingWriter:
         writer = open_writer(session, self.package, path)
         if self.stale:
             writer.note(self.stale)
@@ -98,13 +96,10 @@ class _RenderTask(RigTask["RenderResult"]):
 
     def do(
         self,
-        session: "RigSession",
-        writer: "RecordingWriter | None",
-        source: "PoseSource | None",
-    ) -> "RenderResult":
-        from scissorcal.render import Rendering, VirtualStrokes, render
-        from scissorcal.render.rig_facts import with_probe
-
+        session: RigSession,
+        writer: RecordingWriter | None,
+        source: PoseSource | None,
+    ) -> RenderResult:
         options = self.options
         how = Rendering(
             options.seconds,
@@ -124,14 +119,14 @@ def _stale(engine: Engine) -> str:
     return f"The package is stale: {state.found}. Run '{state.command}'."
 
 
-def _refuse_untrusted(package: "ModelPackage", trusted: "Sequence[str]") -> None:
+def _refuse_untrusted(package: ModelPackage, trusted: "Sequence[str]") -> None:
     """Raise VerdictError where none of the public keys signed what was loaded."""
     said = package.against_review(trusted)
     if said:
         raise VerdictError(f"{' '.join(said)} Nothing was rendered.")
 
 
-def _refuse_other_blades(recipe: "Recipe", package: "ModelPackage") -> None:
+def _refuse_other_blades(recipe: Recipe, package: ModelPackage) -> None:
     """Raise InputError where recipe and package are of rigs whose joints or blades differ."""
     stated = package.recipe.rig
     for key, was, now in (
@@ -147,11 +142,9 @@ def _refuse_other_blades(recipe: "Recipe", package: "ModelPackage") -> None:
 
 
 def _camera(
-    workspace: Workspace, package: "ModelPackage", rig: RigOptions, options: RenderOptions
-) -> "TrackingCamera | None":
+    workspace: Workspace, package: ModelPackage, rig: RigOptions, options: RenderOptions
+) -> TrackingCamera | None:
     """The camera that follows the plate of an estimated scene; None without one."""
-    from scissorcal.workday.tracking.tracking_camera import TrackingCamera
-
     if options.camera == NONE:
         if options.taps_s:
             raise InputError("Taps tell where a tracked plate is: name a camera too (--camera).")
@@ -168,10 +161,8 @@ def _camera(
     return TrackingCamera(engine, options.camera, rig, cut=True)
 
 
-def _refuse_clamped(tracking: "PlateTracking") -> None:
+def _refuse_clamped(tracking: PlateTracking) -> None:
     """Pictures of a plate that is carried would be refused, and what taps told would be lost."""
-    from scissorcal.recipe.plate_surface import CLAMPED_deg_per_s, CLAMPED_mm_per_s
-
     speed, turn = tracking.speed_mm_per_s, tracking.turn_deg_per_s
     if speed > CLAMPED_mm_per_s and turn > CLAMPED_deg_per_s:
         return
@@ -183,13 +174,11 @@ def _refuse_clamped(tracking: "PlateTracking") -> None:
     )
 
 
-def _known_rig(workspace: Workspace, package: "ModelPackage") -> "RigFacts":
+def _known_rig(workspace: Workspace, package: ModelPackage) -> RigFacts:
     """What is known of the rig: the package's friction fit, or the workspace's.
 
     A scene that renders no friction has none in its package, and the rig has friction all the same.
     """
-    from scissorcal.render.rig_facts import fitted_facts, rig_facts
-
     known = rig_facts(package)
     engine = Engine.of(workspace)
     if known.coulomb_Nm is not None or "friction" not in available(engine, ("friction",)):
@@ -198,7 +187,7 @@ def _known_rig(workspace: Workspace, package: "ModelPackage") -> "RigFacts":
     return fitted_facts((*fit.parameters, *fit.nuisance), 1.0, "the workspace's friction fit")
 
 
-def _write_admission(package_path: Path, done: "RenderResult", rig: str) -> None:
+def _write_admission(package_path: Path, done: RenderResult, rig: str) -> None:
     """State beside the package how much of it was rendered on this rig, and what would cure it."""
     admission = asdict(done.admission)
     plain = {
@@ -223,8 +212,6 @@ def package_warnings(workspace: Workspace, package_path: Path | None = None) -> 
 
     Empty where there is none that can be opened, which rendering it then says.
     """
-    from scissorcal.package import open_package
-
     engine = Engine.of(workspace)
     try:
         package = open_package(package_path or engine.file("package build"), warn=False)

@@ -1,22 +1,23 @@
 """Which of a recipe's speeds of empty sweeps a rig can make and its encoder shows."""
 
 import math
-from typing import TYPE_CHECKING
 
+from scissorcal.calibration.signals.filtering import rate_floor_of_step
+from scissorcal.calibration.signals.weak_form import RATE_BAND
+from scissorcal.device.capture_gains import Probed, capture_gains
 from scissorcal.errors import InputError
-
-if TYPE_CHECKING:
-    from scissorcal.kernel import Identity
-    from scissorcal.recipe.schema import Recipe
-    from scissorcal.recording.probe import ProbeResult
+from scissorcal.kernel import Identity
+from scissorcal.recipe.schema import Recipe
+from scissorcal.recording.probe import ProbeResult
+from scissorcal.workday.stock import LEAST_FLOORS
 
 NEXT = 1.2
 """A planned speed that is at most so many times the slowest usable one takes its place."""
 
 
 def with_usable_sweeps(
-    recipe: "Recipe", identity: "Identity", probe: "ProbeResult | None"
-) -> tuple["Recipe", str]:
+    recipe: Recipe, identity: Identity, probe: ProbeResult | None
+) -> tuple[Recipe, str]:
     """The recipe without sweeps that are too slow for a rig, and why; the same and "" without any.
 
     Too slow are speeds below 1.5 times the floor of the fit's rate, below which the encoder does
@@ -24,8 +25,6 @@ def with_usable_sweeps(
     and slip whatever the gains (``capture_gains``). The slowest usable speed takes their place.
     Raises InputError where that is above every planned speed, DeviceError as ``capture_gains``.
     """
-    from scissorcal.workday.stock import LEAST_FLOORS
-
     floor, sticks = sweep_bounds(recipe, identity, probe)
     slowest = _rounded_up(max(floor, sticks))
     planned = recipe.capture.friction.speeds_rad_per_s
@@ -59,16 +58,13 @@ def with_usable_sweeps(
 
 
 def sweep_bounds(
-    recipe: "Recipe", identity: "Identity", probe: "ProbeResult | None"
+    recipe: Recipe, identity: Identity, probe: ProbeResult | None
 ) -> tuple[float, float]:
     """Speeds (rad/s) below which an empty sweep is too slow: for the encoder, for the rig's gains.
 
     The second, with two digits, is 0 where nothing is known of it. Raises DeviceError as
     ``capture_gains``, InputError where the blades would stick at any speed.
     """
-    from scissorcal.device.capture_gains import Probed, capture_gains
-    from scissorcal.workday.stock import LEAST_FLOORS
-
     cutoff_Hz = recipe.fit.friction.cutoff_Hz
     floor = LEAST_FLOORS * _rate_floor(identity.opening_resolution, cutoff_Hz, identity)
     sticks = capture_gains(recipe, identity, "friction", Probed.of(probe)).sticks_below
@@ -81,7 +77,7 @@ def sweep_bounds(
     return floor, _rounded_up(sticks)
 
 
-def sliding_below_encoder(recipe: "Recipe", identity: "Identity") -> str:
+def sliding_below_encoder(recipe: Recipe, identity: Identity) -> str:
     """Which planned speeds of the carriage a fit will not use, as a sentence; empty for none.
 
     Below the rate's floor, which the encoder's step and the fit's cutoff give, the sign of the
@@ -101,10 +97,7 @@ def sliding_below_encoder(recipe: "Recipe", identity: "Identity") -> str:
     )
 
 
-def _rate_floor(resolution: float, cutoff_Hz: float, identity: "Identity") -> float:
-    from scissorcal.calibration.signals.filtering import rate_floor_of_step
-    from scissorcal.calibration.signals.weak_form import RATE_BAND
-
+def _rate_floor(resolution: float, cutoff_Hz: float, identity: Identity) -> float:
     return rate_floor_of_step(resolution, RATE_BAND * cutoff_Hz, 1e6 / identity.tick_us)
 
 

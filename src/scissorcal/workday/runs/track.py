@@ -5,13 +5,17 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from scissorcal.device.link import Link
+from scissorcal.device.motion import Motion
+from scissorcal.device.session import RigSession, rig_facts
 from scissorcal.errors import InputError, ScissorcalError
 from scissorcal.recipe.load import read_text
 from scissorcal.recipe.plate_surface import LONGEST_DELAY_MS
+from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.geometry.pose import Pose
 from scissorcal.vision.live import STATES, State, camera_number, frames_of, timed
 from scissorcal.workday.engine import Engine
@@ -22,14 +26,13 @@ from scissorcal.workday.tracking import feeds, inputs
 from scissorcal.workday.tracking.feeds import Feed
 from scissorcal.workday.tracking.session import Tell, TrackedRun, TrackSession, tracked_run
 from scissorcal.workday.tracking.sim_world import SimWorld
-from scissorcal.workday.tracking.track_pictures import PoseFinder, TrackPicture
-from scissorcal.workday.tracking.track_recorder import TrackRecorder, read_track
+from scissorcal.workday.tracking.track_recorder import (
+    PoseFinder,
+    TrackPicture,
+    TrackRecorder,
+    read_track,
+)
 from scissorcal.workday.workspace import Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.device.link import Link
-    from scissorcal.device.motion import Motion
-    from scissorcal.recipe.schema import Recipe
 
 PATIENCE_S = 10.0
 """Without a pose to start from for so long, a track ends and says why."""
@@ -70,7 +73,7 @@ class TrackResult(TrackedRun):
 
 
 def track_plate(
-    workspace: Workspace, options: TrackOptions = TrackOptions(), tell: "Tell | None" = None
+    workspace: Workspace, options: TrackOptions = TrackOptions(), tell: Tell | None = None
 ) -> TrackResult:
     """Follow the plate by a camera, by contacts of a rig's blade tip, or by both, and record it.
 
@@ -99,22 +102,19 @@ def track_plate(
         return _follow(engine, opened, options, tell)
 
 
-@dataclass(frozen=True, eq=False)
-class _Opened:
+class _Opened(NamedTuple):
     """Everything that a track is fed from, and the recipe that it follows."""
 
-    recipe: "Recipe"
+    recipe: Recipe
     feed: Feed
     eye: PoseFinder | None
-    link: "Link | None"
+    link: Link | None
     default_s: float | None
 
 
 @contextmanager
-def _opened(engine: Engine, recipe: "Recipe", options: TrackOptions) -> Iterator[_Opened]:
+def _opened(engine: Engine, recipe: Recipe, options: TrackOptions) -> Iterator[_Opened]:
     """Open camera and device, or the simulated world of both."""
-    from scissorcal.device.session import RigSession
-
     camera, device = options.camera, options.device
     eye = None
     if camera != NONE:
@@ -177,7 +177,7 @@ def _follow(
     return _result(track, path, rig)
 
 
-def _again(engine: Engine, recipe: "Recipe", path: Path, tell: Tell | None) -> TrackResult:
+def _again(engine: Engine, recipe: Recipe, path: Path, tell: Tell | None) -> TrackResult:
     """Follow what a track was given once more, by the recipe as it is now; record nothing."""
     given = read_track(path)
     inputs.refuse_other_camera(path, given, load_result(engine, "camera"))
@@ -251,7 +251,7 @@ def _notes(session: TrackSession) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _with_delay(recipe: "Recipe", camera_delay_ms: float | None) -> "Recipe":
+def _with_delay(recipe: Recipe, camera_delay_ms: float | None) -> Recipe:
     if camera_delay_ms is None:
         return recipe
     if not abs(camera_delay_ms) <= LONGEST_DELAY_MS:
@@ -264,7 +264,5 @@ def _with_delay(recipe: "Recipe", camera_delay_ms: float | None) -> "Recipe":
     return recipe.model_copy(update={"plate": plate})
 
 
-def _facts(link: "Link | None", recipe: "Recipe") -> dict[str, Any]:
-    from scissorcal.device.session import rig_facts
-
+def _facts(link: Link | None, recipe: Recipe) -> dict[str, Any]:
     return {} if link is None else rig_facts(link.identity, recipe.rig.motor_sign, None)

@@ -4,30 +4,31 @@ import pickle
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from scissorcal.aliases import Progress
-from scissorcal.errors import InputError, MissingError
+from scissorcal.calibration import FitResult
+from scissorcal.calibration.cut.fit import cut_experiment
+from scissorcal.calibration.fit_model import Experiment
+from scissorcal.calibration.friction.advance import actuation_of, sliding_joints
+from scissorcal.calibration.friction.fit import friction_experiment
+from scissorcal.calibration.store import save
+from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
+from scissorcal.calibration.verify.result import VerifyResult
+from scissorcal.calibration.verify.simulator import Simulator, cut_simulator, friction_simulator
+from scissorcal.calibration.verify.study import Study, Task, run
+from scissorcal.errors import MissingError
 from scissorcal.identity import digest
+from scissorcal.recording import Recording
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.options import VerifySettings
-from scissorcal.workday.pool import Pool, open_pool
+from scissorcal.workday.options import Processes, VerifySettings
+from scissorcal.workday.pool import Pool, open_pool, unpacked
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.records import Record, RecordFile
 from scissorcal.workday.runs.cut import edge_of_photographs
 from scissorcal.workday.runs.fit import available, load_result, share_of
 from scissorcal.workday.workspace import FitKind, Workspace
-
-if TYPE_CHECKING:
-    from scissorcal.calibration import FitResult
-    from scissorcal.calibration.fit_model import Experiment
-    from scissorcal.calibration.verify.result import VerifyResult
-    from scissorcal.calibration.verify.simulator import Simulator
-    from scissorcal.calibration.verify.study import Study, Task
-    from scissorcal.recording import Recording
-
 
 ALGORITHM = 6
 """Raised whenever a fit of the same inputs would give other numbers."""
@@ -38,7 +39,7 @@ class VerifyOutcome:
     """The check of one fit, its file, how many fits it took now, and what to say on the side."""
 
     what: FitKind
-    result: "VerifyResult"
+    result: VerifyResult
     path: Path
     fitted: int
     notes: tuple[str, ...]
@@ -47,30 +48,24 @@ class VerifyOutcome:
 def verify_workspace(
     workspace: Workspace,
     wanted: Sequence[FitKind] = (),
-    settings: VerifySettings | None = None,
-    *,
-    workers: int | None = None,
-    cluster: str | None = None,
+    settings: VerifySettings = VerifySettings(),
+    processes: Processes = Processes(),
     progress: Progress | None = None,
 ) -> tuple[VerifyOutcome, ...]:
     """Check the fits of a workspace, those in ``wanted`` or all that there are.
 
     Every single fit is kept in fits/<what>.verify.partial.jsonl as soon as it is done, so that a
     killed run goes on where it was, and one that asks for more fits takes those that are there.
-    Their random numbers depend on seed and index alone: the result is the same for any number of
-    ``workers`` and on a ``cluster``. The whole stands in fits/<what>.verify.json at the end.
+    Their random numbers depend on seed and index alone: the result is the same in all
+    ``processes``. The whole stands in fits/<what>.verify.json at the end.
 
     Raises MissingError where a fit is missing or not of what is there now, InputError where the
     cluster cannot be used or another run holds the file.
     """
-    from scissorcal.calibration.store import save
-    from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
-
-    chosen = settings or VerifySettings()
     engine = Engine.of(workspace)
     kinds = _kinds(engine, wanted)
     outcomes = []
-    with open_pool(workers, cluster) as pool:
+    with open_pool(processes) as pool:
         for index, kind in enumerate(kinds):
             tell = share_of(progress, index, len(kinds))
             tell(0.0, f"{kind}: making ready")
@@ -80,16 +75,18 @@ def verify_workspace(
                 experiment,
                 fit,
                 simulator,
-                settings=StudySettings(seed=chosen.seed, prior=chosen.prior, spread=chosen.spread),
+                settings=StudySettings(
+                    seed=settings.seed, prior=settings.prior, spread=settings.spread
+                ),
                 sheets=sheets,
             )
-            tasks = tasks_of(study, chosen.checks, chosen.fits)
+            tasks = tasks_of(study, settings.checks, settings.fits)
             partial = workspace.verify_partial_path(kind)
-            with RecordFile(partial, _inputs_hash(engine, kind, chosen)) as file:
+            with RecordFile(partial, _inputs_hash(engine, kind, settings)) as file:
                 fitted = _run(pool, study, tasks, file, kind, tell)
                 wanted_tasks = {(task.kind, task.index) for task in tasks}
                 records = [r for r in file.records if (r["kind"], r["index"]) in wanted_tasks]
-                result = assess(study, fit, chosen.checks, records)
+                result = assess(study, fit, settings.checks, records)
                 result = replace(result, fit_content=engine.identity(f"verify {kind}"))
                 path = engine.file(f"verify {kind}")
                 save(result, path)
@@ -111,14 +108,9 @@ def _kinds(engine: Engine, wanted: Sequence[FitKind]) -> list[FitKind]:
 
 
 def _experiment(
-    engine: Engine, kind: FitKind, fit: "FitResult"
-) -> "tuple[Experiment, Simulator, dict[int, int]]":
+    engine: Engine, kind: FitKind, fit: FitResult
+) -> tuple[Experiment, Simulator, dict[int, int]]:
     """The design of a fit, its simulator, and the sheet that each of its strokes went through."""
-    from scissorcal.calibration.cut.fit import cut_experiment
-    from scissorcal.calibration.friction.advance import actuation_of, sliding_joints
-    from scissorcal.calibration.friction.fit import friction_experiment
-    from scissorcal.calibration.verify.simulator import cut_simulator, friction_simulator
-
     recipe = engine.recipe
     recordings = used_recordings(engine.workspace, recipe, kind, engine.index)
     if kind == "friction":
@@ -137,7 +129,7 @@ def _experiment(
     return design, simulator, _sheets(recordings)
 
 
-def _sheets(recordings: "Sequence[Recording]") -> dict[int, int]:
+def _sheets(recordings: Sequence[Recording]) -> dict[int, int]:
     """Number the sheets of all recordings, by the stroke labels that a fit gives."""
     found: dict[int, int] = {}
     numbers: dict[tuple[int, int], int] = {}
@@ -153,8 +145,8 @@ def _sheets(recordings: "Sequence[Recording]") -> dict[int, int]:
 
 def _run(
     pool: Pool,
-    study: "Study",
-    tasks: "Sequence[Task]",
+    study: Study,
+    tasks: Sequence[Task],
     file: RecordFile,
     kind: FitKind,
     tell: Progress,
@@ -178,26 +170,13 @@ def _run(
             f"{_duration(seconds)} left",
         )
 
-    try:
-        pool.work(_do, [(blob, task) for task in left], keep, dict[str, Any])
-    except ModuleNotFoundError as error:
-        raise InputError(
-            f"The cluster's workers lack {error.name}: install this version of scissorcal where "
-            "they run."
-        ) from error
+    pool.work(_do, [(blob, task) for task in left], keep, dict[str, Any])
     return finished
 
 
-def _do(job: "tuple[bytes, Task]") -> Record:
-    from scissorcal.calibration.verify.study import run
-
+def _do(job: tuple[bytes, Task]) -> Record:
     blob, task = job
-    return run(_unpacked(blob), task)
-
-
-@lru_cache(maxsize=2)
-def _unpacked(blob: bytes) -> Any:
-    return pickle.loads(blob)
+    return run(unpacked(blob), task)
 
 
 def _inputs_hash(engine: Engine, kind: FitKind, settings: VerifySettings) -> str:

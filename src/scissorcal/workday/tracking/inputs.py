@@ -2,23 +2,27 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from scissorcal.aliases import Array
+from scissorcal.calibration.plate.fit import plate_target
+from scissorcal.device.link import Link
 from scissorcal.errors import InputError, MissingError
+from scissorcal.model.blade_point import BladePoint
+from scissorcal.recipe.plate_surface import plate_surface
+from scissorcal.recipe.schema import Recipe
+from scissorcal.tracking.rows import TipContacts
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.rigs import SIM
+from scissorcal.workday.runs.cut import blade_edge
 from scissorcal.workday.runs.fit import available, load_result
+from scissorcal.workday.runs.friction import axis_of_fit
+from scissorcal.workday.runs.plate import locate_workspace_rig
+from scissorcal.workday.runs.probe import last_probe
 from scissorcal.workday.tracking.session import RigDrive, TrackFacts
-from scissorcal.workday.tracking.track_recorder import RecordedTrack, TrackAbout
-
-if TYPE_CHECKING:
-    from scissorcal.device.link import Link
-    from scissorcal.recipe.schema import Recipe
-    from scissorcal.tracking.rows import TipContacts
-    from scissorcal.workday.tracking.track_pictures import PoseFinder
+from scissorcal.workday.tracking.track_recorder import PoseFinder, RecordedTrack, TrackAbout
 
 KnownPose = tuple[Array, Array, Array]
 """Rotation (3, 3), place (3,) in m and covariance (6, 6) in the rig's frame."""
@@ -29,21 +33,17 @@ REST_RATE_RAD_PER_S = 0.02
 
 def pose_finder(
     engine: Engine,
-    recipe: "Recipe",
+    recipe: Recipe,
     camera: str,
     *,
     needs_rig: bool,
     otherwise: str = "track with --device none",
-) -> "PoseFinder":
+) -> PoseFinder:
     """The fitted camera, and the rig's frame if its card tells all of it.
 
     MissingError where there is no camera's fit, or where contacts need a frame that is not known;
     ``otherwise`` is what can be done without it, ``camera`` the one that the run names.
     """
-    from scissorcal.calibration.plate.fit import plate_target
-    from scissorcal.workday.runs.plate import locate_workspace_rig
-    from scissorcal.workday.tracking.track_pictures import PoseFinder
-
     fitted = load_result(engine, "camera")
     located = locate_workspace_rig(engine, fitted.camera)
     rig = None if located is None or located.undetermined else located
@@ -63,9 +63,7 @@ def pose_finder(
     return PoseFinder(fitted.camera, back, rig, recipe.fit.plate.priors)
 
 
-def track_about(
-    engine: Engine, recipe: "Recipe", camera: str, eye: "PoseFinder | None"
-) -> TrackAbout:
+def track_about(engine: Engine, recipe: Recipe, camera: str, eye: PoseFinder | None) -> TrackAbout:
     return TrackAbout(
         source=Path(camera).name,
         frame="rig" if eye is None or eye.rig else "camera",
@@ -79,16 +77,14 @@ def track_about(
 def track_facts(
     engine: Engine,
     about: TrackAbout,
-    link: "Link | None" = None,
+    link: Link | None = None,
     radius_m: float | None = None,
-    recipe: "Recipe | None" = None,
+    recipe: Recipe | None = None,
 ) -> TrackFacts:
     """What a track builds on, with a rig where ``link`` or ``radius_m`` (of its handles) is given.
 
     ``recipe`` takes the place of the workspace's.
     """
-    from scissorcal.recipe.plate_surface import plate_surface
-
     recipe = recipe or engine.recipe
     facts = TrackFacts(plate_surface(recipe.plate.surface, engine.workspace.root), about)
     if about.camera_inputs_hash:
@@ -98,18 +94,13 @@ def track_facts(
         radius_m = link.identity.handle_radius
     if radius_m is None:
         return facts
-    contacts, known = tip_contacts(engine, recipe)
-    drive = rig_drive(engine, radius_m, link)
+    contacts, known = _tip_contacts(engine, recipe)
+    drive = _rig_drive(engine, radius_m, link)
     return replace(facts, drive=drive, contacts=contacts, friction_known=known)
 
 
-def tip_contacts(engine: Engine, recipe: "Recipe") -> "tuple[TipContacts, bool]":
+def _tip_contacts(engine: Engine, recipe: Recipe) -> tuple[TipContacts, bool]:
     """Contacts of the upper blade's tip, and whether friction of the opening was fitted."""
-    from scissorcal.model.blade_point import BladePoint
-    from scissorcal.tracking.rows import TipContacts
-    from scissorcal.workday.runs.cut import blade_edge
-    from scissorcal.workday.runs.friction import axis_of_fit
-
     edge = blade_edge(engine, recipe)
     tip = BladePoint.on_edge(edge, edge.length_m, recipe.rig.moving_blades)
     if "friction" not in available(engine, ("friction",)):
@@ -118,10 +109,8 @@ def tip_contacts(engine: Engine, recipe: "Recipe") -> "tuple[TipContacts, bool]"
     return TipContacts(tip, replace(law, rest_rate=REST_RATE_RAD_PER_S)), True
 
 
-def rig_drive(engine: Engine, radius_m: float, link: "Link | None" = None) -> RigDrive:
+def _rig_drive(engine: Engine, radius_m: float, link: Link | None = None) -> RigDrive:
     """Zeros of the sensors are those that the last probe of this rig found."""
-    from scissorcal.workday.runs.probe import last_probe
-
     probe = last_probe(engine.workspace, link)
     if probe is None:
         return RigDrive(radius_m)

@@ -25,8 +25,7 @@ from scissorcal.tracking.settings import CameraErrors, TrackingSettings, setting
 from scissorcal.tracking.tracker import Outcome, PoseEstimate
 from scissorcal.verdicts import Verdict
 from scissorcal.vision.live import STATES, State
-from scissorcal.workday.tracking.track_pictures import TrackPicture
-from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackChannels
+from scissorcal.workday.tracking.track_recorder import TrackAbout, TrackChannels, TrackPicture
 
 UNKNOWN_FRICTION_N = 1.0
 """Least force of a contact where friction of the pivot was not fitted: three times what 13 mN m of

@@ -2,29 +2,26 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from scissorcal.aliases import Array
 from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.motion import Motion
 from scissorcal.device.sim.hand import minimum_jerk
 from scissorcal.device.sim.plate_contact import plate_pose
 from scissorcal.device.sim.specimen import Specimen, TouchedPlate, load_specimen
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey
+from scissorcal.recipe.schema import Recipe
 from scissorcal.tracking.plate_pose import rotation_of, rotation_vector
 from scissorcal.vision.live import Frame
 from scissorcal.vision.sim.optics import SimPose
 from scissorcal.vision.sim.scenes import LEVEL
 from scissorcal.vision.sim.sim_camera import render_frame, sim_plate_scene
-
-if TYPE_CHECKING:
-    from scissorcal.device.motion import Motion
-    from scissorcal.recipe.schema import Recipe
-
 
 CAMERA_OFFSET_S, CAMERA_DRIFT = 3000.0, 80e-6
 """The camera's clock: when it was switched on, and that it runs faster."""
@@ -50,8 +47,7 @@ CUTTING_HAND = {**HAND, "strength_N": 6.0, "margin_mm": 1.0}
 _LEVEL_PLATE = TouchedPlate(place_mm=(20.0, 10.0, 0.0))
 
 
-@dataclass(frozen=True)
-class SimCamera:
+class SimCamera(NamedTuple):
     """A rendered camera: its rate, by how much more than camera_delay_ms a picture may come late,
     and every how many pictures one is black."""
 
@@ -73,7 +69,7 @@ class SimWorld:
 
     def __init__(
         self,
-        recipe: "Recipe",
+        recipe: Recipe,
         seed: int,
         *,
         rig: bool,
@@ -110,7 +106,7 @@ class SimWorld:
             raise ValueError("this world has no rig")
         return self._link
 
-    def begin(self, motion: "Motion", *, taps: bool = True) -> None:
+    def begin(self, motion: Motion, *, taps: bool = True) -> None:
         """Put the plate in where the tip reaches it, and let the hand tap it."""
         motion.configure(ConfigKey.MATERIAL, PLATE)
         if taps:
@@ -128,7 +124,7 @@ class SimWorld:
         assert self._link is not None
         self._link.keeps = True
 
-    def take_out(self, motion: "Motion") -> None:
+    def take_out(self, motion: Motion) -> None:
         """Take the plate out of the tip's reach; one that was tapped goes between the blades."""
         motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
         motion.configure(ConfigKey.MATERIAL, 0.0)
@@ -191,7 +187,7 @@ class _WorldLink(LockstepLink):
         return super().configure(key, value)
 
 
-def _swaying(recipe: "Recipe", *, cut: bool) -> Specimen:
+def _swaying(recipe: Recipe, *, cut: bool) -> Specimen:
     """The recipe's specimen with a plate that moves, and a hand that taps it."""
     base = load_specimen(str(recipe.specimen))
     plate = base.plate or _LEVEL_PLATE
@@ -200,10 +196,8 @@ def _swaying(recipe: "Recipe", *, cut: bool) -> Specimen:
     return base.model_copy(update={"plate": swaying, "hand": hand})
 
 
-def _between_blades(recipe: "Recipe", seed: int) -> TouchedPlate:
+def _between_blades(recipe: Recipe, seed: int) -> TouchedPlate:
     """The plate where photographs of this seed show it, swaying."""
-    from scipy.spatial.transform import Rotation
-
     drawn = sim_plate_scene(recipe, seed).rig_plate
     lean = Rotation.from_matrix(drawn.rotation @ LEVEL.T).as_euler("ZYX", degrees=True)
     plate = TouchedPlate(
@@ -220,7 +214,7 @@ def _pose(plate: TouchedPlate, time_s: float) -> tuple[Array, Array]:
     return np.stack(axes, axis=1), np.array(place)
 
 
-def _sway(recipe: "Recipe", frequency_Hz: float) -> dict[str, object]:
+def _sway(recipe: Recipe, frequency_Hz: float) -> dict[str, object]:
     tracking = recipe.plate.tracking
     reach = math.sqrt(2.0) / (2.0 * math.pi * frequency_Hz)
     return {

@@ -4,29 +4,25 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.device.lockstep import LockstepLink
+from scissorcal.device.motion import Motion
+from scissorcal.device.session import RigSession
 from scissorcal.errors import DeviceError, InputError
+from scissorcal.recording import RecordingWriter
 from scissorcal.tracking.plate_pose import PlatePose, SteadyPose
 from scissorcal.vision.live import frames_of
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import RigOptions
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.tracking import feeds, inputs
-from scissorcal.workday.tracking.camera_thread import CameraThread
+from scissorcal.workday.tracking.feeds import CameraThread
 from scissorcal.workday.tracking.session import TrackedRun, TrackSession, tracked_run
 from scissorcal.workday.tracking.sim_world import CARRY_S, SimWorld
-from scissorcal.workday.tracking.track_pictures import TrackPicture
-from scissorcal.workday.tracking.track_recorder import TrackChannels
-
-if TYPE_CHECKING:
-    from scissorcal.device.lockstep import LockstepLink
-    from scissorcal.device.motion import Motion
-    from scissorcal.device.session import RigSession
-    from scissorcal.recording import RecordingWriter
+from scissorcal.workday.tracking.track_recorder import TrackChannels, TrackPicture
 
 PATIENCE_S = 10.0
 """For so long a first pose is waited for."""
@@ -78,15 +74,15 @@ class TrackingCamera:
         self._track: TrackSession | None = None
 
     @property
-    def world_rig(self) -> "LockstepLink | None":
+    def world_rig(self) -> LockstepLink | None:
         """The rig of the simulated world; None where the camera is real."""
         return self._world.link if self._world else None
 
     @contextmanager
     def follow(
         self,
-        session: "RigSession",
-        writer: "RecordingWriter | None",
+        session: RigSession,
+        writer: RecordingWriter | None,
         *,
         taps_s: float = 0.0,
         held_N: float = 0.0,
@@ -140,7 +136,7 @@ class TrackingCamera:
         return due
 
     def _look(
-        self, motion: "Motion", source: "TrackedPose", track: TrackSession, taps_s: float
+        self, motion: Motion, source: "TrackedPose", track: TrackSession, taps_s: float
     ) -> None:
         """Feed the source with the motors off: through the taps, and until there is a pose."""
         world = self._world
@@ -222,12 +218,12 @@ class TrackedPose:
             self.failed = str(error)
 
 
-def _feed(motion: "Motion", source: TrackedPose, until_s: float) -> None:
+def _feed(motion: Motion, source: TrackedPose, until_s: float) -> None:
     while motion.now_s < until_s:
         _ask(motion, source)
 
 
-def _ask(motion: "Motion", source: TrackedPose) -> None:
+def _ask(motion: Motion, source: TrackedPose) -> None:
     """Pass on a block of samples; a camera that fails before anything moves ends the run."""
     source(motion.now_s, motion.step())
     if source.failed:

@@ -5,6 +5,7 @@ is fitted at a time, all other choices as the present fits made them.
 """
 
 import math
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,6 +16,7 @@ import numpy as np
 from scissorcal.bench.trade.candidate_fit import (
     as_fitted,
     holdout_rms,
+    needed_minutes,
     refit,
     with_cut,
     with_friction,
@@ -23,14 +25,14 @@ from scissorcal.bench.trade.candidate_fit import (
 from scissorcal.bench.trade.case import Case
 from scissorcal.bench.trade.fits import MINUTES, PROCESSOR, expected_fits_s
 from scissorcal.bench.trade.models import (
+    BYTES,
     central_law,
     compiled,
     model_of_law,
     nothing_rendered,
+    package_costs,
     present_law,
 )
-from scissorcal.bench.trade.needed_minutes import needed_minutes
-from scissorcal.bench.trade.package_cost import BYTES, package_costs
 from scissorcal.bench.trade.point import Error, Quantity, Sample, Setting
 from scissorcal.bench.trade.torque import (
     WORST,
@@ -39,8 +41,18 @@ from scissorcal.bench.trade.torque import (
     torque_errors,
 )
 from scissorcal.calibration.result import FitResult
+from scissorcal.errors import ScissorcalError
 from scissorcal.package.simplest.difference import Scene, felt
-from scissorcal.package.simplest.law import FAMILIES, NONE, Aspect, Law, fitted_candidate
+from scissorcal.package.simplest.law import (
+    FAMILIES,
+    NONE,
+    Aspect,
+    Candidate,
+    Law,
+    fitted_candidate,
+    simpler_candidates,
+)
+from scissorcal.package.simplest.project import Reference, project
 from scissorcal.recipe.schema import Recipe
 
 DAMPED = "damped"
@@ -121,14 +133,13 @@ class CandidateKnob(ABC):
     def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
         """Fit the candidate, compile it, and evaluate its torque over the scene."""
         recipe = self.recipe(as_fitted(case), setting.value)
-        found = refit(case, recipe, repeat, friction_too=self.fits == "friction")
-        assert found.cut is not None
-        changed = replace(case, recipe=recipe, cut_fit=found.cut, friction_fit=found.friction)
-        anew = [found.cut]
-        if self.fits == "friction" and found.friction is not None:
-            anew.insert(0, found.friction)
-        law = central_law(changed, found.cut, found.friction)
-        sample = candidate_sample(changed, law, found.seconds, fits=anew)
+        again = self.fits == "friction"
+        friction, cut, seconds = refit(case, recipe, repeat, friction_too=again)
+        assert cut is not None
+        changed = replace(case, recipe=recipe, cut_fit=cut, friction_fit=friction)
+        anew = (friction, cut) if again and friction is not None else (cut,)
+        law = central_law(changed, cut, friction)
+        sample = candidate_sample(changed, law, seconds, fits=anew)
         minutes = needed_minutes(case, _friction_speeds(changed), _cut_speeds(changed))
         if minutes is None:
             return replace(sample, notes=(*sample.notes, NO_MINUTES))
@@ -280,11 +291,10 @@ def candidate_sample(
     first of them the one whose hold-out error counts.
     """
     model, points = model_of_law(law), scene_places(case)
-    made = compiled(case, model)
     rng = np.random.default_rng(case.seed)
     costs = {
         PROCESSOR: Quantity(seconds, "s"),
-        **package_costs(case, model, made.compiled, rng),
+        **package_costs(case, model, compiled(case, model), rng),
     }
     holdout = holdout_rms(fits[0]) if fits else math.nan
     torque = model_torque(case, model, points)
@@ -315,3 +325,65 @@ def _cut_speeds(case: Case) -> int:
     """Damping takes two speeds, and so do teeth: what moves with the speed is no tooth."""
     structure = _cut(case).structure
     return 2 if structure.get("rate_damping") or structure["fracture"] == "rippled" else 1
+
+
+class Edge(CandidateKnob):
+    """The blade's edge: a line, an arc or a cubic in the place of what photographs gave.
+
+    Simpler edges are not fitted to the photographs again but to what the present law predicts
+    (`package.simplest.project`); the time counted is that of the projection.
+    """
+
+    name, title = "edge", "Candidate: edge"
+    cost = BYTES
+    against = "the edge of the present fit"
+    combined = False  # a fit has the edge that photographs gave it
+
+    def candidates(self, case: Case) -> Sequence[str]:
+        """Those below the fitted edge, and that one itself."""
+        law = _law(case)
+        simpler = [one.name for one in simpler_candidates(law, "edge")]
+        return (*simpler, self.fitted(case))
+
+    def fitted(self, case: Case) -> str:
+        """The family of the fit's edge."""
+        return fitted_candidate(_law(case), "edge").name
+
+    def recipe(self, recipe: Recipe, candidate: str) -> Recipe:
+        """Unchanged: photographs decide which edge a fit has."""
+        return recipe
+
+    def single(self, case: Case) -> str:
+        """A line has nothing simpler below it."""
+        if self.fitted(case) != "line":
+            return ""
+        return "The edge is a line, the simplest candidate."
+
+    def expected_s(self, case: Case, setting: Setting) -> float:
+        """A projection at the MAP point."""
+        return 2.0
+
+    def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
+        """Project the law at the MAP point onto the candidate, and compile it."""
+        began = time.process_time()
+        law = projected(case, setting.value)
+        return candidate_sample(case, law, time.process_time() - began)
+
+
+def projected(case: Case, family: str) -> Law:
+    """The fitted law with the nearest edge of another family, at the MAP point.
+
+    The law itself for its own family. Raises ScissorcalError where no such edge exists.
+    """
+    law, candidate = _law(case), Candidate("edge", family)
+    if candidate == fitted_candidate(law, "edge"):
+        return law
+    try:
+        return project(Reference.of(law, case.recipe), candidate).law
+    except ValueError as error:
+        raise ScissorcalError(f"The edge cannot be a {family}: {error}.") from error
+
+
+def _law(case: Case) -> Law:
+    assert case.cut_fit is not None
+    return central_law(case, case.cut_fit, case.friction_fit)

@@ -9,7 +9,6 @@ from scissorcal.bench.trade.case import Case, Photographed
 from scissorcal.bench.trade.fits import PROCESSOR
 from scissorcal.bench.trade.models import fitted_model, nothing_rendered
 from scissorcal.bench.trade.pictures import (
-    Resolution,
     count_of,
     factors_of,
     fit_edge,
@@ -61,7 +60,7 @@ class Photographs:
 
     def settings(self, case: Case) -> tuple[Setting, ...]:
         """Fewer photographs, then coarser ones; all at full width are the reference."""
-        return photo_settings(case.photographs)
+        return _photo_settings(case.photographs)
 
     def applied(self, case: Case, setting: Setting) -> Case:
         """The case with the first so many photographs; the width is that of the files."""
@@ -81,7 +80,7 @@ class Photographs:
 
     def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
         """Fit the edge, and put it into the model of the present fits."""
-        chosen = Resolution(setting.value["count"], setting.value["factor"])
+        chosen = setting.value["count"], setting.value["factor"]
         fit, seconds = fit_edge(case, chosen, np.random.default_rng([case.seed, repeat]))
         model, edge = fitted_model(case), fit.edge_posterior.edge
         length = case.recipe.rig.edge.length_m
@@ -93,7 +92,7 @@ class Photographs:
             "taper_rad": np.arctan(edge.slope_at(station)).tolist(),
             "torque": [None if np.isnan(value) else float(value) for value in torque],
         }
-        costs = _costs(seconds, chosen, setting)
+        costs = _costs(seconds, setting)
         rejected = dict.fromkeys(verdict.check for verdict in failed(fit.verdicts))
         return Sample(costs, outcome, (HELD,), tuple(rejected))
 
@@ -129,7 +128,7 @@ class Plate:
 
     def settings(self, case: Case) -> tuple[Setting, ...]:
         """Fewer photographs, then coarser ones; all at full width are the reference."""
-        return photo_settings((case.plate,)) if case.plate else ()
+        return _photo_settings((case.plate,)) if case.plate else ()
 
     def applied(self, case: Case, setting: Setting) -> Case:
         """The case with the first so many photographs; the width is that of the files."""
@@ -148,7 +147,7 @@ class Plate:
 
     def measure(self, case: Case, setting: Setting, repeat: int) -> Sample:
         """Detect the target in the photographs picked, and fit one pose to them."""
-        chosen = Resolution(setting.value["count"], setting.value["factor"])
+        chosen = setting.value["count"], setting.value["factor"]
         fit, seconds = locate_plate(case, chosen, np.random.default_rng([case.seed, repeat]))
         pose = fit.camera_plate
         outcome = {
@@ -156,7 +155,7 @@ class Plate:
             "translation_m": [float(value) for value in pose.translation_m],
         }
         rejected = dict.fromkeys(verdict.check for verdict in fit.rejected)
-        return Sample(_costs(seconds, chosen, setting), outcome, (), tuple(rejected))
+        return Sample(_costs(seconds, setting), outcome, (), tuple(rejected))
 
     def errors(self, case: Case, sample: Sample, reference: Sample | None) -> Mapping[str, Error]:
         """How far the pose is shifted (mm) and turned (deg)."""
@@ -169,7 +168,7 @@ class Plate:
         }
 
 
-def photo_settings(photographed: Sequence[Photographed]) -> tuple[Setting, ...]:
+def _photo_settings(photographed: Sequence[Photographed]) -> tuple[Setting, ...]:
     """Numbers of photographs at full width, and widths of all of them; cheapest first."""
     count, (width, height) = count_of(photographed), size_of(photographed)
     coarser = [factor for factor in factors_of(width, height) if factor > 1]
@@ -195,10 +194,10 @@ def _words(count: int, width: int) -> str:
     return f"{count} photograph{'s' if count > 1 else ''}, {width} px wide"
 
 
-def _costs(seconds: float, chosen: Resolution, setting: Setting) -> dict[str, Quantity]:
+def _costs(seconds: float, setting: Setting) -> dict[str, Quantity]:
     return {
         PROCESSOR: Quantity(seconds, "s"),
-        COUNT: Quantity(float(chosen.count), ""),
+        COUNT: Quantity(float(setting.value["count"]), ""),
         WIDTH: Quantity(float(setting.value["width_px"]), "px"),
     }
 

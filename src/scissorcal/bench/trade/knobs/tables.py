@@ -7,8 +7,14 @@ from typing import Any, get_args
 import numpy as np
 
 from scissorcal.bench.trade.case import Case
-from scissorcal.bench.trade.models import central, nothing_rendered, tables_of
-from scissorcal.bench.trade.package_cost import BYTES, STEP, measured_tables
+from scissorcal.bench.trade.models import (
+    BYTES,
+    STEP,
+    central,
+    measured_tables,
+    nothing_rendered,
+    tables_of,
+)
 from scissorcal.bench.trade.point import Error, Quantity, Sample, Setting
 from scissorcal.bench.trade.torque import AVERAGE, WORST
 from scissorcal.errors import MissingError
