@@ -78,3 +78,24 @@ from .verify.simulated_recordings import Sheet as Sheet
 from .verify.simulated_recordings import Unevenness as Unevenness
 from .verify.simulated_recordings import crack_law as crack_law
 from .verify.simulated_recordings import material_torque as material_torque
+
+__all__ = [
+    "CutExperiment",
+    "CutRun",
+    "Experiment",
+    "FitResult",
+    "FitSeries",
+    "FittedParameter",
+    "FrictionExperiment",
+    "FrictionRun",
+    "StrokeError",
+    "cut_experiment",
+    "cutting_from",
+    "fit_cut",
+    "fit_friction",
+    "friction_experiment",
+    "load",
+    "load_fit",
+    "read_header",
+    "save",
+]

@@ -8,3 +8,14 @@ from .gains import contact_gains as contact_gains
 from .gains import friction_rates as friction_rates
 from .path_file import read_path as read_path
 from .settings import REQUEST_FIRST as REQUEST_FIRST
+
+__all__ = [
+    "ContactGains",
+    "ContactLoop",
+    "HybridGains",
+    "approach_speed",
+    "choose_gains",
+    "contact_decays",
+    "contact_gains",
+    "friction_rates",
+]

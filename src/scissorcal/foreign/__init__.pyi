@@ -13,3 +13,17 @@ from .reading import read_foreign_text as read_foreign_text
 from .reading import read_json as read_json
 from .reading import reading as reading
 from .reading import refuse_unless_regular as refuse_unless_regular
+
+__all__ = [
+    "Format",
+    "decode_text",
+    "first_line",
+    "open_foreign",
+    "parse_isolated",
+    "parse_json",
+    "read_foreign",
+    "read_foreign_text",
+    "read_json",
+    "reading",
+    "refuse_unless_regular",
+]

@@ -24,3 +24,28 @@ from .problem import Problem as Problem
 from .problem import SamplingStatus as SamplingStatus
 from .problem import SearchStatus as SearchStatus
 from .problem import Stop as Stop
+
+__all__ = [
+    "ArNoise",
+    "Cluster",
+    "Counter",
+    "Effort",
+    "InferOptions",
+    "NotFiniteError",
+    "Optimum",
+    "Posterior",
+    "Problem",
+    "SamplingStatus",
+    "SearchStatus",
+    "Stop",
+    "find_optimum",
+    "fit_ar",
+    "gradient",
+    "hessian",
+    "infer",
+    "ljung_box",
+    "log_density",
+    "robust_covariance_of_scores",
+    "smooth_weights",
+    "tails_of",
+]

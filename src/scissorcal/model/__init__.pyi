@@ -40,3 +40,22 @@ from .surface.protocol import Surface as Surface
 from .terms import IDENTITY as IDENTITY
 from .terms import LOG as LOG
 from .terms import LOGIT as LOGIT
+
+__all__ = [
+    "AxisLaw",
+    "BladePoint",
+    "Cutting",
+    "Edge",
+    "EdgeDistribution",
+    "EdgeView",
+    "FrictionLaw",
+    "Response",
+    "cut_torque_along",
+    "damped",
+    "draw_edges",
+    "edge_height",
+    "friction_torque",
+    "mean_share",
+    "presliding_state",
+    "settled_contact",
+]

@@ -40,3 +40,21 @@ from .table_cost import table_bytes as table_bytes
 from .tables import hermite as hermite
 from .variations import Variations as Variations
 from .variations import central_values as central_values
+
+__all__ = [
+    "REVIEW_FORMAT",
+    "FailedFitsWarning",
+    "Manifest",
+    "ModelPackage",
+    "OutsideCoverageWarning",
+    "PackageOptions",
+    "PackageSummary",
+    "Review",
+    "build_package",
+    "check_package",
+    "manifest_schema_text",
+    "open_package",
+    "put_review",
+    "read_manifest",
+    "stamp",
+]

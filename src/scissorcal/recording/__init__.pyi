@@ -53,3 +53,34 @@ from .table_file import export_table as export_table
 from .writer import RecordingWriter as RecordingWriter
 from .writer import create_locked as create_locked
 from .writer import write_recording as write_recording
+
+__all__ = [
+    "SAMPLE_DTYPE",
+    "Attachment",
+    "ImportOptions",
+    "Joint",
+    "Kind",
+    "Recording",
+    "RecordingFacts",
+    "RecordingHeader",
+    "RecordingSummary",
+    "RecordingWriter",
+    "Recovered",
+    "Stroke",
+    "StrokeKind",
+    "StrokeLabels",
+    "TurningPoints",
+    "content_hash",
+    "export_channel",
+    "export_table",
+    "import_table",
+    "label_strokes",
+    "read_attachments",
+    "read_header",
+    "read_recording",
+    "read_telemetry",
+    "recording_schema",
+    "recover",
+    "summary",
+    "write_recording",
+]

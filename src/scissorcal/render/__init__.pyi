@@ -14,3 +14,17 @@ from .result import RenderResult as RenderResult
 from .result import latency_of as latency_of
 from .rig_facts import RigFacts as RigFacts
 from .rig_facts import with_probe as with_probe
+
+__all__ = [
+    "Admission",
+    "AppliedLimits",
+    "PoseReport",
+    "RenderResult",
+    "Rendering",
+    "RigFacts",
+    "VirtualStrokes",
+    "admit_package",
+    "latency_of",
+    "open_writer",
+    "render",
+]

@@ -26,3 +26,25 @@ from .subjects.closing import trust_check_sha256 as trust_check_sha256
 from .subjects.plate_pose import plate_panels as plate_panels
 from .subjects.posterior import parameters_panel as parameters_panel
 from .subjects.scene import scene_sentence as scene_sentence
+
+__all__ = [
+    "Cell",
+    "Comparison",
+    "Evidence",
+    "Geometry",
+    "Panel",
+    "ReportDocument",
+    "ReportFiles",
+    "Side",
+    "build_report",
+    "compare",
+    "document_of",
+    "document_of_fit",
+    "panel_text",
+    "panels_text",
+    "posterior_sha256",
+    "read_twin",
+    "sign_page",
+    "trust_check_sha256",
+    "write_comparison",
+]

@@ -26,3 +26,30 @@ from .tracker import Counts as Counts
 from .tracker import Outcome as Outcome
 from .tracker import PoseEstimate as PoseEstimate
 from .tracker import PoseTracker as PoseTracker
+
+__all__ = [
+    "CameraErrors",
+    "CameraPose",
+    "ClockFit",
+    "ClockWatch",
+    "ContactErrors",
+    "Counts",
+    "DelayFit",
+    "FollowedRow",
+    "ForceErrors",
+    "Outcome",
+    "PlateMotion",
+    "PoseEstimate",
+    "PoseFollower",
+    "PoseTracker",
+    "TipContact",
+    "TipContacts",
+    "TrackFigures",
+    "TrackingSettings",
+    "fit_clock",
+    "measure_delay",
+    "pose_error",
+    "settings_of",
+    "track_figures",
+    "track_verdicts",
+]
