@@ -248,6 +248,11 @@ def recipe_settings(recipe: Recipe, text: str, *, defaults: bool = True) -> tupl
     """
     keys = list(_walk(recipe, ()))
     lines = key_lines(text, [(*table, name) for table, name, _, _, _ in keys])
+    former = key_lines(text, [(*table, OLD_LAW_KEY) for table, _, _, _, _ in keys])
+    lines = [
+        old if key[1] == "law" and line is None else line
+        for key, line, old in zip(keys, lines, former, strict=True)
+    ]
     settings = []
     for (table, name, value, given, why), line in zip(keys, lines, strict=True):
         if given:
