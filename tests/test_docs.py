@@ -159,6 +159,12 @@ def test_a_stale_api_page_is_reported(tmp_path):
     assert "scissorcal.errors.md is not up to date: run 'make api'." in done.stderr
 
 
+def test_what_a_class_inherits_stands_on_its_api_page():
+    page = (GENERATED / "scissorcal.recording.md").read_text(encoding="utf-8")
+    for member in ("append", "note", "mark", "attach", "poll", "close"):
+        assert f"### RecordingWriter.{member}\n" in page, member
+
+
 def test_drawings_are_those_of_the_script(tmp_path):
     command = [sys.executable, "-m", "benchmarks.draw_docs", "--out", str(tmp_path)]
     subprocess.run(command, cwd=ROOT, check=True)
