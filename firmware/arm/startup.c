@@ -1,13 +1,12 @@
-/* From reset to main on a Cortex-M4F: vector table, data, bss, FPU. Faults release the motors. */
+/* From reset to the loop on a Cortex-M4F: vector table, data, bss, FPU. Faults release the motors. */
 #include <stdint.h>
 
-#include "registers.h"
+#include "board.h"
 
 /* Of the linker script; only their addresses mean something. */
 extern uint32_t fw_stack_top[], fw_data_load[], fw_data_start[], fw_data_end[];
 extern uint32_t fw_bss_start[], fw_bss_end[];
 
-int main(void);
 void fw_reset(void);
 void fw_unexpected(void);
 
@@ -34,8 +33,10 @@ void fw_reset(void)
     for (uint32_t *word = fw_bss_start; word < fw_bss_end; word++) {
         *word = 0;
     }
-    main();
-    fw_unexpected();
+    loop_start();
+    for (;;) {
+        loop_tick();
+    }
 }
 
 /* The 16 words of the architecture (PM0214, section 2.3.4). The second is where reset begins. */
