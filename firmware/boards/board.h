@@ -1,4 +1,4 @@
-/* What a board without an operating system gives to the loop (loop.c): its table and ten functions. */
+/* What a board without an operating system gives to the loop (loop.c): its table and its functions. */
 #ifndef FW_BOARDS_BOARD_H
 #define FW_BOARDS_BOARD_H
 
@@ -7,6 +7,7 @@
 #define REG(address) (*(volatile uint32_t *)(uintptr_t)(address))
 
 extern const fw_board board_table;
+extern const float board_duty_max; /* share of the supply that the bridge can put on the motor */
 
 void board_start(void);            /* clock, pins, timers, port, ADC; the motors stay released */
 void board_start_watchdog(void);   /* from here on a loop that stops resets the board within 30 ms */

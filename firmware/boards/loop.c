@@ -26,7 +26,7 @@ static float within(float value, float most)
     return value > most ? most : value < -most ? -most : value;
 }
 
-/* The share of the supply to put on the motor, -0.95 to 0.95: a bridge's high side needs pauses. */
+/* The share of the supply to put on the motor. */
 static float motor_duty(const fw_inputs *in, const fw_outputs *out)
 {
     const fw_board *board = &board_table;
@@ -41,11 +41,11 @@ static float motor_duty(const fw_inputs *in, const fw_outputs *out)
     }
     if (board->capabilities & SC_CAPABILITY_TORQUE_MEASURED) {
         motor.correction += 0.5f * board->resistance * (motor.wanted - in->current);
-        motor.correction = within(motor.correction, supply);
+        motor.correction = within(motor.correction, supply); /* winds up no farther */
     }
     motor.wanted = out->torque / board->torque_per_A;
     const float volts = board->resistance * motor.wanted + board->torque_per_A * motor.rate;
-    return within((volts + motor.correction) / supply, 0.95f);
+    return within((volts + motor.correction) / supply, board_duty_max);
 }
 
 void loop_start(void)

@@ -35,6 +35,9 @@ const fw_board board_table = {
     .home_at_stop = 1,
 };
 
+/* A bridge's high side needs pauses. */
+const float board_duty_max = 0.95f;
+
 /* Wiring and scales that only this board knows. */
 #define HSE_MHZ 8u                            /* crystal of the board */
 #define MOTOR_SIGN 1.0f                       /* -1 if a positive torque closes the blades */
