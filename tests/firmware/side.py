@@ -1,7 +1,7 @@
 """The firmware's core as the device side of a virtual rig: the rig has only mechanics and sensors.
 
-One tick measures what the last tick's drive brought about, takes what the host sent since, decides,
-drives the rig for a tick, and sends. What only a simulator has (sheet, hand) is set beside the core.
+One tick measures what the last drive brought about, takes what the host sent since, decides, drives
+the rig for a tick, and sends. What only a simulator has (sheet, hand) is set beside the core.
 """
 
 import math
