@@ -2,8 +2,8 @@
 
     python -m tests.firmware.records    # write them anew, by the build in this Python
 
-`GOLDEN` is gzip of: the board (fw_board), then for each tick fw_record_in and fw_record_out, as they
-lie in the memory of a little-endian processor. The ticks are a session with everything in it:
+`GOLDEN` is gzip of: the board (fw_board), then for each tick fw_record_in and fw_record_out, as
+they lie in the memory of a little-endian processor. The ticks are a session with all in it:
 settings, commands, homing, each fault, garbled bytes, and inputs that are no numbers.
 """
 
@@ -32,7 +32,7 @@ from scissorcal.kernel import (
 )
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "firmware-records.gz"
-TICKS = 6000
+TICKS = 4000
 SEED = 32
 
 BOARD = FirmwareBoard(
@@ -48,7 +48,7 @@ BOARD = FirmwareBoard(
     torque_limit=0.5,
     force_limit=20.0,
     opening_min=0.1,
-    opening_max=1.0,
+    opening_max=0.95,
     advance_min=-0.1,
     advance_max=0.2,
     opening_resolution=1e-4,
@@ -68,7 +68,7 @@ BOARD = FirmwareBoard(
     supply_max=13.0,
     temperature_max=80.0,
     home_torque=0.05,
-    home_speed=0.5,
+    home_speed=2.0,
     home_opening=0.9,
     home_timeout=5.0,
 )
