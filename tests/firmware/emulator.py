@@ -18,6 +18,14 @@ from unicorn.arm_const import (
     UC_CPU_ARM_CORTEX_M4,
 )
 
+from scissorcal.kernel import (
+    RECORD_BYTES,
+    Drive,
+    FirmwareInputs,
+    FirmwareOutputs,
+    FirmwarePhase,
+    HomeResult,
+)
 from tests.firmware.elf import Image
 
 FLASH, FLASH_BYTES = 0x08000000, 1 << 20
@@ -25,7 +33,10 @@ RAM, RAM_BYTES = 0x20000000, 128 << 10
 PERIPHERALS, PERIPHERAL_BYTES = 0x40000000, 0x80000
 SYSTEM, SYSTEM_BYTES = 0xE0000000, 0x100000
 CPACR = 0xE000ED88
-RECORD_BYTES = 512
+INPUTS = struct.Struct("<I7f2I")
+"""fw_record_in before its bytes."""
+OUTPUTS = struct.Struct("<2fI3BxI")
+"""fw_record_out before its bytes."""
 PAINT = 0xA5
 STACK_ROOM = 16384
 """Bytes below the top of the stack that are painted: many times what it may take."""
@@ -115,20 +126,39 @@ class Processor:
 
 
 class EmulatedCore:
-    """The core in an image, by its record interface: a device without its board."""
+    """The core in an image, by its record interface: a device without its board.
 
-    def __init__(self, image: Image, board: bytes) -> None:
+    It has the ``tick`` and ``garbled`` of `scissorcal.kernel.FirmwareCore`.
+    """
+
+    garbled = 0
+
+    def __init__(self, image: Image, table: bytes) -> None:
         """Start the core with a table (a fw_board); ValueError if it refuses the table."""
         self.processor = Processor(image)
         # above the image's own memory and far below its stack
         self._in = (image.address("fw_bss_end") + 1023) & ~1023
         self._out = self._in + RECORD_BYTES
         self._core = image.address("core")
-        self.processor.write(self._in, board)
+        self.processor.write(self._in, table)
         if not self.processor.call("fw_init", self._core, self._in):
             raise ValueError("The core refuses this table.")
 
-    def tick(self, record: bytes) -> bytes:
+    def tick(self, inputs: FirmwareInputs, received: bytes = b"") -> FirmwareOutputs:
+        """Pass one tick."""
+        out = self.tick_record(record_of(inputs, received))
+        torque, force, drive, phase, cause, home_result, size = OUTPUTS.unpack_from(out)
+        return FirmwareOutputs(
+            torque,
+            force,
+            Drive(drive),
+            FirmwarePhase(phase),
+            cause,
+            HomeResult(home_result),
+            out[OUTPUTS.size : OUTPUTS.size + size],
+        )
+
+    def tick_record(self, record: bytes) -> bytes:
         """Pass one tick: a fw_record_in to a fw_record_out."""
         self.processor.write(self._in, record)
         self.processor.call("fw_record_tick", self._core, self._in, self._out)
@@ -138,3 +168,9 @@ class EmulatedCore:
         """Pass one tick and return how many instructions it took."""
         self.processor.write(self._in, record)
         return self.processor.counted("fw_record_tick", self._core, self._in, self._out)
+
+
+def record_of(inputs: FirmwareInputs, received: bytes = b"") -> bytes:
+    """A fw_record_in."""
+    head = INPUTS.pack(*inputs, len(received))
+    return (head + received).ljust(RECORD_BYTES, b"\0")

@@ -1,69 +1,73 @@
 """The binary that gets flashed computes what every other build does, within its limits."""
 
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from scissorcal.kernel import Command, CommandFlag, Config, ConfigKey, FaultCause, Hello, encode
-from tests.firmware.builds import HOST_BUILDS, host_build, make, run
-from tests.firmware.elf import Image, read_elf
-from tests.firmware.records import Board, Inputs, Outputs, a_day_of_records
+from scissorcal.kernel import (
+    Command,
+    CommandFlag,
+    Config,
+    ConfigKey,
+    Drive,
+    FirmwareCore,
+    FirmwareInputs,
+    FirmwarePhase,
+    InputFlag,
+    encode,
+)
 
-emulator = pytest.importorskip("tests.firmware.emulator", exc_type=ImportError)
+from . import records
+from .builds import HOST_BUILDS, host_build, make, run
+from .elf import Image, read_elf
+
+emulator = pytest.importorskip(
+    "tests.firmware.emulator", reason="needs unicorn, of the extra 'dev'", exc_type=ImportError
+)
 
 EXCHANGE_INSTRUCTIONS = 5000
 STACK_BYTES = 1024
-FLASH_BYTES = 24 << 10
-TICKS = 20_000
-PHASES = 5
-BOARD = Board().packed()
+TABLE = FirmwareCore(records.BOARD).table
 
 
 @pytest.fixture(scope="module")
-def records() -> list[bytes]:
-    return a_day_of_records(TICKS, seed=1)
+def golden() -> tuple[list[bytes], list[bytes]]:
+    """Golden records: in, out."""
+    pairs = records.read_golden()[1]
+    return [given for given, _ in pairs], [made for _, made in pairs]
 
 
-@pytest.fixture(scope="module")
-def answers(stm32f405: Image, records: list[bytes]) -> bytes:
-    """What the flashed binary answers."""
-    core = emulator.EmulatedCore(stm32f405, BOARD)
-    return b"".join(core.tick(record) for record in records)
+def test_the_binary_gives_the_golden_records(
+    stm32f405: Image, golden: tuple[list[bytes], list[bytes]]
+) -> None:
+    core = emulator.EmulatedCore(stm32f405, TABLE)
+    for tick, (given, made) in enumerate(zip(*golden, strict=True)):
+        assert core.tick_record(given) == made, f"tick {tick}"
 
 
-def outputs_of(answers: bytes) -> list[Outputs]:
-    size = emulator.RECORD_BYTES
-    return [Outputs.of(answers[at : at + size]) for at in range(0, len(answers), size)]
-
-
-def test_the_records_visit_every_phase_and_every_cause(answers: bytes) -> None:
-    outputs = outputs_of(answers)
-    assert {tick.phase for tick in outputs} == set(range(PHASES))
-    assert {tick.cause for tick in outputs} == set(map(int, FaultCause))
-    assert sum(len(tick.sent) for tick in outputs) > 400_000
+def test_the_binary_gives_them_without_optimisation(
+    golden: tuple[list[bytes], list[bytes]], tmp_path: Path
+) -> None:
+    pytest.importorskip("ziglang", reason="needs the compiler of the extra 'page'")
+    make(tmp_path, f"{tmp_path}/stm32f405.elf", optimise="-O0")
+    core = emulator.EmulatedCore(read_elf(tmp_path / "stm32f405.elf"), TABLE)
+    assert [core.tick_record(given) for given in golden[0]] == golden[1]
 
 
 @pytest.mark.parametrize("name", HOST_BUILDS)
-def test_the_binary_answers_as_the_builds_for_this_computer(
-    name: str, answers: bytes, records: list[bytes], tmp_path: Path
+def test_builds_for_this_computer_give_them(
+    name: str, golden: tuple[list[bytes], list[bytes]], tmp_path: Path
 ) -> None:
     problem = host_build(name, tmp_path / "core")
     if problem is not None and "32 bits" in name:
         pytest.skip("needs gcc's 32-bit libraries: apt install gcc-multilib")
     assert problem is None
-    assert run(tmp_path / "core", BOARD, records) == answers
+    assert run(tmp_path / "core", TABLE, golden[0]) == b"".join(golden[1])
 
 
-def test_the_binary_answers_alike_without_optimisation(
-    answers: bytes, records: list[bytes], tmp_path: Path
-) -> None:
-    make(tmp_path, f"{tmp_path}/stm32f405.elf", optimise="-O0")
-    core = emulator.EmulatedCore(read_elf(tmp_path / "stm32f405.elf"), BOARD)
-    assert b"".join(core.tick(record) for record in records) == answers
-
-
-def test_start_copies_data_clears_bss_and_enables_the_fpu(stm32f405: Image) -> None:
+def test_start_clears_memory_and_enables_the_fpu(stm32f405: Image) -> None:
     processor = emulator.Processor(stm32f405)
     address, size = stm32f405.symbols["core"]
     assert processor.memory(address, size) == bytes(size)  # painted at power-on
@@ -72,40 +76,40 @@ def test_start_copies_data_clears_bss_and_enables_the_fpu(stm32f405: Image) -> N
 
 
 def test_an_exchange_takes_few_instructions(stm32f405: Image) -> None:
-    core = emulator.EmulatedCore(stm32f405, BOARD)
-    setup = [
-        encode(Config(int(ConfigKey.STREAM), 1, 1.0)),
-        encode(Config(int(ConfigKey.HOME), 2, 1.0)),
-        *[b""] * 3,
-    ]
-    for tick, frame in enumerate(setup):
-        core.tick(Inputs(device_us=1000 * tick, flags=8 if tick == 4 else 0).record(frame))
+    core = emulator.EmulatedCore(stm32f405, TABLE)
+    asked = (ConfigKey.STREAM, ConfigKey.HOME)
+    frames = [encode(Config(int(key), 1, 1.0)) for key in asked] + [b"", b""]
+    at = FirmwareInputs(device_us=0, opening=0.5, supply=12.0, temperature=25.0)
+    homed = at._replace(flags=int(InputFlag.AT_HOME))
+    for inputs, frame in zip((at, at, at, homed), frames, strict=True):
+        core.tick(inputs, frame)
     counts = []
-    for tick in range(5, 205):
-        torque = 0.01 * (tick % 50) - 0.2
-        command = encode(Command(int(CommandFlag.ENABLE), tick, torque, 1.0, 3))
-        record = Inputs(device_us=1000 * tick, opening=0.5 + 1e-4 * tick, current=0.3).record(
-            command
-        )
-        counts.append(core.counted_tick(record))
-    last = Outputs.of(core.tick(record))
-    assert (last.phase, last.drive, len(last.sent)) == (3, 1, 32)
+    for tick in range(200):
+        torque, force = 0.01 * (tick % 50) - 0.2, 0.1 * (tick % 30)
+        command = encode(Command(int(CommandFlag.ENABLE), tick, torque, force, 3))
+        moved = at._replace(device_us=500 * tick, opening=0.5 - 1e-4 * tick, current=0.3)
+        counts.append(core.counted_tick(emulator.record_of(moved, command)))
+    last = core.tick(moved, command)
+    assert (last.phase, last.drive) == (FirmwarePhase.ENABLED, Drive.DRIVE)
+    assert len(last.sent) == 32
+    print(f"{max(counts)} instructions for a COMMAND and a STATE at the most")
     assert 1000 < max(counts) <= EXCHANGE_INSTRUCTIONS
 
 
-def test_the_stack_stays_small(stm32f405: Image, records: list[bytes]) -> None:
-    core = emulator.EmulatedCore(stm32f405, BOARD)
+def test_the_stack_stays_small(stm32f405: Image, golden: tuple[list[bytes], list[bytes]]) -> None:
+    core = emulator.EmulatedCore(stm32f405, TABLE)
     core.processor.paint_stack()
-    for record in records[:5000]:
-        core.tick(record)
+    for given in golden[0]:
+        core.tick_record(given)
+    print(f"{core.processor.stack_bytes()} bytes of stack for a tick")
     assert 100 < core.processor.stack_bytes() <= STACK_BYTES
 
 
 def test_a_table_that_is_impossible_is_refused(stm32f405: Image) -> None:
+    table = bytearray(TABLE)
+    table[32 + 4 : 32 + 8] = bytes(4)  # tick_us
+    assert bytes(table) != TABLE
     with pytest.raises(ValueError, match="refuses this table"):
-        emulator.EmulatedCore(stm32f405, Board(torque_per_A=0.0).packed())
-
-
-def test_an_identity_is_answered_at_once(stm32f405: Image) -> None:
-    core = emulator.EmulatedCore(stm32f405, BOARD)
-    assert Outputs.of(core.tick(Inputs().record(encode(Hello(7))))).sent[-1:] == b"\0"
+        emulator.EmulatedCore(stm32f405, bytes(table))
+    faster = replace(records.BOARD, tick_us=1000)
+    emulator.EmulatedCore(stm32f405, FirmwareCore(faster).table)
