@@ -222,6 +222,7 @@ static void begin_sample(sc_servo *servo, const sc_state *state)
 
 static void write_command(sc_servo *servo, uint16_t flags, sc_command *command)
 {
+    command->hold_ticks = 0;
     command->flags = flags;
     command->echo_sequence = servo->sequence;
     command->torque = servo->torque;
