@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Protocol, Self
 from scissorcal.device.ports import open_port
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
+    EARLIER_SCHEMAS,
     PROTOCOL_VERSION,
     SCHEMA_HASH,
     Config,
@@ -39,6 +40,10 @@ READ_BYTES = 65536
 IDENTITY_TYPE = 0x11
 SHORTEST_TICK_US, LONGEST_TICK_US = 250, 10_000
 """Limits of the protocol (docs/protocol.md, Timing)."""
+
+
+SCHEMAS = {**EARLIER_SCHEMAS, PROTOCOL_VERSION: SCHEMA_HASH}
+"""Schema hash of each protocol version that is served."""
 
 
 class Link(Protocol):
@@ -274,11 +279,13 @@ def check_identity(name: str, identity: Identity) -> Identity:
     Raises DeviceError where version or schema differ, where a limit is no number or empty, or where
     the tick is shorter or longer than the protocol's.
     """
-    if identity.schema_hash != SCHEMA_HASH:
+    version = identity.protocol_version
+    if identity.schema_hash != SCHEMAS.get(version):
         raise DeviceError(
             f"{name} has another wire schema: the device (firmware "
-            f"{identity.firmware_version}) has {identity.schema_hash:016x}, this scissorcal has "
-            f"{SCHEMA_HASH:016x}. Update the device's firmware to this scissorcal's "
+            f"{identity.firmware_version}, protocol version {version}) has "
+            f"{identity.schema_hash:016x}, this scissorcal has "
+            f"{SCHEMAS.get(version, SCHEMA_HASH):016x}. Update the device's firmware to this scissorcal's "
             "data_schemas/wire.json, or install the scissorcal that the firmware was built with."
         )
     wrong = [
@@ -327,7 +334,7 @@ def check_echo(name: str, echo: ConfigEcho, key: int, value: float) -> None:
 
 
 def _refuse_other_version(name: str, payload: bytes) -> None:
-    if len(payload) > 1 and payload[0] == IDENTITY_TYPE and payload[1] != PROTOCOL_VERSION:
+    if len(payload) > 1 and payload[0] == IDENTITY_TYPE and payload[1] not in SCHEMAS:
         older = "the device's firmware" if payload[1] < PROTOCOL_VERSION else "scissorcal"
         raise DeviceError(
             f"{name} has wire protocol version {payload[1]}, this scissorcal version "
