@@ -25,6 +25,8 @@ from .hybrid import hybrid_inputs as hybrid_inputs
 from .joint import estimated_rates as estimated_rates
 from .joint import presliding_path as presliding_path
 from .layout import fill_struct as fill_struct
+from .image import IMAGE_FORMAT as IMAGE_FORMAT
+from .image import model_image as model_image
 from .loop import Histogram as Histogram
 from .loop import LoopBlock as LoopBlock
 from .loop import LoopCounters as LoopCounters
@@ -92,6 +94,7 @@ __all__ = [
     "EARLIER_SCHEMAS",
     "HYBRID_INPUT_DTYPE",
     "HYBRID_OUTPUT_DTYPE",
+    "IMAGE_FORMAT",
     "MOST_PIECES",
     "MOST_STRIPS",
     "PROTOCOL_VERSION",
@@ -170,6 +173,7 @@ __all__ = [
     "hybrid_inputs",
     "largest_overlap",
     "lock_memory",
+    "model_image",
     "presliding_path",
     "run_loop",
     "walk_crack",
