@@ -91,7 +91,8 @@ typedef struct {
     float heat;              /* A^2 s above what the motor bears for hours */
     float torque;            /* N m, given in the last tick */
     float force;             /* N */
-    float home_from;         /* rad, where the blades stood when they last moved while homing */
+    float home_start;        /* rad, where homing began, as the encoder gave it */
+    float home_from;         /* rad, where the blades were when they last moved while homing */
     uint8_t problem;         /* FW_BOARD_... */
     uint8_t phase;
     uint8_t cause;           /* SC_CAUSE_... of the fault that stands */
@@ -99,8 +100,10 @@ typedef struct {
     uint8_t streaming;
     uint8_t homed;
     uint8_t home_result;     /* FW_HOME_... */
-    uint8_t home_leaving;    /* homing began on the switch: leave it first */
+    uint8_t home_asked;      /* HOME = 1 came since the last tick */
+    uint8_t home_leaving;    /* away from the switch or the stop first */
     uint8_t home_moved;
+    uint8_t clear_asked;     /* CLEAR_FAULT came since the last tick */
     uint8_t measured;        /* last_opening holds a reading */
     uint8_t encoder_doubt;   /* ticks until the encoders are believed again */
     uint8_t saturated;
