@@ -22,11 +22,11 @@ from .hybrid import HybridConfig as HybridConfig
 from .hybrid import HybridFlag as HybridFlag
 from .hybrid import NormalLaw as NormalLaw
 from .hybrid import hybrid_inputs as hybrid_inputs
+from .image import IMAGE_FORMAT as IMAGE_FORMAT
+from .image import model_image as model_image
 from .joint import estimated_rates as estimated_rates
 from .joint import presliding_path as presliding_path
 from .layout import fill_struct as fill_struct
-from .image import IMAGE_FORMAT as IMAGE_FORMAT
-from .image import model_image as model_image
 from .loop import Histogram as Histogram
 from .loop import LoopBlock as LoopBlock
 from .loop import LoopCounters as LoopCounters

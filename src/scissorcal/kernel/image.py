@@ -1,7 +1,7 @@
 """A model and how it is driven as one flat block of numbers, which a device renders from in place.
 
-The layout is that of ``firmware/core/fw_image.h``: a header of 37 numbers, then the tables' rows, all
-little-endian and 4 bytes long.
+The layout is that of ``firmware/core/fw_image.h``: a header of 37 numbers, then the tables' rows,
+all little-endian and 4 bytes long.
 """
 
 import struct
