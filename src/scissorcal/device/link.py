@@ -310,8 +310,9 @@ def check_identity(name: str, identity: Identity) -> Identity:
             f"{name} has another wire schema: the device (firmware "
             f"{identity.firmware_version}, protocol version {version}) has "
             f"{identity.schema_hash:016x}, this scissorcal has "
-            f"{SCHEMAS.get(version, SCHEMA_HASH):016x}. Update the device's firmware to this scissorcal's "
-            "data_schemas/wire.json, or install the scissorcal that the firmware was built with."
+            f"{SCHEMAS.get(version, SCHEMA_HASH):016x}. Update the device's firmware to this "
+            "scissorcal's data_schemas/wire.json, or install the scissorcal that the firmware was "
+            "built with."
         )
     wrong = [
         name

@@ -116,7 +116,8 @@ class LockstepLink:
         """Send a frame (or none), advance one tick, and return the STATE payloads that arrive.
 
         There is one payload per tick unless faults drop or delay it, and none before STREAM is
-        set; those that arrived while :meth:`configure` waited for its echo come first. Raises DeviceError once the rig is unplugged or the link closed.
+        set; those that arrived while :meth:`configure` waited for its echo come first.
+        Raises DeviceError once the rig is unplugged or the link closed.
         """
         self._check_open()
         if command_frame is not None:
@@ -197,7 +198,7 @@ class LockstepLink:
 
     def _collect(self) -> list[bytes]:
         """Take what has arrived: states are kept for :meth:`exchange`, the rest is returned."""
-        answers = []
+        answers: list[bytes] = []
         for payload in self._decoder.feed(b"".join(self._device.take())):
             (self._states if _is_state(payload) else answers).append(payload)
         return answers
