@@ -15,6 +15,15 @@ from .cut_fit import CutFitParameters as CutFitParameters
 from .cut_fit import cut_log_likelihood as cut_log_likelihood
 from .cut_fit import cut_log_likelihoods as cut_log_likelihoods
 from .cut_fit import walk_crack as walk_crack
+from .firmware import RECORD_BYTES as RECORD_BYTES
+from .firmware import Drive as Drive
+from .firmware import FirmwareBoard as FirmwareBoard
+from .firmware import FirmwareCore as FirmwareCore
+from .firmware import FirmwareInputs as FirmwareInputs
+from .firmware import FirmwareOutputs as FirmwareOutputs
+from .firmware import FirmwarePhase as FirmwarePhase
+from .firmware import HomeResult as HomeResult
+from .firmware import InputFlag as InputFlag
 from .hybrid import HYBRID_INPUT_DTYPE as HYBRID_INPUT_DTYPE
 from .hybrid import HYBRID_OUTPUT_DTYPE as HYBRID_OUTPUT_DTYPE
 from .hybrid import Hybrid as Hybrid
