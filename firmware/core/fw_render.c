@@ -55,7 +55,10 @@ static float within(float value, float limit)
 static float limited(float wanted, float before, float limit, float most)
 {
     const float given = within(isfinite(wanted) ? wanted : 0.0f, limit);
-    return within(before + within(given - before, most), limit);
+    if (given > before + most) {
+        return before + most;
+    }
+    return given < before - most ? before - most : given;
 }
 
 /* Damping against energy that the loop made: what the motors did beyond the torque that the model had
