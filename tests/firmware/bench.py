@@ -31,7 +31,9 @@ from scissorcal.kernel.firmware import (
     FirmwareOutputs,
 )
 
-ENABLE = Command(flags=int(CommandFlag.ENABLE), echo_sequence=0, torque=0.0, force=0.0, hold_ticks=0)
+ENABLE = Command(
+    flags=int(CommandFlag.ENABLE), echo_sequence=0, torque=0.0, force=0.0, hold_ticks=0
+)
 CLEAR = ENABLE._replace(flags=int(CommandFlag.ENABLE | CommandFlag.CLEAR_FAULT))
 IMAGE_BYTES = 20 * 1024
 BOARD = FirmwareBoard(

@@ -1,4 +1,4 @@
-"""A package's image in the firmware: what it refuses, and steps that are the kernel's bit for bit."""
+"""The image of a package in the firmware: what it refuses, and steps as the kernel makes them."""
 
 import struct
 import zlib
@@ -208,5 +208,3 @@ def test_nothing_is_loaded_while_the_motors_are_on() -> None:
         assert (echo.status, echo.crc32) == (LoadStatus.BUSY, checksum)
     bench.tick(ENABLE._replace(flags=0))
     assert bench.load(LoadCommit(0)).status == LoadStatus.OK
-
-

@@ -44,9 +44,7 @@ def test_the_probe_finds_nothing_wrong_with_the_firmware() -> None:
 
 @pytest.mark.slow
 @pytest.mark.probes
-def test_a_day_with_the_firmware(
-    cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_day_with_the_firmware(cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     through = partial(LockstepLink, device=FirmwareSide)
     monkeypatch.setattr(lockstep, "LockstepLink", through)
     workspace = Workspace(tmp_path / "paper")

@@ -165,7 +165,7 @@ def test_a_hosts_silence_is_not_felt_for_two_seconds_and_then_it_brakes() -> Non
     bench.tick(ENABLE)
     silent = closing(bench, RENDER_SILENCE_TICKS + 10)
     braked = next(i for i, state in enumerate(silent) if state.flags & StateFlag.FAULT_LATCHED)
-    assert braked == RENDER_SILENCE_TICKS
+    assert braked == RENDER_SILENCE_TICKS - 1  # the tick of the COMMAND counts
     assert silent[-1].cause == FaultCause.WATCHDOG
     assert bench.out.drive is Drive.BRAKE
     assert all(rendering(state) for state in silent[:braked])

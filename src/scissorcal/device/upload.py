@@ -44,7 +44,7 @@ def refuse_without_rendering(identity: Identity) -> None:
         )
 
 
-def upload(link: Loading, image: bytes, tell: ShowShare) -> int:
+def load_image(link: Loading, image: bytes, tell: ShowShare) -> int:
     """Have the device hold an image in force, and return the checksum that both have of it.
 
     A device that holds it already is sent nothing. ``tell`` is called after each piece. Raises

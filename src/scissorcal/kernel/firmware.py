@@ -148,7 +148,10 @@ class FirmwareCore:
             raise ValueError(ffi.string(sentence[0]).decode("ascii"))
         lib.fw_init(self._core, table)
         if image_bytes:
-            self._render, self._memory = ffi.new("fw_render *"), ffi.new("float[]", image_bytes // 4)
+            self._render, self._memory = (
+                ffi.new("fw_render *"),
+                ffi.new("float[]", image_bytes // 4),
+            )
             lib.fw_let_render(self._core, self._render, self._memory, image_bytes)
 
     @property

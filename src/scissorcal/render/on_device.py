@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from scissorcal.device.motion import DEADLINE
 from scissorcal.device.session import RigSession
-from scissorcal.device.upload import upload
+from scissorcal.device.upload import load_image
 from scissorcal.kernel import ModelTables, ServoConfig
 from scissorcal.package import ModelPackage, image_of
 from scissorcal.render.result import PASSIVITY
@@ -36,10 +36,10 @@ def load(
 ) -> Loaded:
     """Have the device hold the package with these limits and admitted tables.
 
-    Raises InputError for a package that no device renders, DeviceError as `device.upload.upload`.
+    Raises InputError for a package that no device renders, DeviceError as `load_image`.
     """
     image = image_of(package, config, tables)
-    return Loaded(len(image), upload(session.link, image, session.operator.progress))
+    return Loaded(len(image), load_image(session.link, image, session.operator.progress))
 
 
 def watching(config: ServoConfig) -> ServoConfig:
