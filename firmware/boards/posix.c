@@ -1,7 +1,7 @@
 /* A device without hardware: the core as a process on a pseudo-terminal at the tick's rate.
  *
  *   posix            prints the port's path, serves in real time until stdin ends
- *   posix --records  no port and no clock: fw_record_in from stdin, fw_record_out to stdout
+ *   posix --records  no port and no clock: a board, then fw_record_in from stdin, fw_record_out out
  *
  * Behind it stand blades with inertia, dry and viscous friction between two stops, and a carriage.
  */
@@ -66,8 +66,7 @@ static void plant_step(axis *a, float effort, int brakes, float dt)
 
 static float measured(float value, float step)
 {
-    const long count = (long)(value / step); /* towards zero, as a counter does */
-    return (float)count * step;
+    return (float)(long)(value / step) * step; /* towards zero, as a counter does */
 }
 
 static void plant_tick(axis axes[2], const fw_outputs *drive, fw_inputs *inputs)
@@ -120,17 +119,20 @@ int main(int count, char **words)
     static fw_core core;
     static fw_record_in in;
     static fw_record_out out;
-    const char *sentence;
-    if (fw_board_problem(&BOARD, &sentence) != FW_BOARD_POSSIBLE) {
+    fw_board board = BOARD;
+    const char *sentence = "No board came: send one first.";
+    const int records = count > 1 && strcmp(words[1], "--records") == 0;
+    if ((records && fread(&board, sizeof board, 1, stdin) != 1) ||
+        fw_board_problem(&board, &sentence) != FW_BOARD_POSSIBLE) {
         fprintf(stderr, "%s\n", sentence);
         return 2;
     }
-    fw_init(&core, &BOARD);
-    if (count > 1 && strcmp(words[1], "--records") == 0) {
-        while (fread(&in, sizeof in, 1, stdin) == 1) {
-            fw_record_tick(&core, &in, &out);
-            fwrite(&out, sizeof out, 1, stdout);
-        }
+    fw_init(&core, &board);
+    while (records && fread(&in, sizeof in, 1, stdin) == 1) {
+        fw_record_tick(&core, &in, &out);
+        fwrite(&out, sizeof out, 1, stdout);
+    }
+    if (records) {
         return 0;
     }
     const int port = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);

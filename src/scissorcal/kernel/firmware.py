@@ -140,18 +140,16 @@ class FirmwareCore:
     def __init__(self, board: FirmwareBoard, image_bytes: int = 0) -> None:
         self._core = ffi.new("fw_core *")
         self._in, self._out = ffi.new("fw_record_in *"), ffi.new("fw_record_out *")
-        table = ffi.new("fw_board *")
+        self._table = ffi.new("fw_board *")
         for name, value in asdict(board).items():
-            setattr(table, name, value.encode("ascii") if isinstance(value, str) else value)
+            setattr(self._table, name, value.encode("ascii") if isinstance(value, str) else value)
         sentence = ffi.new("const char **")
-        if lib.fw_board_problem(table, sentence):
+        if lib.fw_board_problem(self._table, sentence):
             raise ValueError(ffi.string(sentence[0]).decode("ascii"))
-        lib.fw_init(self._core, table)
+        lib.fw_init(self._core, self._table)
         if image_bytes:
-            self._render, self._memory = (
-                ffi.new("fw_render *"),
-                ffi.new("float[]", image_bytes // 4),
-            )
+            self._render = ffi.new("fw_render *")
+            self._memory = ffi.new("float[]", image_bytes // 4)
             lib.fw_let_render(self._core, self._render, self._memory, image_bytes)
 
     @property
@@ -180,6 +178,11 @@ class FirmwareCore:
             HomeResult(out.home_result),
             bytes(ffi.buffer(out.sent, out.sent_size)),
         )
+
+    @property
+    def table(self) -> bytes:
+        """The board as the core has it, fw_board's bytes."""
+        return bytes(ffi.buffer(self._table))
 
     def last_records(self) -> tuple[bytes, bytes]:
         """Give the records, in and out, of the last tick, `RECORD_BYTES` each."""
