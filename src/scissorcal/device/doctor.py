@@ -276,6 +276,11 @@ def _losses(m: Measurements, port: str) -> Verdict:
     share = 100.0 * m.lost / max(m.lost + m.frames, 1)
     found = f"{m.lost} frames lost ({share:.2g} %) and {m.garbled} garbled on {port}."
     bad = f"{found} Use a shorter, shielded cable, and the baud rate that the device is built for."
+    if m.lost and m.interval.worst >= m.lost * m.tick_ms:
+        bad = (
+            f"{found} No frame was read for {m.interval.worst:.0f} ms: this computer was held up, "
+            "or the device paused. Close programs that load this computer, and measure again."
+        )
     if m.garbled:
         return LOST_FRAMES.verdict("fail", share, bad)
     return LOST_FRAMES.judge(share, found, bad)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
+from scissorcal.device.faults import fault_sentence
 from scissorcal.device.paths import Reference
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.device.trajectory import approach, check_reference
@@ -21,6 +22,7 @@ from scissorcal.kernel import (
     Contour,
     ControlConfig,
     EnergyLedger,
+    FaultCause,
     Identity,
     LoopBlock,
     Mode,
@@ -59,7 +61,7 @@ class MotionReport:
     command) and ``interval`` (between frames) are in microseconds, None in virtual time. ``lag`` is
     what a hand feels of all delays; ``rights`` are what the system granted the loop, None in
     virtual time. ``watched`` is the largest value that each watch has seen, as a share of what
-    stops.
+    stops. ``held_up_s`` is the longest time in which this computer did not run the loop.
     """
 
     counters: ServoCounters
@@ -74,6 +76,7 @@ class MotionReport:
     lag: FeltLag
     rights: LoopRights | None
     watched: Mapping[str, float] = field(default_factory=dict)
+    held_up_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +94,19 @@ class LoopTask:
 
 
 IDLE = LoopTask()
+
+
+LATE_STOPS = (
+    StopReason.DEVICE_FAULT,
+    StopReason.SILENCE,
+    StopReason.TRACKING_LOST,
+    StopReason.OVERSPEED,
+    StopReason.OSCILLATION,
+    StopReason.HELD_UP,
+    StopReason.CLOCK_RATE,
+    StopReason.SUPERVISOR_LOST,
+)
+"""Stops that a loop brings about that this computer did not run in time."""
 
 
 class Motion(AbstractContextManager["Motion"], ABC):
@@ -155,6 +171,12 @@ class Motion(AbstractContextManager["Motion"], ABC):
     def render(self, seconds: float) -> Iterator[Samples]:
         """Render the model for ``seconds`` of the device's time; then motors off."""
         self.engage(Mode.RENDER)
+        yield from self._for_ticks(round(seconds / self.tick_s))
+        yield from self.idle(BLOCK_S)
+
+    def watch(self, seconds: float) -> Iterator[Samples]:
+        """Watch a device that renders by itself for ``seconds``, motors on; then motors off."""
+        self.engage(Mode.WATCH)
         yield from self._for_ticks(round(seconds / self.tick_s))
         yield from self.idle(BLOCK_S)
 
@@ -272,11 +294,41 @@ class Motion(AbstractContextManager["Motion"], ABC):
     def _why_lost(self) -> DeviceError | None:
         """The error where the link to the rig failed, None where the servo itself stopped."""
 
+    @property
+    def held_up_s(self) -> float:
+        """Longest time, lately, in which this computer did not run the loop."""
+        return 0.0
+
+    @property
+    def _stop_sentence(self) -> str:
+        """Why the servo stopped, the first cause first."""
+        reason, cause = self.stop_reason, self._servo.fault_cause
+        sentence = reason.sentence
+        if reason is StopReason.DEVICE_FAULT and cause:
+            sentence = f"{fault_sentence(cause)} The fault did not clear, or came too often."
+        if reason is StopReason.ENCODER_FAULT and cause not in (0, FaultCause.ENCODER):
+            sentence = f"{fault_sentence(cause)} {sentence}"
+        watchdog = reason is not StopReason.DEVICE_FAULT or cause in (0, FaultCause.WATCHDOG)
+        if reason in LATE_STOPS and watchdog and self.held_up_s:
+            return (
+                f"This computer did not run the servo loop for {1e3 * self.held_up_s:.0f} ms: "
+                "other work or a stopped process held it up. Close programs that load this "
+                f"computer, and start again. What followed: {sentence}"
+            )
+        return sentence
+
+    def refuse_not_homed(self) -> None:
+        """Raise DeviceError, with the motors off, where the device does not know its zero."""
+        if self.stop_reason is StopReason.NOT_HOMED:
+            error = self._stopped()
+            self.close()
+            raise error
+
     def _stopped(self) -> DeviceError:
         lost = self._why_lost()
         if lost is not None:
             return lost
-        sentence = self.stop_reason.sentence
+        sentence = self._stop_sentence
         if self.stop_reason in (StopReason.TRACKING_LOST, StopReason.OVERSPEED):
             sentence += (
                 " If 'scissorcal device doctor' finds the port slow, lower the gains in the "
