@@ -18,6 +18,8 @@ typedef struct {
 } motor_state;
 
 static fw_core core;
+static fw_render render;
+static float image[FW_IMAGE_MOST_BYTES / 4]; /* of a package, loaded by the host */
 static motor_state motor;
 static int running;
 
@@ -53,6 +55,7 @@ void loop_start(void)
     board_start();
     board_release();
     running = fw_init(&core, &board_table); /* fw_board_problem names why it is not */
+    fw_let_render(&core, &render, image, sizeof image);
     board_start_watchdog();
 }
 

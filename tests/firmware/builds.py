@@ -7,6 +7,21 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 FIRMWARE = ROOT / "firmware"
 WIRE = ROOT / "src" / "scissorcal" / "kernel" / "c"
+SHARED = tuple(
+    [
+        "wire",
+        "messages",
+        "model",
+        "release",
+        "fracture",
+        "edge",
+        "table",
+        "turn",
+        "motion",
+        "near_rest",
+    ]
+)
+"""What the core takes of the host's own sources."""
 ZIG = (sys.executable, "-m", "ziglang", "cc")
 WARNINGS = ("-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wdouble-promotion", "-pedantic")
 
@@ -20,7 +35,7 @@ HOST_BUILDS: dict[str, tuple[str, ...]] = {
 """Compilers and options by the name of a build."""
 
 
-def make(folder: Path, *targets: str, optimise: str = "-O2") -> None:
+def make(folder: Path, *targets: str, optimise: str = "-Os") -> None:
     """Run firmware/arm's Makefile; RuntimeError with what it printed if it fails or warns."""
     ran = subprocess.run(
         [
@@ -40,7 +55,7 @@ def host_build(name: str, target: Path) -> str | None:
     sources = [
         FIRMWARE / "boards" / "posix.c",
         *sorted((FIRMWARE / "core").glob("*.c")),
-        *(WIRE / f"sc_{part}.c" for part in ("wire", "messages")),
+        *(WIRE / f"sc_{part}.c" for part in SHARED),
     ]
     includes = [f"-I{folder}" for folder in (FIRMWARE / "core", WIRE)]
     options = ("-std=c99", "-ffp-contract=off", "-D_XOPEN_SOURCE=700", *WARNINGS)

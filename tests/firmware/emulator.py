@@ -14,6 +14,7 @@ from unicorn.arm_const import (
     UC_ARM_REG_R0,
     UC_ARM_REG_R1,
     UC_ARM_REG_R2,
+    UC_ARM_REG_R3,
     UC_ARM_REG_SP,
     UC_CPU_ARM_CORTEX_M4,
 )
@@ -87,10 +88,10 @@ class Processor:
         self._uc.mem_write(address, data)
 
     def call(self, name: str, *arguments: int) -> int:
-        """Call a function with up to three words and return its first result."""
+        """Call a function with up to four words and return its first result."""
         uc = self._uc
         for register, value in zip(
-            (UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2), arguments, strict=False
+            (UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3), arguments, strict=False
         ):
             uc.reg_write(register, value)
         uc.reg_write(UC_ARM_REG_SP, self.stack_top)
@@ -133,8 +134,13 @@ class EmulatedCore:
 
     garbled = 0
 
-    def __init__(self, image: Image, table: bytes) -> None:
-        """Start the core with a table (a fw_board); ValueError if it refuses the table."""
+    def __init__(self, image: Image, table: bytes, renders: bool = False) -> None:
+        """Start the core with a table (a fw_board); ValueError if it refuses the table.
+
+        With ``renders`` it has the image's own memory for a package. Where ``counts`` is a list,
+        each tick appends how many instructions it took.
+        """
+        self.counts: list[int] | None = None
         self.processor = Processor(image)
         # above the image's own memory and far below its stack
         self._in = (image.address("fw_bss_end") + 1023) & ~1023
@@ -143,6 +149,10 @@ class EmulatedCore:
         self.processor.write(self._in, table)
         if not self.processor.call("fw_init", self._core, self._in):
             raise ValueError("The core refuses this table.")
+        if renders:
+            memory, size = image.symbols["image"]
+            render = image.address("render")
+            self.processor.call("fw_let_render", self._core, render, memory, size)
 
     def tick(self, inputs: FirmwareInputs, received: bytes = b"") -> FirmwareOutputs:
         """Pass one tick."""
@@ -161,13 +171,12 @@ class EmulatedCore:
     def tick_record(self, record: bytes) -> bytes:
         """Pass one tick: a fw_record_in to a fw_record_out."""
         self.processor.write(self._in, record)
-        self.processor.call("fw_record_tick", self._core, self._in, self._out)
+        places = (self._core, self._in, self._out)
+        if self.counts is None:
+            self.processor.call("fw_record_tick", *places)
+        else:
+            self.counts.append(self.processor.counted("fw_record_tick", *places))
         return self.processor.memory(self._out, RECORD_BYTES)
-
-    def counted_tick(self, record: bytes) -> int:
-        """Pass one tick and return how many instructions it took."""
-        self.processor.write(self._in, record)
-        return self.processor.counted("fw_record_tick", self._core, self._in, self._out)
 
 
 def record_of(inputs: FirmwareInputs, received: bytes = b"") -> bytes:

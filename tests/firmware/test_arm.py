@@ -47,11 +47,12 @@ def test_the_binary_gives_the_golden_records(
         assert core.tick_record(given) == made, f"tick {tick}"
 
 
-def test_the_binary_gives_them_without_optimisation(
-    golden: tuple[list[bytes], list[bytes]], tmp_path: Path
+@pytest.mark.parametrize("optimise", ["-O0", "-O2"])
+def test_the_binary_gives_them_however_it_is_optimised(
+    optimise: str, golden: tuple[list[bytes], list[bytes]], tmp_path: Path
 ) -> None:
     pytest.importorskip("ziglang", reason="needs the compiler of the extra 'page'")
-    make(tmp_path, f"{tmp_path}/stm32f405.elf", optimise="-O0")
+    make(tmp_path, f"{tmp_path}/stm32f405.elf", optimise=optimise)
     core = emulator.EmulatedCore(read_elf(tmp_path / "stm32f405.elf"), TABLE)
     assert [core.tick_record(given) for given in golden[0]] == golden[1]
 
@@ -83,17 +84,17 @@ def test_an_exchange_takes_few_instructions(stm32f405: Image) -> None:
     homed = at._replace(flags=int(InputFlag.AT_HOME))
     for inputs, frame in zip((at, at, at, homed), frames, strict=True):
         core.tick(inputs, frame)
-    counts = []
+    core.counts = []
     for tick in range(200):
         torque, force = 0.01 * (tick % 50) - 0.2, 0.1 * (tick % 30)
         command = encode(Command(int(CommandFlag.ENABLE), tick, torque, force, 3))
         moved = at._replace(device_us=500 * tick, opening=0.5 - 1e-4 * tick, current=0.3)
-        counts.append(core.counted_tick(emulator.record_of(moved, command)))
-    last = core.tick(moved, command)
+        last = core.tick(moved, command)
     assert (last.phase, last.drive) == (FirmwarePhase.ENABLED, Drive.DRIVE)
     assert len(last.sent) == 32
-    print(f"{max(counts)} instructions for a COMMAND and a STATE at the most")
-    assert 1000 < max(counts) <= EXCHANGE_INSTRUCTIONS
+    most = max(core.counts)
+    print(f"{most} instructions for a COMMAND and a STATE at the most")
+    assert 1000 < most <= EXCHANGE_INSTRUCTIONS
 
 
 def test_the_stack_stays_small(stm32f405: Image, golden: tuple[list[bytes], list[bytes]]) -> None:

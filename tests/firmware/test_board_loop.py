@@ -1,11 +1,14 @@
 """The whole image of the STM32F405, from reset, on a model of its registers, motor and blades."""
 
+import zlib
 from collections.abc import Sequence
 from typing import Any
 
 import pytest
 
+from scissorcal.device.upload import CHUNK_BYTES
 from scissorcal.kernel import (
+    IMAGE_FORMAT,
     Command,
     CommandFlag,
     Config,
@@ -14,12 +17,19 @@ from scissorcal.kernel import (
     FaultCause,
     Hello,
     Identity,
+    LoadBegin,
+    LoadChunk,
+    LoadCommit,
+    LoadEcho,
+    Message,
     State,
     StateFlag,
     encode,
+    model_image,
 )
 
 from .elf import Image
+from .test_rendering import FELT, PAPER
 
 model = pytest.importorskip(
     "tests.firmware.stm32f405", reason="needs unicorn, of the extra 'dev'", exc_type=ImportError
@@ -129,11 +139,23 @@ def test_a_long_reply_delays_no_state(device: Any) -> None:
     assert all(len(states_of(tick)) == 1 for tick in sent[-10:])
 
 
-def test_the_stack_of_a_tick_of_the_board_stays_small(device: Any) -> None:
-    device.processor.paint_stack()
+def test_the_stack_of_the_loop_stays_small_while_it_renders(device: Any) -> None:
+    image = model_image(PAPER, FELT)
     homed(device)
-    for torque in (0.1, -0.1):
-        device.tick(encode(Hello(3)))
-        device.tick(encode(Command(int(CommandFlag.ENABLE), 0, torque, 0.0)))
-    print(f"{device.processor.stack_bytes()} bytes of stack for the board's loop")
-    assert 100 < device.processor.stack_bytes() <= STACK_BYTES
+    device.processor.paint_stack()
+    parts: list[Message] = [LoadBegin(IMAGE_FORMAT, 0, len(image), zlib.crc32(image))]
+    for offset in range(0, len(image), CHUNK_BYTES):
+        piece = image[offset : offset + CHUNK_BYTES]
+        parts.append(LoadChunk(len(piece), 0, offset, piece))
+    for message in (*parts, LoadCommit(0), Config(int(ConfigKey.RENDER), 1, 1.0)):
+        sent = device.tick(encode(message)) + device.tick()
+        (echo,) = [reply for reply in sent if isinstance(reply, LoadEcho | ConfigEcho)]
+        assert echo.status == 0
+    for tick in range(600):  # a hand closes the blades into the sheet
+        device.opening, device.rate = 1.05 - 1.5e-3 * tick, 0.0
+        states = states_of(device.tick(encode(Command(int(CommandFlag.ENABLE), 0, 0.0, 0.0))))
+    assert states[0].flags & StateFlag.RENDERING
+    assert device.current != 0.0
+    stack = device.processor.stack_bytes()
+    print(f"{stack} bytes of stack for the board's loop")
+    assert 400 < stack <= STACK_BYTES

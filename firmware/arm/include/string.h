@@ -1,4 +1,4 @@
-/* What the core uses of the C library's string functions; string.c defines them. */
+/* What the core uses of the C library's string functions; library.c defines them. */
 #ifndef FW_STRING_H
 #define FW_STRING_H
 

@@ -1,5 +1,6 @@
 /* The C library's part of a bare-metal build. Compiled with -fno-builtin: otherwise the compiler
  * would replace each loop by a call of the function that holds it. */
+#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -79,3 +80,24 @@ void __aeabi_memset(void *to, size_t size, int value) { memset(to, value, size);
 void __aeabi_memclr(void *to, size_t size) { memset(to, 0, size); }
 void __aeabi_memclr4(void *to, size_t size) { memset(to, 0, size); }
 void __aeabi_memclr8(void *to, size_t size) { memset(to, 0, size); }
+
+/* From 2^23 on every float is whole; so is what is no number. */
+float ceilf(float value)
+{
+    if (!(value < 8388608.0f && value > -8388608.0f)) {
+        return value;
+    }
+    const float whole = (float)(int32_t)value;
+    return whole < value ? whole + 1.0f : whole;
+}
+
+/* The other number where one is none (C99, 7.12.12). */
+float fminf(float first, float second)
+{
+    return first < second || isnan(second) ? first : second;
+}
+
+float fmaxf(float first, float second)
+{
+    return first > second || isnan(second) ? first : second;
+}
