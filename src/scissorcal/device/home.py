@@ -14,7 +14,7 @@ from scissorcal.kernel import Capability, ConfigKey, Identity, State, StateFlag
 LONGEST_S = 60.0
 """A device ends its search by itself; what takes longer is stopped."""
 BEGINS_S = 0.5
-"""A device that does not state HOMING so long after HOME = 1 has found its zero or does not look."""
+"""A device that states no HOMING so long after HOME = 1 has found its zero, or does not look."""
 CLEARINGS = 100
 REQUEST = (
     "The device will look for the zero of its encoders: the blades move by themselves, slowly, "
@@ -115,10 +115,11 @@ def _check(last: State, identity: Identity, seconds: float) -> None:
     low, high = identity.opening_min - RANGE_RAD, identity.opening_max + RANGE_RAD
     if not low <= last.opening <= high:
         raise DeviceError(
-            f"The device found a zero that cannot be right: the opening is "
+            "The device found a zero that cannot be right: the opening is "
             f"{math.degrees(last.opening):.3g} degrees, and its stops are at "
             f"{math.degrees(identity.opening_min):.3g} and "
-            f"{math.degrees(identity.opening_max):.3g} degrees. Look for what stopped the blades on the way, and home again."
+            f"{math.degrees(identity.opening_max):.3g} degrees. Look for what stopped the blades "
+            "on the way, and home again."
         )
 
 

@@ -39,7 +39,7 @@ def test_a_device_that_does_not_measure_its_torque_gives_nothing_to_fit(
     recording = friction_recording(Truth(), np.random.default_rng(1))
     device = stated(recording, version, int(capabilities))
     if refused:
-        with pytest.raises(InputError, match="TORQUE_MEASURED.*capture cut --hand"):
+        with pytest.raises(InputError, match=r"TORQUE_MEASURED.*capture cut --hand"):
             refuse_unsound((device,))
         off = device.samples.copy()
         off["flags"] &= ~int(StateFlag.MOTOR_ENABLED) & 0xFFFFFFFF
