@@ -135,6 +135,9 @@ int main(int count, char **words)
     if (records) {
         return 0;
     }
+    static fw_render render;
+    static float image[FW_IMAGE_MOST_BYTES / 4];
+    fw_let_render(&core, &render, image, sizeof image);
     const int port = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
     if (port < 0 || grantpt(port) != 0 || unlockpt(port) != 0) {
         perror("posix: no pseudo-terminal");
