@@ -19,9 +19,7 @@
 #include <unistd.h>
 
 static const fw_board BOARD = {
-    .name = "posix",
-    .serial = "1",
-    .firmware_version = 1,
+    .name = "posix", .serial = "1", .firmware_version = 1,
     .tick_us = 1000,
     .capabilities = SC_CAPABILITY_ADVANCE_MOTOR | SC_CAPABILITY_TORQUE_MEASURED,
     .torque_limit = 0.8f,
@@ -135,6 +133,9 @@ int main(int count, char **words)
         fw_record_tick(&core, &in, &out);
         fwrite(&out, sizeof out, 1, stdout);
     }
+    static fw_render render;
+    static float image[FW_IMAGE_MOST_BYTES / 4];
+    fw_let_render(&core, &render, image, sizeof image);
     const int port = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
     if (records || port < 0 || grantpt(port) != 0 || unlockpt(port) != 0) {
         return !records;

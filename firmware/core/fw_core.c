@@ -24,6 +24,13 @@ int fw_init(fw_core *core, const fw_board *board)
     return core->problem == FW_BOARD_POSSIBLE;
 }
 
+void fw_let_render(fw_core *core, fw_render *render, float *memory, uint32_t capacity)
+{
+    fw_render_init(render, memory, capacity);
+    core->render = render;
+    core->board.capabilities |= SC_CAPABILITY_RENDERS;
+}
+
 void fw_receive(fw_core *core, const uint8_t *data, size_t size)
 {
     size_t taken = 0;
@@ -150,6 +157,9 @@ static void configure(fw_core *core, const sc_config *config)
     } else if (config->key == SC_KEY_HOME && fw_has(core, SC_CAPABILITY_HOMES)) {
         fits = set_home(core, value);
         echo.value = core->home_asked || core->phase == FW_HOMING ? 1.0f : 0.0f;
+    } else if (config->key == SC_KEY_RENDER && core->render != NULL) {
+        fits = fw_render_set(core->render, value) == SC_CONFIG_OK;
+        echo.value = (float)core->render->on;
     } else {
         fits = -1;
     }
@@ -157,6 +167,16 @@ static void configure(fw_core *core, const sc_config *config)
         echo.status = fits ? SC_CONFIG_OK : SC_CONFIG_VALUE_REFUSED;
     }
     fw_put_reply(&core->outbox, payload, sc_pack_config_echo(&echo, payload));
+}
+
+static void load(fw_core *core, const uint8_t *payload, size_t size)
+{
+    uint8_t reply[SC_SIZE_LOAD_ECHO];
+    sc_load_echo echo;
+    const int is_busy = core->phase == FW_ENABLED || enable_asked(core);
+    if (fw_render_load(core->render, payload, size, is_busy, &echo)) {
+        fw_put_reply(&core->outbox, reply, sc_pack_load_echo(&echo, reply));
+    }
 }
 
 static void handle(fw_core *core, const uint8_t *payload, size_t size)
@@ -170,6 +190,8 @@ static void handle(fw_core *core, const uint8_t *payload, size_t size)
         introduce(core, hello.nonce);
     } else if (sc_unpack_config(payload, size, &config)) {
         configure(core, &config);
+    } else if (core->render != NULL) {
+        load(core, payload, size);
     }
 }
 
@@ -182,12 +204,18 @@ static void latch(fw_core *core, uint8_t cause)
     core->cause = cause;
 }
 
-/* Count the silence of the host; what it ends. */
+static int is_silent(const fw_core *core, float limit_ms)
+{
+    return (float)core->command_ticks * (float)core->board.tick_us >= 1e3f * limit_ms;
+}
+
+/* Count the silence of the host; what it ends. A device that renders by itself bears more of it. */
 static void listen(fw_core *core)
 {
     const uint32_t tick_us = core->board.tick_us;
-    const float silent_us = (float)core->command_ticks * (float)tick_us;
-    if (enable_asked(core) && silent_us >= 1e3f * core->brake_after_ms) {
+    const int by_itself = core->render != NULL && core->render->on;
+    const float limit_ms = by_itself ? (float)FW_RENDER_SILENCE_MS : core->brake_after_ms;
+    if (enable_asked(core) && is_silent(core, limit_ms)) {
         core->lost = 1;
     }
     core->command_ticks += core->command_ticks < UINT32_MAX;
@@ -224,9 +252,11 @@ static void change_phase(fw_core *core, const fw_inputs *inputs)
     }
 }
 
-/* The wanted value, or what the slew allows of the way there from the last one. */
+/* The wanted value, or what the slew allows of the way there from the last one; what is not a number
+ * counts as 0. */
 static float slewed(float last, float wanted, float step)
 {
+    wanted = fw_finite(wanted) ? wanted : 0.0f;
     if (fw_magnitude(wanted - last) <= step) {
         return wanted;
     }
@@ -239,21 +269,41 @@ static float stopped(float effort, float place, float low, float high)
     return (place <= low && effort < 0.0f) || (place >= high && effort > 0.0f) ? 0.0f : effort;
 }
 
+/* What the loaded package gives in this tick; zero without one. */
+static fw_render_tick_outputs render(const fw_core *core, const fw_inputs *inputs, float opening)
+{
+    fw_render_tick_outputs out = {0.0f, 0.0f, 0};
+    if (core->render != NULL) {
+        const fw_render_tick_inputs in = {inputs->device_us,
+                                          core->board.tick_us,
+                                          opening,
+                                          fw_has_carriage(core) ? inputs->advance : 0.0f,
+                                          inputs->motor_torque,
+                                          core->phase == FW_ENABLED};
+        fw_render_tick(core->render, &in, &out);
+    }
+    return out;
+}
+
 static void drive(fw_core *core, const fw_inputs *inputs, fw_outputs *outputs)
 {
     const fw_board *board = &core->board;
     const float torque_step = board->torque_slew * core->tick_s;
     const uint8_t hold = core->command.hold_ticks;
+    const float opening = inputs->opening + core->opening_zero;
+    const fw_render_tick_outputs rendered = render(core, inputs, opening);
+    const int is_stale = rendered.rendering && is_silent(core, core->brake_after_ms);
     core->saturated = 0;
+    core->rendering = (uint8_t)rendered.rendering;
     if (core->phase == FW_ENABLED) {
-        const int holds = hold == 0 || core->command_ticks <= hold;
-        const float torque = holds ? core->command.torque : 0.0f;
-        const float force = holds ? core->command.force : 0.0f;
+        const int holds = (hold == 0 || core->command_ticks <= hold) && !is_stale;
+        const float torque = rendered.torque + (holds ? core->command.torque : 0.0f);
+        const float force = rendered.force + (holds ? core->command.force : 0.0f);
         core->saturated = fw_magnitude(torque) > board->torque_limit;
         outputs->drive = FW_DRIVE;
         outputs->torque = stopped(
             slewed(core->torque, fw_clip(torque, board->torque_limit), torque_step),
-            inputs->opening + core->opening_zero, board->opening_min, board->opening_max);
+            opening, board->opening_min, board->opening_max);
         if (fw_has(core, SC_CAPABILITY_ADVANCE_MOTOR)) {
             outputs->force = stopped(slewed(core->force, fw_clip(force, board->force_limit),
                                             board->force_slew * core->tick_s),
@@ -282,6 +332,7 @@ static uint16_t state_flags(const fw_core *core, const fw_inputs *inputs, float 
     flags |= core->encoder_doubt > 0 ? SC_STATE_ENCODER_FAULT : 0u;
     flags |= core->homed ? 0u : SC_STATE_NOT_HOMED;
     flags |= core->phase == FW_HOMING ? SC_STATE_HOMING : 0u;
+    flags |= core->rendering ? SC_STATE_RENDERING : 0u;
     flags |= (inputs->flags & FW_IN_FORCE_SATURATED) != 0 ? SC_STATE_HANDLE_FORCE_SATURATED : 0u;
     if (core->homed && (opening < board->opening_min + board->opening_resolution ||
                         opening > board->opening_max - board->opening_resolution)) {

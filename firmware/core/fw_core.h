@@ -16,6 +16,7 @@
 #define FW_CORE_H
 
 #include "fw_board.h"
+#include "fw_render.h"
 #include "sc_wire.h"
 
 enum { FW_RELEASE = 0, FW_DRIVE = 1, FW_BRAKE = 2 };
@@ -74,6 +75,7 @@ typedef struct {
 
 typedef struct {
     fw_board board;
+    fw_render *render;       /* null where the board gave no memory for an image */
     sc_decoder decoder;
     fw_outbox outbox;
     sc_command command;      /* in force */
@@ -107,11 +109,16 @@ typedef struct {
     uint8_t measured;        /* last_opening holds a reading */
     uint8_t encoder_doubt;   /* ticks until the encoders are believed again */
     uint8_t saturated;
+    uint8_t rendering;
 } fw_core;
 
 /* Start with motors released, nothing streamed and no fault. Returns 1; 0 where the table is
  * impossible (fw_board_problem): such a core never drives and never answers. */
 int fw_init(fw_core *core, const fw_board *board);
+
+/* Let the core load and render packages, with *render and capacity bytes of memory, both the caller's
+ * and for nobody else; after fw_init. Without it LOAD messages are not answered. */
+void fw_let_render(fw_core *core, fw_render *render, float *memory, uint32_t capacity);
 
 /* Take bytes from the host, in pieces of any size. */
 void fw_receive(fw_core *core, const uint8_t *data, size_t size);

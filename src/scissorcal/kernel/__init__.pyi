@@ -31,6 +31,8 @@ from .hybrid import HybridConfig as HybridConfig
 from .hybrid import HybridFlag as HybridFlag
 from .hybrid import NormalLaw as NormalLaw
 from .hybrid import hybrid_inputs as hybrid_inputs
+from .image import IMAGE_FORMAT as IMAGE_FORMAT
+from .image import model_image as model_image
 from .joint import estimated_rates as estimated_rates
 from .joint import presliding_path as presliding_path
 from .layout import fill_struct as fill_struct
@@ -101,6 +103,7 @@ __all__ = [
     "EARLIER_SCHEMAS",
     "HYBRID_INPUT_DTYPE",
     "HYBRID_OUTPUT_DTYPE",
+    "IMAGE_FORMAT",
     "MOST_PIECES",
     "MOST_STRIPS",
     "PROTOCOL_VERSION",
@@ -188,6 +191,7 @@ __all__ = [
     "hybrid_inputs",
     "largest_overlap",
     "lock_memory",
+    "model_image",
     "presliding_path",
     "run_loop",
     "walk_crack",

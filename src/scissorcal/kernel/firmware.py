@@ -123,7 +123,7 @@ class FirmwareOutputs(NamedTuple):
 
 
 class FirmwareCore:
-    """One device's core.
+    """One device's core; with ``image_bytes`` of memory it loads and renders packages.
 
     Raises ValueError, with the sentence that says what to change, where the board is impossible.
 
@@ -137,7 +137,7 @@ class FirmwareCore:
     'RELEASE'
     """
 
-    def __init__(self, board: FirmwareBoard) -> None:
+    def __init__(self, board: FirmwareBoard, image_bytes: int = 0) -> None:
         self._core = ffi.new("fw_core *")
         self._in, self._out = ffi.new("fw_record_in *"), ffi.new("fw_record_out *")
         self._table = ffi.new("fw_board *")
@@ -147,6 +147,10 @@ class FirmwareCore:
         if lib.fw_board_problem(self._table, sentence):
             raise ValueError(ffi.string(sentence[0]).decode("ascii"))
         lib.fw_init(self._core, self._table)
+        if image_bytes:
+            self._render = ffi.new("fw_render *")
+            self._memory = ffi.new("float[]", image_bytes // 4)
+            lib.fw_let_render(self._core, self._render, self._memory, image_bytes)
 
     @property
     def garbled(self) -> int:
