@@ -109,8 +109,8 @@ def _check(last: State, identity: Identity, seconds: float) -> None:
     if last.flags & StateFlag.NOT_HOMED:
         raise DeviceError(
             f"The device gave up after {seconds:.1f} s without finding its zero. Check that "
-            "nothing blocks the blades on their way to the stop, that the motor turns them, and its home "
-            "switch where it has one; then run 'scissorcal device home' again."
+            "nothing blocks the blades on their way to the stop, that the motor turns them, and "
+            "its home switch where it has one; then run 'scissorcal device home' again."
         )
     low, high = identity.opening_min - RANGE_RAD, identity.opening_max + RANGE_RAD
     if not low <= last.opening <= high:
