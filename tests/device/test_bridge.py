@@ -144,7 +144,7 @@ class PersonAtTheRig:
         joint.rate = 0.0
 
 
-@pytest.mark.parametrize("late_ticks", [0, 3])
+@pytest.mark.parametrize("late_ticks", [pytest.param(0, marks=pytest.mark.slow), 3])
 def test_the_probe_measures_the_delay_of_a_bridge(late_ticks: int) -> None:
     """The exchange comes first in a tick, so a command acts two ticks after its STATE's tick."""
     link, _ = link_of(late_ticks)
