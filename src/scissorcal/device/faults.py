@@ -1,6 +1,41 @@
-"""Why a device latched a fault: a sentence with the remedy for each cause that it may state."""
+"""Why a device latched a fault or a servo stopped: the first cause first, with its remedy."""
 
-from scissorcal.kernel import FaultCause
+from scissorcal.kernel import FaultCause, StopReason
+
+LATE_STOPS = (
+    StopReason.DEVICE_FAULT,
+    StopReason.SILENCE,
+    StopReason.TRACKING_LOST,
+    StopReason.OVERSPEED,
+    StopReason.OSCILLATION,
+    StopReason.HELD_UP,
+    StopReason.CLOCK_RATE,
+    StopReason.SUPERVISOR_LOST,
+)
+"""Stops that a loop brings about that this computer did not run in time."""
+
+
+def stop_sentence(reason: StopReason, cause: int, held_up_s: float) -> str:
+    """Say why a servo stopped.
+
+    ``cause`` is that of the last fault, ``held_up_s`` the longest time, shortly before the stop, in
+    which this computer did not run the loop.
+
+    >>> stop_sentence(StopReason.DEVICE_FAULT, FaultCause.HEAT, 0.0)[:38]
+    'Motor or driver is too hot (cause HEAT'
+    """
+    sentence = reason.sentence
+    if reason is StopReason.DEVICE_FAULT and cause:
+        sentence = f"{fault_sentence(cause)} The fault did not clear, or came too often."
+    by_itself = reason is StopReason.DEVICE_FAULT and cause not in (0, FaultCause.WATCHDOG)
+    if reason not in LATE_STOPS or by_itself or not held_up_s:
+        return sentence
+    return (
+        f"This computer did not run the servo loop for {1e3 * held_up_s:.0f} ms: other work or a "
+        "stopped process held it up. Close programs that load this computer, and start again. What "
+        f"followed: {sentence}"
+    )
+
 
 _SENTENCES = {
     FaultCause.WATCHDOG: (

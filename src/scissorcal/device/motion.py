@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.device.faults import fault_sentence
+from scissorcal.device.faults import stop_sentence
 from scissorcal.device.paths import Reference
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.device.trajectory import approach, check_reference
@@ -22,7 +22,6 @@ from scissorcal.kernel import (
     Contour,
     ControlConfig,
     EnergyLedger,
-    FaultCause,
     Identity,
     LoopBlock,
     Mode,
@@ -94,19 +93,6 @@ class LoopTask:
 
 
 IDLE = LoopTask()
-
-
-LATE_STOPS = (
-    StopReason.DEVICE_FAULT,
-    StopReason.SILENCE,
-    StopReason.TRACKING_LOST,
-    StopReason.OVERSPEED,
-    StopReason.OSCILLATION,
-    StopReason.HELD_UP,
-    StopReason.CLOCK_RATE,
-    StopReason.SUPERVISOR_LOST,
-)
-"""Stops that a loop brings about that this computer did not run in time."""
 
 
 class Motion(AbstractContextManager["Motion"], ABC):
@@ -301,21 +287,7 @@ class Motion(AbstractContextManager["Motion"], ABC):
 
     @property
     def _stop_sentence(self) -> str:
-        """Why the servo stopped, the first cause first."""
-        reason, cause = self.stop_reason, self._servo.fault_cause
-        sentence = reason.sentence
-        if reason is StopReason.DEVICE_FAULT and cause:
-            sentence = f"{fault_sentence(cause)} The fault did not clear, or came too often."
-        if reason is StopReason.ENCODER_FAULT and cause not in (0, FaultCause.ENCODER):
-            sentence = f"{fault_sentence(cause)} {sentence}"
-        watchdog = reason is not StopReason.DEVICE_FAULT or cause in (0, FaultCause.WATCHDOG)
-        if reason in LATE_STOPS and watchdog and self.held_up_s:
-            return (
-                f"This computer did not run the servo loop for {1e3 * self.held_up_s:.0f} ms: "
-                "other work or a stopped process held it up. Close programs that load this "
-                f"computer, and start again. What followed: {sentence}"
-            )
-        return sentence
+        return stop_sentence(self.stop_reason, self._servo.fault_cause, self.held_up_s)
 
     def refuse_not_homed(self) -> None:
         """Raise DeviceError, with the motors off, where the device does not know its zero."""

@@ -45,8 +45,9 @@ def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Ver
 
     The watchdog is set to 1 ms for it, so that a computer that stalls there gives three ticks of
     torque at most, and a device of version 2 is told to hold it for one: with these and the least
-    inertia the rate is bounded before it is tried. Then it is set to ``brake_after_ms`` again, whatever happened. A strike that was braked or lost is
-    repeated from rest, each way by turns; if none arrives, nothing is determined.
+    inertia the rate is bounded before it is tried. Then it is set to ``brake_after_ms`` again,
+    whatever happened. A strike that was braked or lost is repeated from rest, each way by turns; if
+    none arrives, nothing is determined.
     """
     limit, bounds = talk.identity.torque_limit, talk.bounds
     if inertia is None or not inertia.mean > SDS * inertia.sd:

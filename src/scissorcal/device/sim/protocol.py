@@ -181,7 +181,7 @@ class RigProtocol:
                 measured.advance,
                 given if self.faults.unmeasured_torque else measured.motor_torque,
                 measured.handle_force,
-                int(self._cause or 0) if self._version >= PROTOCOL_VERSION else 0,
+                cause=int(self._cause or 0) if self._version >= PROTOCOL_VERSION else 0,
             )
         )
 

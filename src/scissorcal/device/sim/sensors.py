@@ -12,7 +12,6 @@ from scissorcal.errors import InputError
 from scissorcal.kernel import PROTOCOL_VERSION, FaultCause
 
 BLOCK = 4096
-MEASURED_FLAGS = 3
 
 
 class Measured(NamedTuple):
