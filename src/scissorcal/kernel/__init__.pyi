@@ -15,6 +15,15 @@ from .cut_fit import CutFitParameters as CutFitParameters
 from .cut_fit import cut_log_likelihood as cut_log_likelihood
 from .cut_fit import cut_log_likelihoods as cut_log_likelihoods
 from .cut_fit import walk_crack as walk_crack
+from .firmware import RECORD_BYTES as RECORD_BYTES
+from .firmware import Drive as Drive
+from .firmware import FirmwareBoard as FirmwareBoard
+from .firmware import FirmwareCore as FirmwareCore
+from .firmware import FirmwareInputs as FirmwareInputs
+from .firmware import FirmwareOutputs as FirmwareOutputs
+from .firmware import FirmwarePhase as FirmwarePhase
+from .firmware import HomeResult as HomeResult
+from .firmware import InputFlag as InputFlag
 from .hybrid import HYBRID_INPUT_DTYPE as HYBRID_INPUT_DTYPE
 from .hybrid import HYBRID_OUTPUT_DTYPE as HYBRID_OUTPUT_DTYPE
 from .hybrid import Hybrid as Hybrid
@@ -22,6 +31,8 @@ from .hybrid import HybridConfig as HybridConfig
 from .hybrid import HybridFlag as HybridFlag
 from .hybrid import NormalLaw as NormalLaw
 from .hybrid import hybrid_inputs as hybrid_inputs
+from .image import IMAGE_FORMAT as IMAGE_FORMAT
+from .image import model_image as model_image
 from .joint import estimated_rates as estimated_rates
 from .joint import presliding_path as presliding_path
 from .layout import fill_struct as fill_struct
@@ -31,6 +42,7 @@ from .loop import LoopCounters as LoopCounters
 from .loop import ask_for_slice as ask_for_slice
 from .loop import lock_memory as lock_memory
 from .loop import run_loop as run_loop
+from .messages import EARLIER_SCHEMAS as EARLIER_SCHEMAS
 from .messages import PROTOCOL_VERSION as PROTOCOL_VERSION
 from .messages import SCHEMA_HASH as SCHEMA_HASH
 from .messages import Capability as Capability
@@ -40,8 +52,14 @@ from .messages import Config as Config
 from .messages import ConfigEcho as ConfigEcho
 from .messages import ConfigKey as ConfigKey
 from .messages import ConfigStatus as ConfigStatus
+from .messages import FaultCause as FaultCause
 from .messages import Hello as Hello
 from .messages import Identity as Identity
+from .messages import LoadBegin as LoadBegin
+from .messages import LoadChunk as LoadChunk
+from .messages import LoadCommit as LoadCommit
+from .messages import LoadEcho as LoadEcho
+from .messages import LoadStatus as LoadStatus
 from .messages import Message as Message
 from .messages import State as State
 from .messages import StateFlag as StateFlag
@@ -82,11 +100,14 @@ from .wire import encode_frame as encode_frame
 
 __all__ = [
     "CONTROL_DTYPE",
+    "EARLIER_SCHEMAS",
     "HYBRID_INPUT_DTYPE",
     "HYBRID_OUTPUT_DTYPE",
+    "IMAGE_FORMAT",
     "MOST_PIECES",
     "MOST_STRIPS",
     "PROTOCOL_VERSION",
+    "RECORD_BYTES",
     "SAMPLE_DTYPE",
     "SCHEMA_HASH",
     "STEP_DTYPE",
@@ -107,16 +128,30 @@ __all__ = [
     "Curve",
     "CutFitData",
     "CutFitParameters",
+    "Drive",
     "EnergyLedger",
+    "FaultCause",
+    "FirmwareBoard",
+    "FirmwareCore",
+    "FirmwareInputs",
+    "FirmwareOutputs",
+    "FirmwarePhase",
     "FrameDecoder",
     "Hello",
     "Histogram",
+    "HomeResult",
     "Hybrid",
     "HybridConfig",
     "HybridFlag",
     "Identity",
+    "InputFlag",
     "Kernel",
     "LagCounts",
+    "LoadBegin",
+    "LoadChunk",
+    "LoadCommit",
+    "LoadEcho",
+    "LoadStatus",
     "LoopBlock",
     "LoopCounters",
     "Message",
@@ -156,6 +191,7 @@ __all__ = [
     "hybrid_inputs",
     "largest_overlap",
     "lock_memory",
+    "model_image",
     "presliding_path",
     "run_loop",
     "walk_crack",

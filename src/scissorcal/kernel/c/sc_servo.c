@@ -62,12 +62,17 @@ static int handle_fault(const sc_servo_config *config, sc_servo *servo, const sc
         sc_servo_stop(servo, SC_STOP_ENCODER_FAULT);
         return 1;
     }
+    if (state->flags & SC_STATE_NOT_HOMED) {
+        sc_servo_stop(servo, SC_STOP_NOT_HOMED);
+        return 1;
+    }
     if (!(state->flags & SC_STATE_FAULT_LATCHED)) {
         servo->fault_seen = 0;
         return 0;
     }
     if (!servo->fault_seen) {
         servo->fault_seen = 1;
+        servo->fault_cause = state->cause;
         servo->clearings_sent = 0;
         servo->faults += servo->enabled_once;
         servo->opening_integral = 0.0f;
@@ -135,8 +140,8 @@ static effort render(const sc_servo_config *config, const sc_model *model, sc_se
     if (!sc_servo_step_model(config, model, servo, &share)) {
         return wanted;
     }
-    sc_port_friction(&config->passivity, model, &servo->port, motion->opening,
-                     motion->opening_rate, &servo->step);
+    sc_near_rest(model, config->passivity.friction_width, &servo->port.anchor, motion->opening,
+                 motion->opening_rate, &servo->step);
     servo->sample.flags |= servo->step.flags << SC_SAMPLE_STEP_SHIFT;
     const sc_port_tick tick = {since->turned, since->moved,         since->delivered,
                                since->dt,     motion->opening_rate, share,
@@ -222,6 +227,7 @@ static void begin_sample(sc_servo *servo, const sc_state *state)
 
 static void write_command(sc_servo *servo, uint16_t flags, sc_command *command)
 {
+    command->hold_ticks = 0;
     command->flags = flags;
     command->echo_sequence = servo->sequence;
     command->torque = servo->torque;
