@@ -22,6 +22,11 @@ COURSE = Wiring(
     from_encoder="PA0, PA1",
     from_stop="PC0, opens",
     to_computer="PC6, PC7",
+    force=[
+        "load cell of 50 N at the finger ring, instrumentation",
+        "amplifier, 1 kHz: 33 mV/N about 1.65 V",
+    ],
+    from_force="PA7",
 )
 LAB = Wiring(
     title="Wiring of the lab build (firmware/boards/b_g431b_esc1.c)",
@@ -60,7 +65,7 @@ BEST = Wiring(
     to_computer="USB",
     force=[
         "load cell of 50 N at the finger ring, instrumentation",
-        "amplifier, 1 kHz, 1.65 V at 0 N",
+        "amplifier, 1 kHz: 33 mV/N about 1.65 V",
     ],
     from_force="A2",
 )

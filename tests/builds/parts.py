@@ -151,7 +151,7 @@ COURSE = Build(
     tick_us=1000,
     delay_ticks=1,
     motor_lag=5e-4,
-    force_sensor=False,
+    force_sensor=True,
 )
 LAB = Build(
     name="lab",
