@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 GENERATED = ROOT / "docs" / "api"
 PROSE = [
-    *(page for page in PAGES if page.parent == ROOT / "docs"),
+    *(page for page in PAGES if page.parent in (ROOT / "docs", ROOT / "docs" / "build")),
     ROOT / "README.md",
     ROOT / "CONTRIBUTING.md",
 ]

@@ -3,8 +3,6 @@
 import math
 from pathlib import Path
 
-import numpy as np
-
 from .faults import FIRST, faults_of
 from .parts import BUILDS, GIMBAL, NOT_WORKING, Build
 from .rig import Said, Wrong, probe_of
@@ -58,31 +56,36 @@ def probed(build: Build) -> str:
     """What the probe says of a right one, over the seeds."""
     found = [probe_of(build, seed) for seed in SEEDS]
     right = [said for said in found if said.result is not None]
+    values = [probed_values(said) for said in right]
+    rows = [
+        (name, *(f"{pick(value[name] for value in values):.3g}" for pick in (min, max)))
+        for name in values[0]
+    ]
     lines = [
         f"{len(right)} of {len(found)} were accepted. Lowest and highest of what it found:",
         "",
     ]
-    rows = {
-        "inertia over the true one": _range(
-            right, lambda s: _mean(s, "inertia_kg_m2") / s.rig.inertia
-        ),
-        "sd that it states of the inertia, %": _range(
-            right, lambda s: 100.0 * _sd(s, "inertia_kg_m2") / _mean(s, "inertia_kg_m2")
-        ),
-        "dry friction over the true one": _range(right, lambda s: _mean(s, "coulomb_Nm") / _dry(s)),
-        "delay, ms": _range(right, lambda s: 1e3 * _mean(s, "delay_s")),
-        "measured over commanded torque": _range(right, lambda s: _mean(s, "torque_gain")),
-        "noise of motor_torque, mN m": _range(right, lambda s: 1e3 * _fact(s, "torque_noise_Nm")),
-        "noise of the opening, mrad": _range(right, lambda s: 1e3 * _fact(s, "encoder_jitter_rad")),
-        "largest torque that it used, mN m": _range(
-            right, lambda s: 1e3 * _fact(s, "largest_torque_Nm")
-        ),
-        "largest rate at the blades, rad/s": _range(right, lambda s: s.largest_rate),
-        "time, s": _range(right, lambda s: s.seconds),
-    }
-    lines += [_table(("what", "lowest", "highest"), [(k, *v) for k, v in rows.items()]), ""]
+    lines += [_table(("what", "lowest", "highest"), rows), ""]
     lines += ["What it says of the first one:", "", *_sentences(right[0])]
     return "\n".join(lines)
+
+
+def probed_values(said: Said) -> dict[str, float]:
+    """What a probe found of a right build, by the words of the page."""
+    inertia = _mean(said, "inertia_kg_m2")
+    dry = 0.5 * (said.rig.coulomb_opening + said.rig.coulomb_closing)
+    return {
+        "inertia over the true one": inertia / said.rig.inertia,
+        "sd that it states of the inertia, %": 100.0 * _sd(said, "inertia_kg_m2") / inertia,
+        "dry friction over the true one": _mean(said, "coulomb_Nm") / dry,
+        "delay, ms": 1e3 * _mean(said, "delay_s"),
+        "measured over commanded torque": _mean(said, "torque_gain"),
+        "noise of motor_torque, mN m": 1e3 * _fact(said, "torque_noise_Nm"),
+        "noise of the opening, mrad": 1e3 * _fact(said, "encoder_jitter_rad"),
+        "largest torque that it used, mN m": 1e3 * _fact(said, "largest_torque_Nm"),
+        "largest rate at the blades, rad/s": said.largest_rate,
+        "time, s": said.seconds,
+    }
 
 
 def said_of(build: Build, faults: dict[str, Wrong]) -> str:
@@ -154,11 +157,6 @@ def _sentences(said: Said) -> list[str]:
     return [f"    {v.check}: {v.why}" for v in said.result.verdicts if v.check in LINES]
 
 
-def _range(found, of):  # type: ignore[no-untyped-def]
-    values = [of(said) for said in found]
-    return f"{min(values):.3g}", f"{max(values):.3g}"
-
-
 def _mean(said: Said, name: str) -> float:
     return float(getattr(said.result, name).mean)
 
@@ -170,10 +168,6 @@ def _sd(said: Said, name: str) -> float:
 def _fact(said: Said, name: str) -> float:
     assert said.result is not None
     return float(said.result.facts[name])
-
-
-def _dry(said: Said) -> float:
-    return float(np.mean([said.rig.coulomb_opening, said.rig.coulomb_closing]))
 
 
 def _table(head, rows) -> str:  # type: ignore[no-untyped-def]
