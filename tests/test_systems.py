@@ -155,6 +155,7 @@ RIG = {
     "device simulate": ["device", "simulate", "office-paper"],
     "device doctor": ["device", "doctor", "--device", "sim"],
     "device probe": ["device", "probe", "--device", "sim"],
+    "device home": ["device", "home", "--device", "sim"],
     "capture": ["capture", "friction", "--device", "sim"],
     "capture from a port": ["capture", "friction", "--device", "/dev/ttyUSB0"],
 }

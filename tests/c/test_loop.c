@@ -29,7 +29,7 @@ typedef struct {
 static void send_state(int fd, uint32_t sequence, uint16_t flags, int garble)
 {
     uint8_t payload[SC_SIZE_STATE], frame[SC_FRAME_MAX];
-    const sc_state state = {flags, sequence, sequence * 1000u,
+    const sc_state state = {0, flags, sequence, sequence * 1000u,
                             0.6f - 1e-4f * (float)sequence, 0.0f, 0.0f, 0.0f};
     const size_t size = sc_pack_state(&state, payload);
     const size_t whole = sc_encode_frame(payload, size, frame, sizeof frame);

@@ -83,7 +83,7 @@ static ssize_t made_up_read(int fd, void *bytes, size_t room)
     if (world.sequence == BEFORE + AFTER && world.beats) {
         sc_block_stop(world.block);
     }
-    const sc_state state = {SC_STATE_MOTOR_ENABLED, world.sequence, 1000u * world.sequence,
+    const sc_state state = {0, SC_STATE_MOTOR_ENABLED, world.sequence, 1000u * world.sequence,
                             0.5f - RATE_PER_TICK * (float)world.sequence, 0.0f, 0.0f, 0.0f};
     CHECK(room >= SC_FRAME_MAX, "room");
     return (ssize_t)sc_encode_frame(payload, sc_pack_state(&state, payload), bytes, room);

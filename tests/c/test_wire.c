@@ -42,6 +42,10 @@ static size_t repacked(const uint8_t *payload, size_t size, uint8_t *again)
     sc_identity identity;
     sc_config config;
     sc_config_echo echo;
+    sc_load_begin begin;
+    sc_load_chunk chunk;
+    sc_load_commit commit;
+    sc_load_echo loaded;
     if (sc_unpack_state(payload, size, &state)) {
         return sc_pack_state(&state, again);
     }
@@ -59,6 +63,18 @@ static size_t repacked(const uint8_t *payload, size_t size, uint8_t *again)
     }
     if (sc_unpack_config_echo(payload, size, &echo)) {
         return sc_pack_config_echo(&echo, again);
+    }
+    if (sc_unpack_load_begin(payload, size, &begin)) {
+        return sc_pack_load_begin(&begin, again);
+    }
+    if (sc_unpack_load_chunk(payload, size, &chunk)) {
+        return sc_pack_load_chunk(&chunk, again);
+    }
+    if (sc_unpack_load_commit(payload, size, &commit)) {
+        return sc_pack_load_commit(&commit, again);
+    }
+    if (sc_unpack_load_echo(payload, size, &loaded)) {
+        return sc_pack_load_echo(&loaded, again);
     }
     return 0;
 }
@@ -84,6 +100,7 @@ static void check_state_fields(const json *cases)
     const json *fields = json_get(&cases->items[0], "fields");
     const size_t size = json_bytes(json_text(&cases->items[0], "payload"), payload, sizeof payload);
     CHECK(sc_unpack_state(payload, size, &state), "state");
+    CHECK(state.cause == fields->items[0].number, "state");
     CHECK(state.flags == fields->items[1].number, "state");
     CHECK(state.sequence == fields->items[2].number, "state");
     CHECK(state.device_us == fields->items[3].number, "state");

@@ -159,7 +159,7 @@ def test_without_a_pose_the_tip_is_lifted_and_goes_on_with_the_next(
 def released(run: Any) -> None:
     """The motors are off: the rig, left alone, is pushed by nothing."""
     assert abs(run.truth.torque[-1]) < 0.01
-    protocol = run.link._protocol
+    protocol = run.link._device
     assert not protocol._command.flags
 
 

@@ -111,7 +111,7 @@ class Listened(LockstepLink):
         """Nothing waits."""
 
     def keep_streaming(self) -> None:
-        self._protocol.receive(encode(Hello(1)))
+        self._device.receive(encode(Hello(1)))
 
     def round_trip(self) -> float:
         self._pass()

@@ -1,6 +1,8 @@
 """The handshake and its refusals, against a thread on the other side of a pseudo-terminal."""
 
 import fcntl
+import inspect
+import itertools
 import struct
 import termios
 import time
@@ -13,8 +15,9 @@ from typing import Any
 import pytest
 
 from scissorcal.device import link as room
+from scissorcal.device import ports
 from scissorcal.device.link import DEFAULT_BAUD, PortLink, check_identity, open_link
-from scissorcal.device.ports import open_port
+from scissorcal.device.ports import modem_manager_runs, open_port
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     SCHEMA_HASH,
@@ -171,7 +174,9 @@ def test_forbidden_port_is_refused(far_end: Make, monkeypatch: pytest.MonkeyPatc
     ("said", "words"),
     [
         (b"", "sent nothing within 0.3 s"),
-        (b"$GPGGA,foreign\r\n", "sent 16 bytes but no valid frame"),
+        (bytes(range(128, 160)), "sent 32 bytes but no valid frame"),
+        (b"$GPGGA,foreign\r\n", r"sent text \('\$GPGGA,foreign'\).* another device"),
+        (b"rst:0x1 (POWERON)\r\nload", r"sent text \('rst:0x1 .*restarted when its port"),
         (encode(STATE), "does not answer the handshake"),
     ],
 )
@@ -192,6 +197,76 @@ def test_silence_and_foreign_data_give_different_errors(
         monkeypatch.setattr(room, "time", SimpleNamespace(monotonic=clock))
         with pytest.raises(DeviceError, match=words):
             link.shake_hands(0.3)
+
+
+def test_what_a_device_sends_while_it_boots_is_discarded(
+    far_end: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It boots when the port is opened, and hears nothing until it has."""
+    monkeypatch.setattr(room, "HELLO_WAIT_S", 0.02)
+    asked = itertools.count()
+
+    def boots(message: Message) -> list[bytes]:
+        if isinstance(message, Hello) and next(asked) < 3:
+            return [b"rst:0x1 (POWERON),boot:0x8\r\n"]
+        return honest(message)
+
+    with opened(far_end(boots)) as link:
+        assert link.identity.name == "bench rig"
+        assert link.garbled == 0
+
+
+def test_the_host_waits_longer_than_a_board_boots() -> None:
+    """A boot loader waits for two seconds at most, and a device answers a second after that."""
+    assert inspect.signature(open_link).parameters["timeout"].default == 4.0
+
+
+def test_modem_manager_is_named_where_it_runs(tmp_path: Path) -> None:
+    assert not modem_manager_runs(tmp_path)
+    (tmp_path / "812").mkdir()
+    (tmp_path / "812" / "comm").write_text("ModemManager\n", encoding="utf-8")
+    assert modem_manager_runs(tmp_path)
+
+
+@pytest.mark.parametrize("runs", [True, False])
+def test_a_port_in_use_says_who_may_have_it(
+    runs: bool, far_end: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import serial
+
+    def taken(*args: object, **options: object) -> None:
+        raise serial.SerialException(16, "could not open port: Device or resource busy")
+
+    monkeypatch.setattr(serial, "Serial", taken)
+    monkeypatch.setattr(ports, "modem_manager_runs", lambda: runs)
+    with pytest.raises(DeviceError, match="in use by another program") as caught:
+        open_link(far_end(honest).port)
+    assert ("udev rule" in str(caught.value)) is runs
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_device_of_each_version_is_served_with_its_own_schema(
+    far_end: Make, version: int
+) -> None:
+    def of_version(message: Message) -> list[bytes]:
+        assert isinstance(message, Hello)
+        schema = {1: 0xB09FB42A7F073F64, 2: SCHEMA_HASH}[version]
+        identity = IDENTITY._replace(
+            nonce_echo=message.nonce, protocol_version=version, schema_hash=schema
+        )
+        return [encode(identity)]
+
+    with opened(far_end(of_version)) as link:
+        assert link.identity.protocol_version == version
+
+
+def test_a_device_of_version_1_with_the_schema_of_version_2_is_refused(far_end: Make) -> None:
+    def mixed(message: Message) -> list[bytes]:
+        assert isinstance(message, Hello)
+        return [encode(IDENTITY._replace(nonce_echo=message.nonce, protocol_version=1))]
+
+    with pytest.raises(DeviceError, match=r"another wire schema.*b09fb42a7f073f64"):
+        opened(far_end(mixed))
 
 
 def test_other_schema_gives_both_hashes(far_end: Make) -> None:

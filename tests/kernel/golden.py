@@ -44,17 +44,28 @@ def wire_vectors() -> dict[str, Any]:
         *(0x8003, 0xDEADBEEF, SCHEMA_HASH, b"scissorcal-sim", b"paper-0001", 7, 1000),
         *(1.0, 30.0, 0.0, 1.0, -0.05, 0.25, 2.0**-16, 2.0**-20, 0.0625),
     )
+    earlier = (*identity[:2], 0xB09FB42A7F073F64, *identity[3:])
     plain = {
         "state": ("STATE", 0, 1, 258, 16909060, 0.5, -0.25, 0.125, -2.0),
         "state of zeros": ("STATE", 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0),
-        "state at the ends": ("STATE", 0, 0x7F, 2**32 - 1, 2**32 - 1, math.pi, 1e-30, -1e30, 3e38),
+        "state at the ends": ("STATE", 0, 0x3FF, 2**32 - 1, 2**32 - 1, math.pi, 1e-30, -1e30, 3e38),
+        "state of a fault": ("STATE", 4, 2, 259, 16910060, 0.5, -0.25, 0.0, -2.0),
+        "state while it homes": ("STATE", 0, 0x181, 5, 5000, 0.0, 0.0, -0.1, 0.0),
         "command": ("COMMAND", 0, 1, 7, 0.25, 0.0),
+        "command that holds for one tick": ("COMMAND", 1, 1, 8, 0.25, 0.0),
         "command that clears a fault": ("COMMAND", 0, 3, 256, -0.75, 12.5),
-        "hello": ("HELLO", 1, 0, 0x01020304),
-        "identity": ("IDENTITY", 1, *identity),
+        "hello": ("HELLO", 2, 0, 0x01020304),
+        "identity": ("IDENTITY", 2, *identity),
+        "identity of version 1": ("IDENTITY", 1, *earlier),
         "config": ("CONFIG", 0, 1, 99, 1.0),
         "config of the simulator": ("CONFIG", 0, 0x8001, 100, 0.3),
+        "config that homes": ("CONFIG", 0, 3, 102, 1.0),
         "config echo": ("CONFIG_ECHO", 2, 2, 101, 10.0),
+        "load begin": ("LOAD_BEGIN", 0, 1, 103, 5000, 0xCBF43926),
+        "load chunk": ("LOAD_CHUNK", 192, 0, 104, 192, bytes(range(192))),
+        "last load chunk": ("LOAD_CHUNK", 8, 0, 105, 4992, b"scissors".ljust(192, b"\0")),
+        "load commit": ("LOAD_COMMIT", 0, 0, 106),
+        "load echo": ("LOAD_ECHO", 5, 0, 106, 5000, 32768, 0),
     }
     messages = []
     for title, (name, second, *values) in plain.items():
@@ -83,7 +94,7 @@ def wire_vectors() -> dict[str, Any]:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, bytes):
-        return value.decode()
+        return value.decode() if len(value) < 192 else value.hex()
     return single(value) if isinstance(value, float) else value
 
 

@@ -10,6 +10,10 @@ LAYOUTS = {
     "IDENTITY": (0x11, "<BBHIQ16s16sII9f"),
     "CONFIG": (0x12, "<BBHIf"),
     "CONFIG_ECHO": (0x13, "<BBHIf"),
+    "LOAD_BEGIN": (0x14, "<BBHIII"),
+    "LOAD_CHUNK": (0x15, "<BBHII192s"),
+    "LOAD_COMMIT": (0x16, "<BBHI"),
+    "LOAD_ECHO": (0x17, "<BBHIIII"),
 }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from scissorcal.kernel import (
+    EARLIER_SCHEMAS,
     PROTOCOL_VERSION,
     SAMPLE_DTYPE,
     SCHEMA_HASH,
@@ -17,6 +18,7 @@ from scissorcal.kernel import (
     Config,
     Hello,
     Identity,
+    LoadChunk,
     State,
     c_sources,
     crc16,
@@ -32,8 +34,9 @@ from tests.kernel.reference_wire import LAYOUTS, frame_of, unstuffed
 
 ROOT = Path(__file__).parent.parent.parent
 WIRE = json.loads((ROOT / "data_schemas" / "wire.json").read_text(encoding="utf-8"))
-SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "f32": 4, "char16": 16}
-LETTERS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "f32": "f", "char16": "16s"}
+SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "f32": 4, "char16": 16, "char192": 192}
+LETTERS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "f32": "f"}
+LETTERS |= {"char16": "16s", "char192": "192s"}
 
 
 def test_what_restates_the_layout_is_generated_from_the_schema() -> None:
@@ -107,6 +110,7 @@ def identity(**changes: object) -> Identity:
         Config(1 << 16, 0, 0.0),
         identity(name="a name far too long for it"),
         identity(serial="München"),
+        LoadChunk(count=193, nonce=1, offset=0, bytes=b"x" * 193),
     ],
 )
 def test_numbers_and_texts_that_do_not_fit_are_refused(message: State) -> None:
@@ -131,6 +135,16 @@ def test_identity_keeps_its_texts() -> None:
     assert decoded.schema_hash == SCHEMA_HASH
 
 
+def test_a_piece_of_an_image_keeps_its_bytes() -> None:
+    sent = LoadChunk(count=4, nonce=7, offset=192, bytes=b"\0a\0\xff")
+    piece = decode(unstuffed(encode(sent)[:-1])[:-2])
+    assert piece == sent._replace(bytes=sent.bytes.ljust(192, b"\0"))
+
+
+def test_version_1_devices_are_known_by_their_schema() -> None:
+    assert EARLIER_SCHEMAS == {1: 0xB09FB42A7F073F64}
+
+
 def hex_blocks(text: str) -> list[bytes]:
     """Every fenced block of the protocol page that is marked as a frame."""
     blocks = re.findall(r"```frame\n(.*?)```", text, re.DOTALL)
@@ -151,7 +165,13 @@ def test_frames_worked_out_in_the_protocol_page_are_golden() -> None:
         assert f"`{name}`" in page
         for field in message["fields"]:
             assert field["name"] in page, f"{name}.{field['name']}"
-    for name in (*WIRE["state_flags"], *WIRE["config_keys"], *WIRE["capabilities"]):
+    for name in (
+        *WIRE["state_flags"],
+        *WIRE["config_keys"],
+        *WIRE["capabilities"],
+        *WIRE["fault_causes"],
+        *WIRE["load_status"],
+    ):
         assert name in page
 
 

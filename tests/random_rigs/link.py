@@ -93,7 +93,7 @@ class RigLink:
         self.time_s = 0.0
         self.largest_rate = 0.0
         self._splitter, self._host_splitter = wire.Splitter(), wire.Splitter()
-        self._hash = wire.schema_hash(WIRE)
+        self._hash = wire.schema_hash(WIRE, 1)
         self._arriving: deque[tuple[int, bytes]] = deque()
         self._out = b""
         self._tick = 0

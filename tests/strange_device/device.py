@@ -18,6 +18,7 @@ RESOLUTION_RAD, RESOLUTION_M = 2.0 * math.pi / 160_000, 2.5e-6
 RADIUS_M = 0.06
 TORQUE_NOISE_NM, FORCE_NOISE_N = 1.5e-3, 0.015
 BRAKE_NM_S = 0.05
+HOMING_S = 1.5
 WIRE = Path(__file__).parents[2] / "data_schemas" / "wire.json"
 
 
@@ -26,10 +27,12 @@ class StrangeDevice:
 
     ``largest_torque`` (N m, at the motor), ``largest_rate`` (rad/s) and ``largest_force`` (N) are
     the truth since the start or since `forget`. ``hand`` and ``sheet`` may be set at any time.
+    ``version`` is that of the protocol, 1 or 2.
     """
 
-    def __init__(self, faults: Faults | None = None, seed: int = 0) -> None:
+    def __init__(self, faults: Faults | None = None, seed: int = 0, version: int = 1) -> None:
         self.faults = faults or Faults()
+        self.version = version
         f = self.faults
         self.rng = np.random.default_rng(seed)
         low = OPENING_LOW if f.jammed_at_rad is None else f.jammed_at_rad
@@ -41,7 +44,7 @@ class StrangeDevice:
         self.largest_torque = self.largest_rate = self.largest_force = 0.0
         self.unplugged = False
         self._splitter = wire.Splitter()
-        self._hash = wire.schema_hash(WIRE)
+        self._hash = wire.schema_hash(WIRE, version)
         self._hand_since = 0.0
         self._arriving: deque[tuple[float, bytes]] = deque()
         self._leaving: deque[tuple[float, bytes]] = deque()
@@ -86,6 +89,8 @@ class StrangeDevice:
         self._motor = 0.0
         self._enabled = self._lost = self._fault = False
         self._fault_given = False
+        self._cause = self._hold = 0
+        self._homed, self._homing_s = not self.faults.not_homed, 0.0
         self._silence_s = 0.0
         self._brake_after_ms = self.faults.brake_after_ms
         self._streaming = False
@@ -105,17 +110,23 @@ class StrangeDevice:
         elif kind == wire.CONFIG and size == 12:
             self._send(self._configured(*struct.unpack_from("<HIf", payload, 2)))
         elif kind == wire.COMMAND and size == 16:
-            flags, _, torque, force = struct.unpack_from("<HIff", payload, 2)
+            hold, flags, _, torque, force = struct.unpack_from("<BHIff", payload, 1)
             if math.isfinite(torque) and math.isfinite(force):
+                self._hold = hold if self.version >= 2 else 0
                 self._obey(flags, torque, force)
 
     def _obey(self, flags: int, torque: float, force: float) -> None:
-        self._enabled = bool(flags & wire.ENABLE)
+        self._enabled = bool(flags & wire.ENABLE) and self._homed
         self._torque, self._force = torque, force
         self._silence_s = 0.0
         self._lost = False
         if flags & wire.CLEAR_FAULT and not (self.faults.fault_stays and self._fault_given):
-            self._fault = False
+            self._fault, self._cause = False, 0
+
+    def _latch(self, cause: int) -> None:
+        self._cause = self._cause if self._fault else cause
+        self._fault = True
+        self._homing_s = 0.0
 
     def _configured(self, key: int, nonce: int, value: float) -> bytes:
         status, in_force = 1, 0.0
@@ -128,17 +139,28 @@ class StrangeDevice:
             status = 0 if fits else 2
             self._brake_after_ms = value if fits else self._brake_after_ms
             in_force = self._brake_after_ms
+        elif key == wire.HOME and self.version >= 2:
+            fits = value == 0.0 or (value == 1.0 and not self._fault and not self._enabled)
+            status = 0 if fits else 2
+            if fits:
+                self._homing_s = HOMING_S if value else 0.0
+                self._homed = self._homed and not value
+            in_force = float(self._homing_s > 0.0)
         return struct.pack("<BBHIf", wire.CONFIG_ECHO, status, key, nonce, in_force)
 
     def _identity(self, nonce: int) -> bytes:
         f = self.faults
         return struct.pack(
             "<BBHIQ16s16sIIfffffffff",
-            wire.IDENTITY, 1, wire.FORCE_SENSOR | wire.ADVANCE_MOTOR, nonce, self._hash,
+            wire.IDENTITY, self.version, self._capabilities(), nonce, self._hash,
             b"strange", b"bench-3", 12, f.stated_tick_us or f.tick_us,
             TORQUE_LIMIT, FORCE_LIMIT, OPENING_LOW, OPENING_HIGH, ADVANCE_LOW, ADVANCE_HIGH,
             f.stated_resolution_rad or RESOLUTION_RAD, RESOLUTION_M, f.stated_radius_m or RADIUS_M,
         )  # fmt: skip
+
+    def _capabilities(self) -> int:
+        more = wire.HOMES | wire.TORQUE_MEASURED * self.faults.torque_measured
+        return wire.FORCE_SENSOR | wire.ADVANCE_MOTOR | more * (self.version >= 2)
 
     def _watch(self) -> None:
         f = self.faults
@@ -147,15 +169,21 @@ class StrangeDevice:
             self._restarted = self._streaming = True
             self._streamed_s = f.restarts_at_s
         if self._streamed_s >= f.fault_at_s and not self._fault_given:
-            self._fault = self._fault_given = True
+            self._latch(f.fault_cause)
+            self._fault_given = True
+        if self._homing_s > 0.0:
+            self._homing_s -= self.tick_s
+            self._homed = self._homing_s <= 0.0 and f.home_finds
         silent = 1e3 * self._silence_s >= self._brake_after_ms - 1e-9
         if self._enabled and silent and not f.watchdog_deaf:
-            self._lost = self._fault = True
+            self._lost = True
+            self._latch(wire.WATCHDOG)
         self._silence_s += self.tick_s
 
     def _move(self) -> None:
         f = self.faults
         drives = self._enabled and not self._fault
+        drives &= self._hold == 0 or self._silence_s <= self._hold * self.tick_s + 1e-9
         asked = self._torque if drives else 0.0
         given = min(max(asked, -TORQUE_LIMIT), TORQUE_LIMIT) if f.clips else asked
         self._clipped = given != asked
@@ -223,6 +251,8 @@ class StrangeDevice:
         flags |= wire.FAULT_LATCHED * self._fault | wire.COMMANDS_LOST * self._lost
         flags |= wire.AT_STOP * self.blades.at_stop | wire.TORQUE_SATURATED * self._clipped
         flags |= wire.ENCODER_FAULT * (at >= f.encoder_fault_at_s)
+        if self.version >= 2:
+            flags |= wire.NOT_HOMED * (not self._homed) | wire.HOMING * (self._homing_s > 0.0)
         clock = int(self._clock_us) & 0xFFFFFFFF
         third = at >= f.stamps_wrong_at_s and self._sequence % 3 == 0
         if at >= f.clock_random_at_s or third:
@@ -232,7 +262,7 @@ class StrangeDevice:
         state = struct.pack(
             "<BBHIIffff",
             wire.STATE,
-            0,
+            self._cause if self.version >= 2 else 0,
             flags,
             self._sequence & 0xFFFFFFFF,
             clock,

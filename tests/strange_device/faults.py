@@ -60,6 +60,11 @@ class Faults:
     encoder_fault_at_s: float = math.inf
     fault_at_s: float = math.inf
     fault_stays: bool = False
+    fault_cause: int = 8
+    """Of the fault at ``fault_at_s``, as a device of version 2 states it."""
+    not_homed: bool = False
+    home_finds: bool = True
+    torque_measured: bool = True
     watchdog_deaf: bool = False
     clips: bool = True
     refuses_brake_after: bool = False

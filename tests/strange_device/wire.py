@@ -11,12 +11,20 @@ MOTOR_ENABLED, FAULT_LATCHED, COMMANDS_LOST, AT_STOP = 1, 2, 4, 8
 TORQUE_SATURATED, FORCE_SATURATED, ENCODER_FAULT = 16, 32, 64
 ENABLE, CLEAR_FAULT = 1, 2
 FORCE_SENSOR, ADVANCE_MOTOR = 1, 2
-STREAM, BRAKE_AFTER_MS = 1, 2
+STREAM, BRAKE_AFTER_MS, HOME = 1, 2, 3
+NOT_HOMED, HOMING = 128, 256
+TORQUE_MEASURED, HOMES = 4, 8
+WATCHDOG, ENCODER = 1, 2
 MOST_BYTES = 253
 
 
-def schema_hash(wire_json: Path) -> int:
-    """First 8 bytes of SHA-256 over wire.json without spaces and with sorted keys."""
+def schema_hash(wire_json: Path, version: int = 2) -> int:
+    """First 8 bytes of SHA-256 over wire.json without spaces and with sorted keys.
+
+    That of version 1 is the one that its devices were built with.
+    """
+    if version == 1:
+        return 0xB09FB42A7F073F64
     wire = json.loads(wire_json.read_text(encoding="utf-8"))
     text = json.dumps(wire, sort_keys=True, separators=(",", ":"))
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")

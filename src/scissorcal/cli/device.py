@@ -16,6 +16,7 @@ _COMMANDS = {
     "list": ("scissorcal.cli.device:list_", "The serial ports of this machine."),
     "doctor": ("scissorcal.cli.device:doctor", "Measure port, timer and scheduler; name remedies."),
     "probe": ("scissorcal.cli.device:probe", "Check a rig before its motors run."),
+    "home": ("scissorcal.cli.device_home:home", "Have a device find the zero of its encoders."),
     "simulate": ("scissorcal.cli.device:simulate", "Serve a virtual rig on a pseudo-terminal."),
 }
 
@@ -97,8 +98,10 @@ def simulate(
         typer.Option(
             "--fault",
             metavar="KIND=VALUE",
-            help="drop=0.01, garble=0.01 (shares of frames), delay=16 (ms), unplug=5 or "
-            "stuck-encoder=5 (seconds after streaming begins); may be repeated.",
+            help="drop=0.01, garble=0.01 (shares of frames), delay=16 (ms), unplug=5, "
+            "stuck-encoder=5 or heat=5 (seconds after streaming begins; heat, current, speed, "
+            "supply, driver and stop-button latch a fault), not-homed=1, unmeasured-torque=1, "
+            "protocol=1; may be repeated.",
         ),
     ] = None,
     seed: Seed = 0,

@@ -208,6 +208,11 @@ def _finish(recorder: Recorder, motion: Motion) -> CaptureReport:
     """Note how the servo ran and what was lost, and report."""
     report = motion.report()
     recorder.writer.note(report.lag.sentence)
+    if report.held_up_s and recorder.tally.lost:
+        recorder.writer.note(
+            f"This computer did not run the loop for up to {1e3 * report.held_up_s:.0f} ms: what "
+            "the device sent meanwhile may be what was lost. Close programs that load it."
+        )
     if report.rights:
         recorder.writer.note(report.rights.sentence)
     recorder.finish(report.overrun)

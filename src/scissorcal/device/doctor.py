@@ -5,7 +5,6 @@ import os
 import select
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from scissorcal.aliases import Array, Integers, Progress
 from scissorcal.device.link import PortLink
 from scissorcal.device.motion import LOOP
+from scissorcal.device.ports import adapter_timer_ms, adapter_timer_path
 from scissorcal.device.timing import Percentiles
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Capability, ConfigKey, State
@@ -117,15 +117,6 @@ def clock_drift(arrival_s: Array, device_us: Integers) -> tuple[float, float]:
     left = y - y.mean() - slope * x
     error = math.sqrt(float(left @ left) / (len(x) - 2) / float(x @ x))
     return 1e6 * slope, 1e6 * error
-
-
-def adapter_timer_ms(port: str, sys_root: Path = Path("/sys")) -> float | None:
-    """Latency timer (ms) of the USB adapter behind a port, None where there is none."""
-    path = _adapter_timer_path(port, sys_root)
-    try:
-        return float(path.read_text(encoding="ascii"))
-    except (OSError, ValueError):
-        return None
 
 
 def _listen(link: PortLink, seconds: float) -> tuple[Array, Integers, Integers, int]:
@@ -233,11 +224,6 @@ def brake_after_ms(m: Measurements) -> float:
     return min(max(5.0 * math.ceil(needed / 5.0), LEAST_BRAKE_MS), MOST_BRAKE_MS)
 
 
-def _adapter_timer_path(port: str, sys_root: Path = Path("/sys")) -> Path:
-    """Return the file in which Linux keeps the latency timer of a USB serial adapter."""
-    return sys_root / "bus/usb-serial/devices" / Path(port).resolve().name / "latency_timer"
-
-
 def _round_trip(m: Measurements) -> Verdict:
     limit = ROUND_TRIP_LIMIT_TICKS * m.tick_ms
     found = (
@@ -276,6 +262,11 @@ def _losses(m: Measurements, port: str) -> Verdict:
     share = 100.0 * m.lost / max(m.lost + m.frames, 1)
     found = f"{m.lost} frames lost ({share:.2g} %) and {m.garbled} garbled on {port}."
     bad = f"{found} Use a shorter, shielded cable, and the baud rate that the device is built for."
+    if m.lost and m.interval.worst >= m.lost * m.tick_ms:
+        bad = (
+            f"{found} No frame was read for {m.interval.worst:.0f} ms: this computer was held up, "
+            "or the device paused. Close programs that load this computer, and measure again."
+        )
     if m.garbled:
         return LOST_FRAMES.verdict("fail", share, bad)
     return LOST_FRAMES.judge(share, found, bad)
@@ -287,7 +278,7 @@ def _adapter(m: Measurements, port: str) -> Verdict:
         why = f"{port} has no USB adapter with a latency timer."
         return LATENCY_TIMER.not_evaluated(why)
     found = f"The adapter delays data by up to {delay_ms:g} ms."
-    bad = f"{found} Run: echo 1 | sudo tee {_adapter_timer_path(port)}"
+    bad = f"{found} Run: echo 1 | sudo tee {adapter_timer_path(port)}"
     return LATENCY_TIMER.judge(delay_ms, found, bad)
 
 

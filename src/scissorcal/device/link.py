@@ -10,9 +10,16 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, suppress
 from typing import TYPE_CHECKING, Protocol, Self
 
-from scissorcal.device.ports import open_port
+from scissorcal.device.ports import (
+    MODEM_MANAGER,
+    adapter_timer_ms,
+    adapter_timer_path,
+    modem_manager_runs,
+    open_port,
+)
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
+    EARLIER_SCHEMAS,
     PROTOCOL_VERSION,
     SCHEMA_HASH,
     Config,
@@ -35,10 +42,20 @@ DEFAULT_BAUD = 921600
 CONFIGURE_ATTEMPTS = 5
 CONFIGURE_WAIT_S = 0.2
 HELLO_WAIT_S = 0.2
+BOOT_S = 4.0
+"""Many boards restart when their port is opened (DTR), and have a boot loader that waits for two
+seconds; a device then answers within another."""
+FIRST_BYTES = 256
+TEXT_BYTES, TEXT_SHARE = 16, 0.9
+"""So many bytes, and so large a share of printable ones, are text. Of random bytes 0.38 are."""
 READ_BYTES = 65536
 IDENTITY_TYPE = 0x11
 SHORTEST_TICK_US, LONGEST_TICK_US = 250, 10_000
 """Limits of the protocol (docs/protocol.md, Timing)."""
+
+
+SCHEMAS = {**EARLIER_SCHEMAS, PROTOCOL_VERSION: SCHEMA_HASH}
+"""Schema hash of each protocol version that is served."""
 
 
 class Link(Protocol):
@@ -55,11 +72,11 @@ class Link(Protocol):
     def close(self) -> None: ...
 
 
-def open_link(port: str, baud: int = DEFAULT_BAUD, timeout: float = 2.0) -> "PortLink":
+def open_link(port: str, baud: int = DEFAULT_BAUD, timeout: float = BOOT_S) -> "PortLink":
     """Open a port, discard what waits in it, and ask the device for its identity.
 
-    The port is locked against a second user. ``timeout`` (s) bounds the wait for the answer; a
-    device that needs longer to boot after its port is opened needs more. Raises DeviceError, with
+    The port is locked against a second user. ``timeout`` (s) bounds the wait for the answer, in
+    which a device may boot; the text that it sends meanwhile is discarded. Raises DeviceError, with
     the remedy, where the port is missing, busy or forbidden, where nothing or something else
     answers, and where the device has another wire version or schema.
     """
@@ -80,6 +97,8 @@ class PortLink(AbstractContextManager["PortLink"]):
         self.received = FrameDecoder()
         self._port = port
         self._identity: Identity | None = None
+        self._first_bytes = b""
+        self._garbled_before = 0
         self._nonces = itertools.count(secrets.randbits(32))
 
     @property
@@ -93,8 +112,8 @@ class PortLink(AbstractContextManager["PortLink"]):
 
     @property
     def garbled(self) -> int:
-        """Frames from the device that were discarded since the port was flushed."""
-        return self.received.garbled
+        """Frames from the device that were discarded since the handshake or the last flush."""
+        return self.received.garbled - self._garbled_before
 
     def fileno(self) -> int:
         """Return the file descriptor, for the servo loop."""
@@ -181,6 +200,7 @@ class PortLink(AbstractContextManager["PortLink"]):
             if len(self._read()) < READ_BYTES:
                 break
         self.received = FrameDecoder()
+        self._garbled_before = 0
 
     def shake_hands(self, timeout: float) -> None:
         """Ask who is there until an answer with the right nonce comes, and check that it fits."""
@@ -199,25 +219,43 @@ class PortLink(AbstractContextManager["PortLink"]):
                     message = decode(payload)
                     if isinstance(message, Identity) and message.nonce_echo == nonce:
                         self._identity = check_identity(self.name, message)
+                        self._garbled_before = self.received.garbled  # boot text
                         return
         raise self._no_identity(timeout, frames)
 
     def _no_identity(self, timeout: float, frames: int) -> DeviceError:
+        """The error where no identity came: what was seen first, then what may hold it up."""
         heard = self.received.bytes_received
+        text = _boot_text(self._first_bytes)
         if heard == 0:
-            return DeviceError(
+            seen = (
                 f"{self.name} sent nothing within {timeout:g} s of the handshake. Check that the "
                 "rig is powered and that this is its port."
             )
-        if frames == 0:
-            return DeviceError(
+        elif frames == 0 and text:
+            seen = (
+                f"{self.name} sent text ({text!r}) and no valid frame within {timeout:g} s. Either "
+                "this is another device, or a board that restarted when its port was opened (DTR) "
+                "and did not answer in time: flash the rig's firmware, which must answer HELLO "
+                "within a second of power-on, or keep DTR from the board's reset line."
+            )
+        elif frames == 0:
+            seen = (
                 f"{self.name} sent {heard} bytes but no valid frame: another device, or another "
                 "baud rate. Check the port and the baud rate (921600 by default)."
             )
-        return DeviceError(
-            f"{self.name} sends valid frames ({frames}) but does not answer the handshake: restart "
-            "the device, and check that its receive line is connected."
-        )
+        else:
+            seen = (
+                f"{self.name} sends valid frames ({frames}) but does not answer the handshake: "
+                "restart the device, and check that its receive line is connected."
+            )
+        delay_ms = adapter_timer_ms(self.name)
+        if delay_ms is not None and delay_ms > 1.0:
+            seen += (
+                f" Its adapter holds data back for up to {delay_ms:g} ms: echo 1 | sudo tee "
+                f"{adapter_timer_path(self.name)}"
+            )
+        return DeviceError(f"{seen} {MODEM_MANAGER}" if modem_manager_runs() else seen)
 
     def _payloads(self, timeout: float) -> Iterator[bytes]:
         """Yield payloads until ``timeout``; what has arrived at once is always given whole."""
@@ -230,7 +268,10 @@ class PortLink(AbstractContextManager["PortLink"]):
                 raise self._gone() from error
             if not ready:
                 return
-            yield from self.received.feed(self._read())
+            data = self._read()
+            if self._identity is None and len(self._first_bytes) < FIRST_BYTES:
+                self._first_bytes += data[:FIRST_BYTES]
+            yield from self.received.feed(data)
             if time.monotonic() > deadline:
                 return
 
@@ -268,18 +309,33 @@ class PortLink(AbstractContextManager["PortLink"]):
         return self
 
 
+def _boot_text(data: bytes) -> str:
+    """The first line of what a device sent, where that is text; else empty.
+
+    >>> _boot_text(b"ESP-ROM:esp32s3-20210327\\r\\nrst:0x1 (POWERON)")
+    'ESP-ROM:esp32s3-20210327'
+    """
+    printable = sum(32 <= byte < 127 or byte in b"\t\r\n" for byte in data)
+    if len(data) < TEXT_BYTES or printable < TEXT_SHARE * len(data):
+        return ""
+    return data.decode("ascii", "replace").strip().splitlines()[0][:60]
+
+
 def check_identity(name: str, identity: Identity) -> Identity:
     """Return the identity if this host can work with it.
 
     Raises DeviceError where version or schema differ, where a limit is no number or empty, or where
     the tick is shorter or longer than the protocol's.
     """
-    if identity.schema_hash != SCHEMA_HASH:
+    version = identity.protocol_version
+    if identity.schema_hash != SCHEMAS.get(version):
         raise DeviceError(
             f"{name} has another wire schema: the device (firmware "
-            f"{identity.firmware_version}) has {identity.schema_hash:016x}, this scissorcal has "
-            f"{SCHEMA_HASH:016x}. Update the device's firmware to this scissorcal's "
-            "data_schemas/wire.json, or install the scissorcal that the firmware was built with."
+            f"{identity.firmware_version}, protocol version {version}) has "
+            f"{identity.schema_hash:016x}, this scissorcal has "
+            f"{SCHEMAS.get(version, SCHEMA_HASH):016x}. Update the device's firmware to this "
+            "scissorcal's data_schemas/wire.json, or install the scissorcal that the firmware was "
+            "built with."
         )
     wrong = [
         name
@@ -327,7 +383,7 @@ def check_echo(name: str, echo: ConfigEcho, key: int, value: float) -> None:
 
 
 def _refuse_other_version(name: str, payload: bytes) -> None:
-    if len(payload) > 1 and payload[0] == IDENTITY_TYPE and payload[1] != PROTOCOL_VERSION:
+    if len(payload) > 1 and payload[0] == IDENTITY_TYPE and payload[1] not in SCHEMAS:
         older = "the device's firmware" if payload[1] < PROTOCOL_VERSION else "scissorcal"
         raise DeviceError(
             f"{name} has wire protocol version {payload[1]}, this scissorcal version "

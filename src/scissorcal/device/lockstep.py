@@ -6,6 +6,7 @@ give the same numbers on every machine.
 """
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
@@ -31,11 +32,37 @@ ATTEMPTS = 20
 ANSWER_TICKS = 50
 
 
+class DeviceSide(Protocol):
+    """A device behind a lockstep link: it takes bytes, and gives bytes, in virtual time."""
+
+    @property
+    def unplugged(self) -> bool:
+        """Whether its cable has been pulled."""
+
+    @property
+    def garbled(self) -> int:
+        """Frames from the host that it discarded."""
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the host, in pieces of any size."""
+
+    def tick(self) -> None:
+        """Advance one tick: measure, decide, drive, send."""
+
+    def take(self) -> list[bytes]:
+        """Bytes that are due for the host, oldest first."""
+
+
+MakeDevice = Callable[[VirtualRig, np.random.Generator, Faults | None], DeviceSide]
+"""Makes the device side of a rig whose mechanics it drives, one `VirtualRig.tick` for each tick."""
+
+
 class LockstepLink:
     """A link (``identity``, ``configure``, ``close``) with :meth:`exchange`.
 
     ``specimen`` is a Specimen, its name or its path; ``rng`` seeds everything random in the rig.
-    ``rig`` gives tests the truth.
+    ``rig`` gives tests the truth. ``device`` makes the device side: the rig's own protocol, or
+    another that drives the same mechanics, such as a firmware.
 
     >>> from scissorcal.kernel import ConfigKey
     >>> link = LockstepLink("office-paper", np.random.default_rng(1))
@@ -50,13 +77,16 @@ class LockstepLink:
         specimen: Specimen | str,
         rng: np.random.Generator,
         faults: Faults | None = None,
+        device: MakeDevice = RigProtocol,
     ) -> None:
         """Power on a rig and read its identity; DeviceError if it never answers."""
         loaded = specimen if isinstance(specimen, Specimen) else load_specimen(specimen)
         rig_rng, line_rng = rng.spawn(2)
         self.name = f"The virtual rig {loaded.name}"
         self.rig = VirtualRig(loaded, rig_rng)
-        self._protocol = RigProtocol(self.rig, line_rng, faults)
+        self._device = device(self.rig, line_rng, faults)
+        self._unplug_s = faults.unplug_s if faults else None
+        self._states: list[bytes] = []
         self._decoder = FrameDecoder()
         self._nonce = 0
         self._closed = False
@@ -85,12 +115,15 @@ class LockstepLink:
         """Send a frame (or none), advance one tick, and return the STATE payloads that arrive.
 
         There is one payload per tick unless faults drop or delay it, and none before STREAM is
-        set. Raises DeviceError once the rig is unplugged or the link closed.
+        set; those that arrived while :meth:`configure` waited for its echo come first.
+        Raises DeviceError once the rig is unplugged or the link closed.
         """
         self._check_open()
         if command_frame is not None:
-            self._protocol.receive(command_frame)
-        return [payload for payload in self._pass_tick() if _is_state(payload)]
+            self._device.receive(command_frame)
+        self._pass_tick()
+        states, self._states = self._states, []
+        return states
 
     def configure(self, key: int, value: float) -> float:
         """Set a value of the device, wait for its echo and return the value in force.
@@ -125,30 +158,35 @@ class LockstepLink:
     def _ask(
         self, question: Callable[[int], Message], answers: Callable[[Message, int], bool]
     ) -> Message | None:
-        """Ask until the answer arrives; STATE payloads that arrive before it are dropped."""
+        """Ask until the answer arrives; states that arrive before it wait for the next exchange."""
         for _ in range(ATTEMPTS):
             self._nonce += 1
-            self._protocol.receive(encode(question(self._nonce)))
-            payloads = self._collect()
+            self._device.receive(encode(question(self._nonce)))
+            answered = self._collect()
             for _ in range(ANSWER_TICKS):
-                for payload in payloads:
-                    if not _is_state(payload) and answers(reply := decode(payload), self._nonce):
+                for payload in answered:
+                    if answers(reply := decode(payload), self._nonce):
                         return reply
-                payloads = self._pass_tick()
+                answered = self._pass_tick()
         return None
 
     def _pass_tick(self) -> list[bytes]:
-        self._protocol.tick()
-        if self._protocol.unplugged:
+        self._device.tick()
+        if self._device.unplugged:
             self._closed = True
+            after = f" after {self._unplug_s:g} s of streaming" if self._unplug_s else ""
             raise DeviceError(
-                f"{self.name} was unplugged after {self._protocol.faults.unplug_s:g} s of "
-                f"streaming, as its faults specify ({self.virtual_time / TICK_S:.0f} ticks in all)."
+                f"{self.name} was unplugged{after}, as its faults specify "
+                f"({self.virtual_time / TICK_S:.0f} ticks in all)."
             )
         return self._collect()
 
     def _collect(self) -> list[bytes]:
-        return self._decoder.feed(b"".join(self._protocol.take()))
+        """Take what has arrived: states are kept for :meth:`exchange`, the rest is returned."""
+        answers: list[bytes] = []
+        for payload in self._decoder.feed(b"".join(self._device.take())):
+            (self._states if _is_state(payload) else answers).append(payload)
+        return answers
 
     def _check_open(self) -> None:
         if self._closed:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
+from scissorcal.device.faults import stop_sentence
 from scissorcal.device.paths import Reference
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.device.trajectory import approach, check_reference
@@ -59,7 +60,7 @@ class MotionReport:
     command) and ``interval`` (between frames) are in microseconds, None in virtual time. ``lag`` is
     what a hand feels of all delays; ``rights`` are what the system granted the loop, None in
     virtual time. ``watched`` is the largest value that each watch has seen, as a share of what
-    stops.
+    stops. ``held_up_s`` is the longest time in which this computer did not run the loop.
     """
 
     counters: ServoCounters
@@ -74,6 +75,7 @@ class MotionReport:
     lag: FeltLag
     rights: LoopRights | None
     watched: Mapping[str, float] = field(default_factory=dict)
+    held_up_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,11 +274,27 @@ class Motion(AbstractContextManager["Motion"], ABC):
     def _why_lost(self) -> DeviceError | None:
         """The error where the link to the rig failed, None where the servo itself stopped."""
 
+    @property
+    def held_up_s(self) -> float:
+        """Longest time, lately, in which this computer did not run the loop."""
+        return 0.0
+
+    @property
+    def _stop_sentence(self) -> str:
+        return stop_sentence(self.stop_reason, self._servo.fault_cause, self.held_up_s)
+
+    def refuse_not_homed(self) -> None:
+        """Raise DeviceError, with the motors off, where the device does not know its zero."""
+        if self.stop_reason is StopReason.NOT_HOMED:
+            error = self._stopped()
+            self.close()
+            raise error
+
     def _stopped(self) -> DeviceError:
         lost = self._why_lost()
         if lost is not None:
             return lost
-        sentence = self.stop_reason.sentence
+        sentence = self._stop_sentence
         if self.stop_reason in (StopReason.TRACKING_LOST, StopReason.OVERSPEED):
             sentence += (
                 " If 'scissorcal device doctor' finds the port slow, lower the gains in the "

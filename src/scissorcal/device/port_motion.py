@@ -28,7 +28,8 @@ def open_motion(
     """Start the servo on a link: in a separate process on a port, in this process in virtual time.
 
     Samples come in blocks of about ``every_s``. It starts idle, with the rig's position known. A
-    fault that the device has latched is cleared.
+    fault that the device has latched is cleared. Raises DeviceError, before a motor runs, where the
+    device does not know the zero of its encoders.
 
     >>> import numpy as np
     >>> from scissorcal.device.lockstep import LockstepLink
@@ -39,11 +40,15 @@ def open_motion(
     >>> len(samples), bool(samples["torque_command"].any())
     (200, False)
     """
+    motion: Motion
     if isinstance(link, Exchanging):
-        return LockstepMotion(link, config, task, every_s)
-    if not isinstance(link, PortLink):
+        motion = LockstepMotion(link, config, task, every_s)
+    elif isinstance(link, PortLink):
+        motion = PortMotion(link, config, task, every_s)
+    else:
         raise TypeError(f"A {type(link).__name__} is neither a port nor a lockstep link.")
-    return PortMotion(link, config, task, every_s)
+    motion.refuse_not_homed()
+    return motion
 
 
 CONFIGURE_ATTEMPTS = 3
@@ -98,6 +103,10 @@ class PortMotion(Motion):
         if not self._process.alive and self._block.stop_reason is StopReason.NONE:
             return StopReason.HANGUP
         return self._block.stop_reason
+
+    @property
+    def held_up_s(self) -> float:
+        return self._block.held_up_lately_s
 
     @property
     def garbled(self) -> int:
@@ -156,6 +165,7 @@ class PortMotion(Motion):
             lag=FeltLag.of(block.lag, self.tick_s, self._process.round_trip_s),
             rights=LoopRights(*block.rights),
             watched=block.watched,
+            held_up_s=block.held_up_s,
         )
 
     def close(self) -> None:
@@ -183,7 +193,7 @@ class PortMotion(Motion):
         if reason is StopReason.NONE and not self._process.alive:
             return self._process.why_dead()
         if reason in (StopReason.HANGUP, StopReason.SILENCE, StopReason.LINE_ERROR):
-            return DeviceError(f"{self._link.name}: {reason.sentence}", reason.name)
+            return DeviceError(f"{self._link.name}: {self._stop_sentence}", reason.name)
         return None
 
     def _go_idle(self) -> None:

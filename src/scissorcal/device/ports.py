@@ -5,6 +5,7 @@ import os
 import time
 from contextlib import suppress
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scissorcal.errors import DeviceError, needs_unix
@@ -59,6 +60,35 @@ def known_ports() -> tuple[str, ...]:
     return tuple(sorted(info.device for info in list_ports.comports()))
 
 
+def adapter_timer_ms(port: str, sys_root: Path = Path("/sys")) -> float | None:
+    """Latency timer (ms) of the USB adapter behind a port, None where there is none."""
+    path = adapter_timer_path(port, sys_root)
+    try:
+        return float(path.read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return None
+
+
+def adapter_timer_path(port: str, sys_root: Path = Path("/sys")) -> Path:
+    """Return the file in which Linux keeps the latency timer of a USB serial adapter."""
+    return sys_root / "bus/usb-serial/devices" / Path(port).resolve().name / "latency_timer"
+
+
+def modem_manager_runs(proc_root: Path = Path("/proc")) -> bool:
+    """Whether ModemManager runs, which opens new serial ports and writes to them."""
+    for path in proc_root.glob("[0-9]*/comm"):
+        with suppress(OSError):  # the process has ended
+            if path.read_text(encoding="utf-8", errors="replace").strip() == "ModemManager":
+                return True
+    return False
+
+
+MODEM_MANAGER = (
+    "ModemManager runs on this computer: it opens a new serial port for up to 30 s and writes to "
+    "it. Wait and try again, or have it ignore the rig with the udev rule of docs/protocol.md."
+)
+
+
 def _why_not_open(port: str, baud: int, error: Exception) -> str:
     number = _errno_of(error)
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
@@ -68,8 +98,11 @@ def _why_not_open(port: str, baud: int, error: Exception) -> str:
     if number in (errno.EACCES, errno.EPERM):
         return (
             f"You may not open {port}: join the group that owns it (on most Linux systems "
-            "'sudo usermod -aG dialout $USER'), log in again, and retry."
+            "'sudo usermod -aG dialout $USER'), log in again, and retry; or add the udev rule of "
+            "docs/protocol.md."
         )
+    if number in BUSY and modem_manager_runs():
+        return f"{port} is in use by another program. {MODEM_MANAGER}"
     if number in BUSY:
         return f"{port} is in use by another program: close that program first."
     if number in (errno.ENOTTY, errno.EINVAL, errno.EISDIR):

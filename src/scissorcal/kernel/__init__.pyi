@@ -31,6 +31,7 @@ from .loop import LoopCounters as LoopCounters
 from .loop import ask_for_slice as ask_for_slice
 from .loop import lock_memory as lock_memory
 from .loop import run_loop as run_loop
+from .messages import EARLIER_SCHEMAS as EARLIER_SCHEMAS
 from .messages import PROTOCOL_VERSION as PROTOCOL_VERSION
 from .messages import SCHEMA_HASH as SCHEMA_HASH
 from .messages import Capability as Capability
@@ -40,8 +41,14 @@ from .messages import Config as Config
 from .messages import ConfigEcho as ConfigEcho
 from .messages import ConfigKey as ConfigKey
 from .messages import ConfigStatus as ConfigStatus
+from .messages import FaultCause as FaultCause
 from .messages import Hello as Hello
 from .messages import Identity as Identity
+from .messages import LoadBegin as LoadBegin
+from .messages import LoadChunk as LoadChunk
+from .messages import LoadCommit as LoadCommit
+from .messages import LoadEcho as LoadEcho
+from .messages import LoadStatus as LoadStatus
 from .messages import Message as Message
 from .messages import State as State
 from .messages import StateFlag as StateFlag
@@ -82,6 +89,7 @@ from .wire import encode_frame as encode_frame
 
 __all__ = [
     "CONTROL_DTYPE",
+    "EARLIER_SCHEMAS",
     "HYBRID_INPUT_DTYPE",
     "HYBRID_OUTPUT_DTYPE",
     "MOST_PIECES",
@@ -108,6 +116,7 @@ __all__ = [
     "CutFitData",
     "CutFitParameters",
     "EnergyLedger",
+    "FaultCause",
     "FrameDecoder",
     "Hello",
     "Histogram",
@@ -117,6 +126,11 @@ __all__ = [
     "Identity",
     "Kernel",
     "LagCounts",
+    "LoadBegin",
+    "LoadChunk",
+    "LoadCommit",
+    "LoadEcho",
+    "LoadStatus",
     "LoopBlock",
     "LoopCounters",
     "Message",

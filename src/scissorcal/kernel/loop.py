@@ -67,6 +67,10 @@ def ask_for_slice(slice_us: int) -> bool:
     return bool(lib.sc_rights_slice(slice_us))
 
 
+LATELY_NS = 3_000_000_000
+"""Of a stop, which the supervisor sees within a second."""
+
+
 @dataclass(frozen=True)
 class LoopCounters:
     """What happened on the line.
@@ -303,6 +307,18 @@ class LoopBlock(ServoView):
     def stop_reason(self) -> StopReason:
         """Why the loop ended or is about to; NONE while it runs."""
         return StopReason(self.pointer.exit_reason or self._servo.stop_reason)
+
+    @property
+    def held_up_s(self) -> float:
+        """Longest time in which this computer did not run the loop; 0 where none passed 10 ms."""
+        return 1e-9 * float(self.pointer.held_up_ns)
+
+    @property
+    def held_up_lately_s(self) -> float:
+        """The same within the last seconds."""
+        pointer = self.pointer
+        ago_ns = time.monotonic_ns() - int(pointer.recent_held_up_until_ns)
+        return 1e-9 * float(pointer.recent_held_up_ns) if ago_ns < LATELY_NS else 0.0
 
     @property
     def line(self) -> LoopCounters:

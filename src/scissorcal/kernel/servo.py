@@ -194,6 +194,11 @@ class ServoView:
         return StopReason(self._servo.stop_reason)
 
     @property
+    def fault_cause(self) -> int:
+        """`FaultCause` of the last fault that the device latched, 0 where it stated none."""
+        return int(self._servo.fault_cause)
+
+    @property
     def track_index(self) -> int:
         """Where TRACK is in its reference; at or beyond its length once the last place is held."""
         return int(self._servo.track_index)

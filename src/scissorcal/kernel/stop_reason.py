@@ -20,6 +20,7 @@ class StopReason(IntEnum):
     DEVICE_CLOCK = 11
     OVERSPEED = 12
     RESTARTED = 13
+    NOT_HOMED = 14
     NO_CONTOUR = 17
     HANDLE_HELD = 18
     PRESSED_AWAY = 19
@@ -92,6 +93,10 @@ _STOP_SENTENCES = {
     StopReason.RESTARTED: (
         "The device restarted: its sequence numbers fell back. Check its power supply and cable, "
         "then start again."
+    ),
+    StopReason.NOT_HOMED: (
+        "The device does not know the zero of its encoders (NOT_HOMED). Run 'scissorcal device "
+        "home --device PORT' with the blades clear, then start again."
     ),
     StopReason.NO_CONTOUR: (
         "No new estimate of the surface came for too long, so the tip was lifted and the motors "

@@ -75,8 +75,8 @@ class FrameDecoder:
 def encode(message: Message) -> bytes:
     """Give the whole frame of a message, delimiter included.
 
-    Raises ValueError for numbers that their field cannot hold and texts that are not ASCII of at
-    most 16 characters.
+    Raises ValueError for numbers that their field cannot hold, texts that are not ASCII of at most
+    16 characters, and bytes that are longer than their field; shorter ones are padded with 0.
 
     >>> from scissorcal.kernel import Command
     >>> encode(Command(flags=1, echo_sequence=7, torque=0.25, force=0.0)).hex(" ")
@@ -84,10 +84,10 @@ def encode(message: Message) -> bytes:
     """
     known, payload = _IN_C[type(message)], ffi.new(_PAYLOAD, LARGEST_PAYLOAD)
     try:
-        values = map(_text_bytes, message) if known.has_text else message
+        values = map(_to_c, message) if known.has_arrays else message
         fields = dict(zip(message._fields, values, strict=True))
         size = known.pack(ffi.new(known.pointer, fields), payload)
-    except (OverflowError, TypeError, UnicodeEncodeError) as error:
+    except (OverflowError, TypeError, IndexError, UnicodeEncodeError) as error:
         kind = type(message).__name__
         raise ValueError(f"{kind} does not fit its frame: {error}.") from error
     return encode_frame(bytes(ffi.buffer(payload, size)))
@@ -107,24 +107,24 @@ def decode(payload: bytes) -> Message:
     if not known.unpack(ffi.from_buffer(payload), len(payload), struct):
         raise ValueError(f"A {known.name.upper()} does not have {len(payload)} bytes.")
     values = known.read(struct)
-    return kind(*(map(_value, values) if known.has_text else values))
+    return kind(*(map(_from_c, values, known.hints) if known.has_arrays else values))
 
 
-def _text_bytes(text: Any) -> Any:
-    """A text as its bytes, a number as it is."""
-    if not isinstance(text, str):
-        return text
-    data = text.encode("ascii")
-    if len(data) > 16:
-        raise OverflowError(f"the text {text!r} is longer than 16 characters")
-    return list(data.ljust(16, b"\0"))
+def _to_c(value: Any) -> Any:
+    """A text or bytes as a list, a number as it is."""
+    if isinstance(value, str):
+        if len(value) > 16:
+            raise OverflowError(f"the text {value!r} is longer than 16 characters")
+        value = value.encode("ascii")
+    return list(value) if isinstance(value, bytes) else value
 
 
-def _value(value: Any) -> Any:
-    """A number as it is; an array of bytes as the text in it."""
+def _from_c(value: Any, hint: type) -> Any:
+    """A number as it is; an array of bytes whole, or as the text in it."""
     if isinstance(value, int | float):
         return value
-    return bytes(value).split(b"\0", 1)[0].decode("ascii", "replace")
+    data = bytes(value)
+    return data if hint is bytes else data.split(b"\0", 1)[0].decode("ascii", "replace")
 
 
 class _InC(NamedTuple):
@@ -135,15 +135,23 @@ class _InC(NamedTuple):
     pack: Callable[..., int]
     unpack: Callable[..., bool]
     read: Callable[[Any], tuple[Any, ...]]
-    has_text: bool
+    hints: tuple[type, ...]
+    has_arrays: bool
 
     @classmethod
     def of(cls, kind: type[Message]) -> "_InC":
         name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", kind.__name__).lower()
         pack, unpack = (getattr(lib, f"sc_{verb}_{name}") for verb in ("pack", "unpack"))
-        has_text = str in get_type_hints(kind).values()
+        hints = tuple(get_type_hints(kind).values())
+        has_arrays = str in hints or bytes in hints
         pointer = ffi.typeof(f"sc_{name} *")
-        return cls(name, pointer, pack, unpack, attrgetter(*kind._fields), has_text)
+        read = attrgetter(*kind._fields) if len(kind._fields) > 1 else _only(kind._fields[0])
+        return cls(name, pointer, pack, unpack, read, hints, has_arrays)
+
+
+def _only(field: str) -> Callable[[Any], tuple[Any, ...]]:
+    """As ``attrgetter`` of several fields, for a message of one."""
+    return lambda struct: (getattr(struct, field),)
 
 
 _PAYLOAD = ffi.typeof("uint8_t[]")

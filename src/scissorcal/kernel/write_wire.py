@@ -21,15 +21,28 @@ KERNEL = "src/scissorcal/kernel"
 C_TYPES = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "u64": "uint64_t", "f32": "float"}
 ENUMS = {
     "state_flags": ("StateFlag", "IntFlag", "What a device says about itself in every STATE."),
+    "fault_causes": ("FaultCause", "IntEnum", "What latched the fault that stands."),
     "command_flags": ("CommandFlag", "IntFlag", "What a host asks for in every COMMAND."),
     "capabilities": ("Capability", "IntFlag", "What a device has."),
     "config_status": ("ConfigStatus", "IntEnum", "How a device answered a CONFIG."),
+    "load_status": ("LoadStatus", "IntEnum", "How a device answered a LOAD message."),
     "config_keys": (
         "ConfigKey",
         "IntEnum",
         "Values that CONFIG sets; those from 0x8000 on exist in the simulator only.",
     ),
 }
+C_ENUMS = {
+    "state_flags": "STATE",
+    "fault_causes": "CAUSE",
+    "command_flags": "COMMAND",
+    "capabilities": "CAPABILITY",
+    "config_status": "CONFIG",
+    "load_status": "LOAD",
+    "config_keys": "KEY",
+}
+TEXT = "char16"
+"""Type of the fields that hold text; another ``char`` type holds bytes."""
 GENERATED = "Generated from data_schemas/wire.json by write_wire.py: do not edit."
 
 
@@ -57,6 +70,12 @@ def _own(message: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
+def _members(entries: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
+    """Names and values of an enum; a key of CONFIG has its value under ``key``."""
+    for name, entry in entries.items():
+        yield name, entry["key"] if isinstance(entry, dict) else entry
+
+
 def _header(wire: Mapping[str, Any]) -> Iterator[str]:
     messages = wire["messages"]
     yield f"/* The messages of the wire. {GENERATED} */\n"
@@ -71,8 +90,8 @@ def _header(wire: Mapping[str, Any]) -> Iterator[str]:
     )
     yield _c_enum({f"SC_TYPE_{name}": message["type"] for name, message in messages.items()})
     yield _c_enum({f"SC_SIZE_{name}": message["size"] for name, message in messages.items()})
-    for prefix, key in (("STATE", "state_flags"), ("COMMAND", "command_flags")):
-        yield _c_enum({f"SC_{prefix}_{flag}": value for flag, value in wire[key].items()})
+    for key, prefix in C_ENUMS.items():
+        yield _c_enum({f"SC_{prefix}_{name}": value for name, value in _members(wire[key])})
     for name, message in messages.items():
         yield f"\n/* {message['meaning']} */\ntypedef struct {{\n"
         for field in _own(message):
@@ -133,11 +152,20 @@ def _module(wire: Mapping[str, Any]) -> Iterator[str]:
     yield f"PROTOCOL_VERSION = {wire['protocol_version']}\n"
     yield f"SCHEMA_HASH = 0x{schema_hash(wire):016X}\n"
     yield '"""First 8 bytes, little-endian, of SHA-256 over the canonical form of wire.json."""\n'
+    yield "EARLIER_SCHEMAS: dict[int, int] = {\n"
+    for version, earlier in wire["earlier_schemas"].items():
+        yield f"    {version}: 0x{earlier},\n"
+    yield '}\n"""Schema hash of each earlier protocol version whose devices are served."""\n'
     for key, (name, kind, meaning) in ENUMS.items():
         yield f'\n\nclass {name}({kind}):\n    """{meaning}"""\n\n'
-        for member, value in wire[key].items():
-            yield f"    {member} = {value['key'] if isinstance(value, dict) else value}\n"
-    defaults = {"protocol_version": "PROTOCOL_VERSION", "schema_hash": "SCHEMA_HASH"}
+        for member, number in _members(wire[key]):
+            yield f"    {member} = {number}\n"
+    defaults = {
+        "protocol_version": "PROTOCOL_VERSION",
+        "schema_hash": "SCHEMA_HASH",
+        "cause": "0",  # of protocol version 1, which has neither
+        "hold_ticks": "0",
+    }
     for name, message in wire["messages"].items():
         yield f"\n\nclass {_class_name(name)}(NamedTuple):\n"
         yield f'    """{_sender(message)}: {_inline(message["meaning"])}\n\n'
@@ -149,10 +177,13 @@ def _module(wire: Mapping[str, Any]) -> Iterator[str]:
             value = f" = {defaults[field['name']]}" if field["name"] in defaults else ""
             if name == "STATE" and field["type"] == "f32":
                 value = " = 0.0"  # what a device does not measure
-            kind = {"f": "float", "c": "str"}.get(field["type"][0], "int")
-            yield f"    {field['name']}: {kind}{value}\n"
+            letter = "text" if field["type"] == TEXT else field["type"][0]
+            hint = {"text": "str", "f": "float", "c": "bytes"}.get(letter, "int")
+            clash = "  # type: ignore[assignment]" if hasattr(tuple, field["name"]) else ""
+            yield f"    {field['name']}: {hint}{value}{clash}\n"
     classes = [_class_name(name) for name in wire["messages"]]
-    yield f"\n\nMessage = {' | '.join(classes)}\n\nTYPES: dict[int, type[Message]] = {{\n"
+    union = "\n    | ".join(classes)
+    yield f"\n\nMessage = (\n    {union}\n)\n\nTYPES: dict[int, type[Message]] = {{\n"
     for name, message in wire["messages"].items():
         yield f"    {message['type']}: {_class_name(name)},\n"
     yield '}\n"""Messages by the first byte of their payload."""\n'

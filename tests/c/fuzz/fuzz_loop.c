@@ -89,7 +89,7 @@ static void send_states(int fd, input *from)
             whole = sc_encode_frame(payload, sc_pack_config_echo(&echo, payload), frame, sizeof frame);
         } else {
             sequence += what % 8 != 5;
-            const sc_state state = {(uint16_t)(what & 8 ? take_word(from) : SC_STATE_MOTOR_ENABLED),
+            const sc_state state = {0, (uint16_t)(what & 8 ? take_word(from) : SC_STATE_MOTOR_ENABLED),
                                     sequence, sequence * 1000u, take_float(from, 0.2f, 0.9f),
                                     take_float(from, -0.03f, 0.03f), take_float(from, -0.2f, 0.2f),
                                     take_float(from, -3.0f, 3.0f)};

@@ -56,7 +56,7 @@ static sc_state taken_state(input *from, uint32_t *clock)
 {
     const uint8_t how = take_byte(from);
     *clock += how & 1 ? 1000u : how & 2 ? take_word(from) % 5000u : 0u;
-    const sc_state state = {(uint16_t)(how & 4 ? take_word(from) : SC_STATE_MOTOR_ENABLED),
+    const sc_state state = {0, (uint16_t)(how & 4 ? take_word(from) : SC_STATE_MOTOR_ENABLED),
                             how & 8 ? take_word(from) : *clock / 1000u,
                             how & 16 ? take_word(from) : *clock,
                             take_float(from, 0.15f, 0.9f),
@@ -100,7 +100,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     const sc_reference reference = {opening, rate, advance, stroke, PATH, has_task ? &task : NULL};
     sc_orders orders = {take_byte(&from) % 5u, 1, 1, 0.03f, 0, 0};
     sc_servo servo;
-    sc_command command = {0, 0, 0.0f, 0.0f};
+    sc_command command = {0, 0, 0, 0.0f, 0.0f};
     uint32_t clock = 0;
     memset(&servo, 0, sizeof servo);
     for (int i = 0; i < 400 && from.size > 0; i++) {

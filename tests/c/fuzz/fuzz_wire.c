@@ -11,12 +11,20 @@ static size_t packed_again(const uint8_t *payload, size_t size, uint8_t *again)
     sc_identity identity;
     sc_config config;
     sc_config_echo echo;
+    sc_load_begin begin;
+    sc_load_chunk chunk;
+    sc_load_commit commit;
+    sc_load_echo loaded;
     if (sc_unpack_state(payload, size, &state)) return sc_pack_state(&state, again);
     if (sc_unpack_command(payload, size, &command)) return sc_pack_command(&command, again);
     if (sc_unpack_hello(payload, size, &hello)) return sc_pack_hello(&hello, again);
     if (sc_unpack_identity(payload, size, &identity)) return sc_pack_identity(&identity, again);
     if (sc_unpack_config(payload, size, &config)) return sc_pack_config(&config, again);
     if (sc_unpack_config_echo(payload, size, &echo)) return sc_pack_config_echo(&echo, again);
+    if (sc_unpack_load_begin(payload, size, &begin)) return sc_pack_load_begin(&begin, again);
+    if (sc_unpack_load_chunk(payload, size, &chunk)) return sc_pack_load_chunk(&chunk, again);
+    if (sc_unpack_load_commit(payload, size, &commit)) return sc_pack_load_commit(&commit, again);
+    if (sc_unpack_load_echo(payload, size, &loaded)) return sc_pack_load_echo(&loaded, again);
     return 0;
 }
 

@@ -7,12 +7,44 @@ import pytest
 
 from scissorcal.calibration.signals.soundness import refuse_unsound
 from scissorcal.errors import InputError
+from scissorcal.kernel import Capability, StateFlag
+from scissorcal.recording import Recording
 from tests.calibration.truth import Truth, friction_recording
 
 
 @pytest.fixture(scope="module")
 def recording():
     return friction_recording(Truth(), np.random.default_rng(1))
+
+
+def stated(recording: Recording, version: int, capabilities: int) -> Recording:
+    """The recording, of a device that states so; the motors run in its strokes."""
+    samples = recording.samples.copy()
+    samples["flags"] |= int(StateFlag.MOTOR_ENABLED)
+    device = {**recording.device, "protocol_version": version, "capabilities": capabilities}
+    return replace(recording, samples=samples, device=device)
+
+
+@pytest.mark.parametrize(
+    ("version", "capabilities", "refused"),
+    [
+        (2, Capability.HANDLE_FORCE_SENSOR, True),
+        (2, Capability.HANDLE_FORCE_SENSOR | Capability.TORQUE_MEASURED, False),
+        (1, Capability.HANDLE_FORCE_SENSOR, False),
+    ],
+)
+def test_a_device_that_does_not_measure_its_torque_gives_nothing_to_fit(
+    version: int, capabilities: int, refused: bool
+) -> None:
+    recording = friction_recording(Truth(), np.random.default_rng(1))
+    device = stated(recording, version, int(capabilities))
+    if refused:
+        with pytest.raises(InputError, match=r"TORQUE_MEASURED.*capture cut --hand"):
+            refuse_unsound((device,))
+        off = device.samples.copy()
+        off["flags"] &= ~int(StateFlag.MOTOR_ENABLED) & 0xFFFFFFFF
+        device = replace(device, samples=off)  # by hand, motors off
+    refuse_unsound((device,))
 
 
 def test_a_sound_recording_passes(recording):

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.signals.segments import by_label
+from scissorcal.calibration.signals.torque_source import refuse_commanded_torque
 from scissorcal.calibration.signals.weak_form import Windows
 from scissorcal.errors import InputError
 from scissorcal.kernel import StateFlag
@@ -30,6 +31,7 @@ def refuse_unsound(recordings: tuple[Recording, ...]) -> None:
 
     A sensor has noise, so two strokes or recordings never agree to the last digit. A copy would
     count as a second observation, and intervals would come out too narrow by the root of two.
+    A torque that a device does not measure is its own command, which says nothing of the load.
     Recordings of joints of two kinds, with handles of two lengths, or of devices with unlike serial
     numbers are not of one rig.
     """
@@ -42,6 +44,7 @@ def refuse_unsound(recordings: tuple[Recording, ...]) -> None:
                 "move: record again, or name another file."
             )
         _refuse_values(recording)
+        refuse_commanded_torque(recording)
     _refuse_two_rigs(recordings)
     _refuse_copied_recordings(recordings)
     _refuse_copies(recordings)

@@ -44,9 +44,10 @@ def clipping(talk: Talk, inertia: Estimate | None, brake_after_ms: float) -> Ver
     """Command more than the limit for one tick, if the blades cannot get faster than the bounds.
 
     The watchdog is set to 1 ms for it, so that a computer that stalls there gives three ticks of
-    torque at most: with these and the least inertia the rate is bounded before it is tried. Then
-    it is set to ``brake_after_ms`` again, whatever happened. A strike that was braked or lost is
-    repeated from rest, each way by turns; if none arrives, nothing is determined.
+    torque at most, and a device of version 2 is told to hold it for one: with these and the least
+    inertia the rate is bounded before it is tried. Then it is set to ``brake_after_ms`` again,
+    whatever happened. A strike that was braked or lost is repeated from rest, each way by turns; if
+    none arrives, nothing is determined.
     """
     limit, bounds = talk.identity.torque_limit, talk.bounds
     if inertia is None or not inertia.mean > SDS * inertia.sd:
@@ -136,7 +137,7 @@ def _struck(talk: Talk, torque: float) -> Stage[int | None]:
         return None
     begin = talk.mark()
     yield Answer()
-    state = yield Answer(torque=torque)
+    state = yield Answer(torque=torque, hold_ticks=1)
     for _ in range(talk.ticks(REST_S)):
         state = yield RELEASE._replace(clear=bool(state.flags & StateFlag.FAULT_LATCHED))
     return begin

@@ -48,7 +48,9 @@ class Idle:
     encoder's step as seen, ``moved_rad`` how far the blades moved, ``jitter_rad`` the standard
     deviation of the opening about its slow motion and ``jitter_correlation`` the largest
     magnitude of its autocorrelation. ``zeros`` and ``noises`` (standard deviations) are of all that
-    is measured but places, by its name. Shares are of the frames that were due.
+    is measured but places, by its name. Shares are of the frames that were due, without those that
+    this computer missed while it did not listen, for ``held_up_s`` at the longest. ``fault_cause``
+    is that of a fault that stays.
     """
 
     fault_stays: bool
@@ -68,6 +70,8 @@ class Idle:
     lost_share: float
     garbled_share: float
     duplicate_share: float
+    fault_cause: int = 0
+    held_up_s: float = 0.0
 
     @property
     def swings(self) -> bool:
@@ -92,8 +96,15 @@ def idle(talk: Talk) -> Idle:
         opening = np.array([math.nan])
     ticks = np.diff(heard["sequence"])
     clock = np.diff(heard["device_us"])
-    due = max(1, int(heard["sequence"][-1] - heard["sequence"][0]) + 1)
-    lost = int(missing_frames(heard["sequence"]).sum())
+    missing = missing_frames(heard["sequence"]).copy()
+    held_up = talk.held_up(begin)
+    own = 0
+    for row, seconds in held_up:  # what the system still kept comes first, then what was lost
+        after = slice(max(row - 1, 0), row + talk.ticks(seconds))
+        own += int(missing[after].sum())
+        missing[after] = 0
+    due = max(1, int(heard["sequence"][-1] - heard["sequence"][0]) + 1 - own)
+    lost = int(missing.sum())
     ratio, error = host_ratio(heard["host_s"], heard["device_us"])
     loads = {name: heard[name][np.isfinite(heard[name])] for name in MEASURED if name not in PLACES}
     slow = _slow(opening)
@@ -115,6 +126,8 @@ def idle(talk: Talk) -> Idle:
         lost_share=lost / due,
         garbled_share=(talk.link.garbled - garbled) / due,
         duplicate_share=(talk.duplicates - duplicates) / due,
+        fault_cause=faults[2],
+        held_up_s=max((seconds for _, seconds in held_up), default=0.0),
     )
 
 
@@ -197,8 +210,8 @@ def observed_step(openings: Array) -> float:
     return float(gaps[near].sum() / counts[near].sum())
 
 
-def _cleared(talk: Talk) -> Stage[tuple[bool, bool]]:
-    """Clear a fault from before; return whether one stays, and whether the encoder has one."""
+def _cleared(talk: Talk) -> Stage[tuple[bool, bool, int]]:
+    """Clear a fault from before; whether one stays, whether the encoder has one, its cause."""
     state = yield RELEASE
     asked = 0
     for _ in range(talk.ticks(SETTLE_S) + CLEARINGS):
@@ -208,7 +221,7 @@ def _cleared(talk: Talk) -> Stage[tuple[bool, bool]]:
             break
         state = yield RELEASE._replace(clear=faulty)
     faulty = bool(state.flags & StateFlag.FAULT_LATCHED)
-    return faulty, bool(state.flags & StateFlag.ENCODER_FAULT)
+    return faulty, bool(state.flags & StateFlag.ENCODER_FAULT), state.cause
 
 
 def _quiet(talk: Talk, seconds: float) -> Stage[None]:

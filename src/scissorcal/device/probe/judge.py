@@ -6,6 +6,7 @@ interval refuses nothing. Every limit has its reason beside it.
 
 import math
 
+from scissorcal.device.faults import fault_sentence
 from scissorcal.device.motion import STOP_MARGIN_RAD
 from scissorcal.device.probe.clipping import Follow
 from scissorcal.device.probe.idle import JITTER_RAD, Idle
@@ -169,6 +170,8 @@ def _no_fault(found: Idle) -> Verdict:
         else "The device has latched a fault that 100 commands with CLEAR_FAULT did not clear: "
         "remove its cause (emergency stop, motor supply, temperature) or restart the device."
     )
+    if found.fault_cause:
+        bad = f"{fault_sentence(found.fault_cause)} 100 commands with CLEAR_FAULT did not clear it."
     return FAULTS.judge(faults, "No fault stands.", bad)
 
 
@@ -221,6 +224,11 @@ def _lost(found: Idle) -> Verdict:
         f"{100 * found.lost_share:.2g} % of the frames were lost, "
         f"{100 * found.garbled_share:.2g} % garbled, {100 * found.duplicate_share:.2g} % repeated."
     )
+    if found.held_up_s:
+        good += (
+            f" This computer did not listen for up to {1e3 * found.held_up_s:.0f} ms; what was "
+            "lost by that is not counted."
+        )
     bad = (
         f"{good} Use a shorter or shielded cable, a lower baud rate or another adapter; "
         "'scissorcal device doctor' measures the port."

@@ -130,6 +130,7 @@ def probe(session: RigSession, *, then: str = "", now: datetime | None = None) -
         ProbeResult(session.name, identity_digest(identity), made, recipe.rig.motor_sign), tell
     )
     with Talk(session.link, bounds_of(recipe, identity), recipe.rig.motor_sign) as talk:
+        talk.refuse_not_homed()
         tell(0.0, "the blades by hand, motors off")
         try:
             finding.by_hand = _by_hand(talk, finding, recipe, confirm, then)

@@ -15,15 +15,29 @@ from typing import NamedTuple, TypeVar, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
+from scissorcal.device.faults import fault_sentence
 from scissorcal.device.link import Link, PortLink
 from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import RELEASE_COMMANDS, SILENCE_S, STOP_MARGIN_RAD
 from scissorcal.errors import DeviceError
-from scissorcal.kernel import Command, CommandFlag, ConfigKey, State, StateFlag, decode, encode
+from scissorcal.kernel import (
+    PROTOCOL_VERSION,
+    Command,
+    CommandFlag,
+    ConfigKey,
+    FaultCause,
+    State,
+    StateFlag,
+    StopReason,
+    decode,
+    encode,
+)
 from scissorcal.kernel.loop import STALL_TICKS
 from scissorcal.kernel.servo import LEAP_RATES, OPENING_RATE_LIMIT, STUCK_FRAMES
 
 LINE = "the line, before a motor runs"
+LISTEN_S = 5e-3
+"""One wait for states, as in sc_loop.c: one that takes twice as long is this computer's delay."""
 SENSORS = "the sensors, before a motor runs"
 MOTORS = "the motors, before they run in earnest"
 """What checks of a probe guard begins so."""
@@ -66,6 +80,8 @@ class Answer(NamedTuple):
     force: float = 0.0
     enable: bool = True
     clear: bool = False
+    hold_ticks: int = 0
+    """Ticks that the effort acts, zero after them; a device of version 1 holds it (0 does)."""
 
 
 RELEASE = Answer(enable=False)
@@ -120,7 +136,10 @@ class Talk(AbstractContextManager["Talk"]):
         self._rows: list[tuple[float, ...]] = []
         self._origin: tuple[float, float] | None = None
         self._frame: bytes | None = None
+        self._listened_at: float | None = None
         self._restarted = False
+        self._held_up: list[tuple[int, float]] = []
+        """Each time this computer did not listen: rows before it, and how long (s)."""
         link.configure(ConfigKey.STREAM, 1.0)
 
     @property
@@ -197,6 +216,14 @@ class Talk(AbstractContextManager["Talk"]):
         self.link.configure(ConfigKey.STREAM, 0.0)
         yield
         self.link.configure(ConfigKey.STREAM, 1.0)
+        self._listened_at = None
+
+    def refuse_not_homed(self) -> None:
+        """Raise DeviceError where the device does not know the zero of its encoders."""
+        if self._next_state().flags & StateFlag.NOT_HOMED:
+            raise DeviceError(
+                f"{self.name}: {StopReason.NOT_HOMED.sentence}", StopReason.NOT_HOMED.name
+            )
 
     def release(self) -> None:
         """Switch the motors off, three times, in case a command is lost.
@@ -238,18 +265,37 @@ class Talk(AbstractContextManager["Talk"]):
             fresh = [state for state in states if self._note(state)]
             if fresh:
                 return fresh[-1]
-            silent_s += max(self._now() - began, 0.0 if states else 1e-6)
-        raise DeviceError(
-            f"{self.name} stopped sending STATE frames; check its power and the cable, then start "
-            "again."
+            passed_s = self._now() - began
+            if self._virtual is None:
+                passed_s = min(passed_s, 2.0 * LISTEN_S)  # beyond it this computer did not listen
+            silent_s += max(passed_s, 0.0 if states else 1e-6)
+        held_s = sum(seconds for row, seconds in self._held_up if row == len(self._rows))
+        first = (
+            f"This computer did not listen for {1e3 * held_s:.0f} ms, and then "
+            if held_s > 0.0
+            else ""
         )
+        raise DeviceError(
+            f"{first}{self.name} stopped sending STATE frames; check its power and the cable, then "
+            "start again."
+        )
+
+    def held_up(self, since: int = 0) -> list[tuple[int, float]]:
+        """Times in which this computer did not listen: rows `heard` before, and how long (s)."""
+        return [(row - since, seconds) for row, seconds in self._held_up if row > since]
 
     def _pass(self) -> list[State]:
         """Send what waits to be sent; return what arrives."""
         link, frame = self.link, self._frame
         self._frame = None
         if isinstance(link, PortLink):
-            if not select.select([link], [], [], SILENCE_S)[0]:
+            began = time.monotonic()
+            ready = select.select([link], [], [], LISTEN_S)[0]
+            waited_s = time.monotonic() - min(began, self._listened_at or began)
+            self._listened_at = time.monotonic()
+            if waited_s > 2.0 * LISTEN_S:
+                self._held_up.append((len(self._rows), waited_s))
+            if not ready:
                 return []
             return [found for found in link.receive(0.0) if isinstance(found, State)]
         assert self._virtual is not None
@@ -288,7 +334,8 @@ class Talk(AbstractContextManager["Talk"]):
             CommandFlag.CLEAR_FAULT if answer.clear else 0
         )
         self._rows[-1] = (*self._rows[-1][:-3], torque, force, int(flags))
-        command = Command(int(flags), state.sequence, self._sign * torque, force)
+        hold = answer.hold_ticks if self.identity.protocol_version >= PROTOCOL_VERSION else 0
+        command = Command(int(flags), state.sequence, self._sign * torque, force, hold)
         if isinstance(self.link, PortLink):
             self.link.send(command)
         else:
@@ -340,8 +387,12 @@ class Talk(AbstractContextManager["Talk"]):
         numbers = (state.opening, state.advance, state.motor_torque)
         if not all(math.isfinite(number) for number in numbers):
             return "it sent an opening, advance or torque that is no number; check its sensors."
+        if state.flags & StateFlag.NOT_HOMED:
+            return f"it no longer knows its zero. {StopReason.NOT_HOMED.sentence}"
         if state.flags & StateFlag.ENCODER_FAULT:
             return "it reports a fault of its encoder; check the encoder and its cable."
+        if state.cause not in (FaultCause.NONE, FaultCause.WATCHDOG):
+            return fault_sentence(state.cause)
         low, high = self.identity.opening_min, self.identity.opening_max
         if not low - STOP_MARGIN_RAD <= state.opening <= high + STOP_MARGIN_RAD:
             return (

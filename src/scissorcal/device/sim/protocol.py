@@ -16,6 +16,11 @@ Its behaviour, beyond the messages themselves:
 * MATERIAL = 1 puts in a fresh sheet with its near edge at advance + contact = 0. It is refused
   (VALUE_REFUSED) while the blades block it: open them or retract first. MATERIAL = 2 puts in the
   specimen's plate to touch, and is refused where it has none or the tip blocks it.
+* Without a zero of its encoder (NOT_HOMED) it follows no command. HOME = 1 makes it look for one
+  at the closing stop (HOMING); HOME = 0, a fault, and UNHEARD_S of silence end that.
+* With ``hold_ticks`` = n a COMMAND acts for n ticks; torque and force are zero after them.
+* A LOAD message is refused: this device renders nothing by itself.
+* A device of protocol version 1 has none of these, and no cause of its faults.
 * HAND_SPEED > 0 makes the virtual hand do HAND_STROKES strokes and then release; 0 releases now.
 * A stuck encoder is detected after ENCODER_CHECK_MS: ENCODER_FAULT, and the fault latches.
   Until then its reading is constant.
@@ -26,9 +31,13 @@ from collections import deque
 
 import numpy as np
 
+from scissorcal.device.sim.homing import Homing
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
-from scissorcal.device.sim.sensors import MEASURED_FLAGS, Faults, FaultyLine
+from scissorcal.device.sim.sensors import Faults, FaultyLine
 from scissorcal.kernel import (
+    EARLIER_SCHEMAS,
+    PROTOCOL_VERSION,
+    SCHEMA_HASH,
     Capability,
     Command,
     CommandFlag,
@@ -36,9 +45,15 @@ from scissorcal.kernel import (
     ConfigEcho,
     ConfigKey,
     ConfigStatus,
+    FaultCause,
     FrameDecoder,
     Hello,
     Identity,
+    LoadBegin,
+    LoadChunk,
+    LoadCommit,
+    LoadEcho,
+    LoadStatus,
     Message,
     State,
     StateFlag,
@@ -66,6 +81,8 @@ _OPENING_AT_STOP = int(StateFlag.OPENING_AT_STOP)
 _TORQUE_SATURATED = int(StateFlag.TORQUE_SATURATED)
 _FORCE_SATURATED = int(StateFlag.HANDLE_FORCE_SATURATED)
 _ENCODER_FAULT = int(StateFlag.ENCODER_FAULT)
+_NOT_HOMED = int(StateFlag.NOT_HOMED)
+_HOMING = int(StateFlag.HOMING)
 
 
 class RigProtocol:
@@ -88,13 +105,15 @@ class RigProtocol:
         self._delay_ticks = round(self.faults.delay_ms * 1e-3 / TICK_S)
         self._ticks = 0
         self._streamed_since: int | None = None
-        self._values = {int(key): 0.0 for key in ConfigKey}
+        self._version = self.faults.protocol_version
+        self._homing = Homing(rig, homed=not self.faults.not_homed)
+        self._values = {int(key): 0.0 for key in self._known_keys()}
         self._values[int(ConfigKey.BRAKE_AFTER_MS)] = DEFAULT_BRAKE_AFTER_MS
         self._values[int(ConfigKey.HAND_STROKES)] = float(rig.hand.strokes)
         self._command = Command(0, 0, 0.0, 0.0)
         self._silent_ticks = 0
         self._unheard_ticks = 0
-        self._fault = False
+        self._cause: FaultCause | None = None
         self._lost = False
         self._stuck_at: float | None = None
         self._clock_rate = 1.0 + rig.specimen.sensors.clock_drift_ppm * 1e-6
@@ -121,32 +140,48 @@ class RigProtocol:
         self._watch_commands()
         self._watch_faults()
         self._watch_host()
+        homing = self._homing
+        if not homing.homed:
+            self._command = self._command._replace(flags=self._command.flags & ~_ENABLE)
         command = self._command
-        enabled = bool(command.flags & _ENABLE) and not self._fault
-        measured = self.rig.tick(command.torque, command.force, enabled, self._fault)
+        fault = self._cause is not None
+        enabled = bool(command.flags & _ENABLE) and not fault
+        hold = command.hold_ticks if self._version >= PROTOCOL_VERSION else 0
+        holds = hold == 0 or self._silent_ticks <= hold
+        torque, force = (command.torque, command.force) if holds else (0.0, 0.0)
+        if homing.active:
+            torque, force = homing.torque(), 0.0
+        measured = self.rig.tick(torque, force, enabled or homing.active, fault)
         self._ticks += 1
         if not self._values[ConfigKey.STREAM]:
             return
-        flags = (_MOTOR_ENABLED if enabled else 0) | (_FAULT_LATCHED if self._fault else 0)
+        flags = (_MOTOR_ENABLED if enabled else 0) | (_FAULT_LATCHED if fault else 0)
         flags |= (_COMMANDS_LOST if self._lost else 0) | (
-            _OPENING_AT_STOP if measured.at_stop else 0
+            _OPENING_AT_STOP if measured.at_stop and homing.homed else 0
         )
         flags |= (_TORQUE_SATURATED if measured.torque_saturated else 0) | (
             _FORCE_SATURATED if measured.force_saturated else 0
         )
         flags |= _ENCODER_FAULT if self._encoder_noticed() else 0
-        opening = measured.opening
+        if self._version >= PROTOCOL_VERSION:
+            flags |= (0 if homing.homed else _NOT_HOMED) | (_HOMING if homing.active else 0)
+        opening = homing.opening(measured.opening)
         if self._stuck_at is not None:
             opening = self._stuck_at
         elif self._stuck():
             self._stuck_at = opening
+        limit = self.rig.specimen.motor.torque_limit_Nm
+        given = min(max(torque, -limit), limit) if enabled or homing.active else 0.0
         self._send(
             State(
                 flags,
                 self._ticks & U32,
                 int(self._ticks * TICK_US * self._clock_rate) & U32,
                 opening,
-                *measured[1:-MEASURED_FLAGS],
+                measured.advance,
+                given if self.faults.unmeasured_torque else measured.motor_torque,
+                measured.handle_force,
+                cause=int(self._cause or 0) if self._version >= PROTOCOL_VERSION else 0,
             )
         )
 
@@ -163,13 +198,22 @@ class RigProtocol:
             if math.isfinite(message.torque) and math.isfinite(message.force):
                 self._silent_ticks = 0
                 self._lost = False
-                if message.flags & _CLEAR_FAULT and not self._encoder_noticed():
-                    self._fault = False
+                if message.flags & _CLEAR_FAULT and self._present_cause() is None:
+                    self._cause = None
                 self._command = message
         elif isinstance(message, Hello):
             self._send(self._identity(message.nonce))
         elif isinstance(message, Config):
             self._send(self._configured(message))
+        elif isinstance(message, LoadBegin | LoadChunk | LoadCommit) and self._version > 1:
+            begins = isinstance(message, LoadBegin)
+            status = LoadStatus.OTHER_FORMAT if begins else LoadStatus.NOT_ANNOUNCED
+            self._send(LoadEcho(status, message.nonce, received=0, capacity=0, crc32=0))
+
+    def _known_keys(self) -> list[ConfigKey]:
+        """A key of what this device does not do is unknown to it."""
+        missing = [ConfigKey.RENDER] if self._version > 1 else [ConfigKey.RENDER, ConfigKey.HOME]
+        return [key for key in ConfigKey if key not in missing]
 
     def _configured(self, config: Config) -> ConfigEcho:
         """Set a value if it is acceptable, and state the value in force."""
@@ -187,12 +231,17 @@ class RigProtocol:
         if accepted:
             self._values[key] = value
             self._apply(key, value)
+        if key == ConfigKey.HOME:
+            self._values[key] = float(self._homing.active)
         status = ConfigStatus.OK if accepted else ConfigStatus.VALUE_REFUSED
         return ConfigEcho(status, key, config.nonce, self._values[key])
 
     def _accepts(self, key: int, value: float) -> bool:
         if key == ConfigKey.STREAM:
             return value in (0.0, 1.0)
+        if key == ConfigKey.HOME:
+            follows = bool(self._command.flags & _ENABLE)
+            return value == 0.0 or (value == 1.0 and self._cause is None and not follows)
         if key == ConfigKey.MATERIAL:
             return value in (0.0, 1.0, PLATE)
         if key == ConfigKey.BRAKE_AFTER_MS:
@@ -205,6 +254,10 @@ class RigProtocol:
         rig = self.rig
         if key == ConfigKey.STREAM and value and self._streamed_since is None:
             self._streamed_since = self._ticks
+        elif key == ConfigKey.HOME and not value:
+            self._homing.stop()
+        elif key == ConfigKey.HOME and not self._homing.active:
+            self._homing.start()
         elif key == ConfigKey.HAND_SPEED_rad_per_s:
             rig.hand.start(value, rig.opening, rig.advance)
         elif key == ConfigKey.HAND_STROKES:
@@ -216,16 +269,30 @@ class RigProtocol:
             return
         if (self._silent_ticks - 1) * TICK_US * 1e-3 >= self._values[ConfigKey.BRAKE_AFTER_MS]:
             self._lost = True
-            self._fault = True
+            self._latch(FaultCause.WATCHDOG)
 
     def _watch_host(self) -> None:
         self._unheard_ticks += 1
         if self._unheard_ticks * TICK_S >= UNHEARD_S:
             self._values[int(ConfigKey.STREAM)] = 0.0
+            self._homing.stop()
+
+    def _latch(self, cause: FaultCause) -> None:
+        """The first cause stands until the fault is cleared."""
+        self._cause = self._cause or cause
+        self._homing.stop()
+
+    def _present_cause(self) -> FaultCause | None:
+        """What would latch a fault now, apart from missing commands."""
+        if self._encoder_noticed():
+            return FaultCause.ENCODER
+        at = self.faults.cause_s
+        return self.faults.cause if at is not None and self._streamed_s() >= at else None
 
     def _watch_faults(self) -> None:
-        if self._encoder_noticed():
-            self._fault = True
+        cause = self._present_cause()
+        if cause is not None:
+            self._latch(cause)
         if self.faults.unplug_s is not None and self._streamed_s() >= self.faults.unplug_s:
             self.unplugged = True
 
@@ -252,13 +319,21 @@ class RigProtocol:
         specimen = self.rig.specimen
         mechanism, motor, sensors = specimen.mechanism, specimen.motor, specimen.sensors
         low, high = mechanism.opening_range_deg
+        capabilities = (
+            Capability.HANDLE_FORCE_SENSOR | Capability.ADVANCE_MOTOR | Capability.SIMULATOR
+        )
+        if self._version >= PROTOCOL_VERSION:
+            capabilities |= Capability.HOMES
+            if not self.faults.unmeasured_torque:
+                capabilities |= Capability.TORQUE_MEASURED
+        schemas = {**EARLIER_SCHEMAS, PROTOCOL_VERSION: SCHEMA_HASH}
         return Identity(
             nonce_echo=nonce,
             name=DEVICE_NAME,
             serial=specimen.name[:16],
-            capabilities=int(
-                Capability.HANDLE_FORCE_SENSOR | Capability.ADVANCE_MOTOR | Capability.SIMULATOR
-            ),
+            protocol_version=self._version,
+            schema_hash=schemas[self._version],
+            capabilities=int(capabilities),
             firmware_version=FIRMWARE_VERSION,
             tick_us=TICK_US,
             torque_limit=motor.torque_limit_Nm,

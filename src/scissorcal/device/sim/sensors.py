@@ -3,15 +3,15 @@
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from scissorcal.device.sim.specimen import Sensors
 from scissorcal.errors import InputError
+from scissorcal.kernel import PROTOCOL_VERSION, FaultCause
 
 BLOCK = 4096
-MEASURED_FLAGS = 3
 
 
 class Measured(NamedTuple):
@@ -117,10 +117,21 @@ _KINDS = {
     "delay": "delay_ms",
     "unplug": "unplug_s",
     "stuck-encoder": "stuck_encoder_s",
+    "protocol": "protocol_version",
+    "not-homed": "not_homed",
+    "unmeasured-torque": "unmeasured_torque",
 }
+_CAUSES = {
+    cause.name.lower().replace("_", "-"): cause
+    for cause in FaultCause
+    if cause not in (FaultCause.NONE, FaultCause.WATCHDOG, FaultCause.ENCODER)
+}
+_HIGHEST = {"drop": 1, "garble": 1, "protocol": PROTOCOL_VERSION}
+_HIGHEST |= dict.fromkeys(("not-homed", "unmeasured-torque"), 1)
 _MEANINGS = (
     "drop=P and garble=P (a share from 0 to 1 of all frames), delay=MS (milliseconds), "
-    "unplug=S and stuck-encoder=S (seconds after streaming begins)"
+    f"unplug=S, stuck-encoder=S, {'=S, '.join(_CAUSES)}=S (seconds after streaming begins), "
+    "protocol=1, not-homed=1 and unmeasured-torque=1"
 )
 
 
@@ -130,7 +141,10 @@ class Faults:
 
     ``drop_share`` and ``garble_share`` (0 to 1) are probabilities per frame, either way on the
     line. ``delay_ms`` holds back every frame to the host, as an adapter with a long latency timer
-    does. ``unplug_s`` and ``stuck_encoder_s`` count from the first STREAM.
+    does. ``unplug_s``, ``stuck_encoder_s`` and ``cause_s`` count from the first STREAM; at
+    ``cause_s`` the device latches a fault of ``cause``, which lasts. ``protocol_version`` is that
+    of the device, ``not_homed`` one whose encoder has no zero at power-on, ``unmeasured_torque``
+    one that states its command as ``motor_torque``.
     """
 
     drop_share: float = 0.0
@@ -138,32 +152,50 @@ class Faults:
     delay_ms: float = 0.0
     unplug_s: float | None = None
     stuck_encoder_s: float | None = None
+    cause: FaultCause = FaultCause.NONE
+    cause_s: float | None = None
+    protocol_version: int = PROTOCOL_VERSION
+    not_homed: bool = False
+    unmeasured_torque: bool = False
 
 
 def parse_faults(options: Iterable[str]) -> Faults:
     """Read faults from words such as ``drop=0.01``; InputError where one is not valid.
 
-    >>> parse_faults(["drop=0.01", "unplug=2.5"])
-    Faults(drop_share=0.01, garble_share=0.0, delay_ms=0.0, unplug_s=2.5, stuck_encoder_s=None)
+    >>> faults = parse_faults(["drop=0.01", "heat=2.5"])
+    >>> faults.drop_share, faults.cause.name, faults.cause_s
+    (0.01, 'HEAT', 2.5)
     """
-    values: dict[str, float] = {}
+    values: dict[str, Any] = {}
     for option in options:
         kind, equals, number = option.partition("=")
-        if kind not in _KINDS or not equals:
+        name = "cause_s" if kind in _CAUSES else _KINDS.get(kind)
+        if name is None or not equals:
             raise InputError(f"The fault {option!r} is not known. Give {_MEANINGS}.")
-        if _KINDS[kind] in values:
+        if name in values:
             raise InputError(f"The fault {kind} is given twice: give it once.")
         try:
             value = float(number)
         except ValueError:
             value = math.nan
-        highest = 1.0 if kind in ("drop", "garble") else 1e6
+        highest = _HIGHEST.get(kind, 1e6)
         if not 0.0 <= value <= highest:
             raise InputError(
                 f"The fault {option!r} needs a number from 0 to {highest:g} after the equals sign: "
                 f"give {_MEANINGS}."
             )
-        values[_KINDS[kind]] = value
+        values[name] = value
+        if kind in _CAUSES:
+            values["cause"] = _CAUSES[kind]
+    if values.get("protocol_version", 1) not in (1, PROTOCOL_VERSION):
+        raise InputError("The protocol of a virtual rig is 1 or 2: give protocol=1 or protocol=2.")
+    for name, kind_of in (
+        ("protocol_version", int),
+        ("not_homed", bool),
+        ("unmeasured_torque", bool),
+    ):
+        if name in values:
+            values[name] = kind_of(values[name])
     return Faults(**values)
 
 

@@ -70,6 +70,9 @@ typedef struct {
     uint64_t answers;      /* commands written */
     uint64_t unsent;       /* commands that the line did not accept in time */
     uint64_t stalls;       /* longer than SC_TICKS_OF_A_STALL between two STATE by the host's clock */
+    int64_t held_up_ns;    /* longest time in which this computer did not run the loop ... */
+    int64_t recent_held_up_ns; /* ... and the longest lately, ... */
+    int64_t recent_held_up_until_ns; /* ... which ended then, by CLOCK_MONOTONIC */
     int64_t started_ns;
     sc_orders orders;
     sc_mailbox mailbox;

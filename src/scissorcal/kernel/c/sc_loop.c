@@ -23,6 +23,7 @@ uint32_t sc_loop_run(int fd, sc_block *block)
 enum {
     POLL_MS = 5,
     LONGEST_LISTENED_NS = 10000000,
+    LATELY_S = 2,
     WRITE_PATIENCE_MS = 20,
     READ_BYTES = 4096,
     FAREWELLS = 3,
@@ -292,6 +293,20 @@ static void read_line(loop *self, short events)
     }
 }
 
+/* Note a time in which this computer did not run the loop. */
+static void note_held_up(sc_block *block, int64_t held_up_ns, int64_t now_ns)
+{
+    const int64_t lately_ns = (int64_t)LATELY_S * 1000000000;
+    if (held_up_ns > block->held_up_ns) {
+        block->held_up_ns = held_up_ns;
+    }
+    if (held_up_ns > block->recent_held_up_ns ||
+        now_ns - block->recent_held_up_until_ns > lately_ns) {
+        block->recent_held_up_ns = held_up_ns;
+        block->recent_held_up_until_ns = now_ns;
+    }
+}
+
 /* Let time pass. That in which this computer stalled counts neither as silence of the device nor of
  * the supervisor. */
 static void pass_time(loop *self)
@@ -308,6 +323,7 @@ static void pass_time(loop *self)
     self->passed_ns = passed_ns > listened_ns ? now_ns : self->passed_ns + whole_us * 1000;
     if (passed_ns > listened_ns) { /* the device's clock went on meanwhile, and is compared */
         sc_watch_pass(&block->servo.watch, (uint32_t)((passed_ns - listened_ns) / 1000));
+        note_held_up(block, passed_ns, now_ns);
     }
     self->silent_ns += whole_us * 1000;
     sc_block_read_orders(block, &orders);

@@ -6,13 +6,13 @@
 
 uint64_t sc_schema_hash(void)
 {
-    return UINT64_C(0xB09FB42A7F073F64);
+    return UINT64_C(0xAE72CC7C5BFA0A33);
 }
 
 size_t sc_pack_state(const sc_state *message, uint8_t *payload)
 {
     put_u8(payload + 0, SC_TYPE_STATE);
-    put_u8(payload + 1, 0);
+    put_u8(payload + 1, message->cause);
     put_u16(payload + 2, message->flags);
     put_u32(payload + 4, message->sequence);
     put_u32(payload + 8, message->device_us);
@@ -28,6 +28,7 @@ int sc_unpack_state(const uint8_t *payload, size_t size, sc_state *message)
     if (size != SC_SIZE_STATE || payload[0] != SC_TYPE_STATE) {
         return 0;
     }
+    message->cause = get_u8(payload + 1);
     message->flags = get_u16(payload + 2);
     message->sequence = get_u32(payload + 4);
     message->device_us = get_u32(payload + 8);
@@ -41,7 +42,7 @@ int sc_unpack_state(const uint8_t *payload, size_t size, sc_state *message)
 size_t sc_pack_command(const sc_command *message, uint8_t *payload)
 {
     put_u8(payload + 0, SC_TYPE_COMMAND);
-    put_u8(payload + 1, 0);
+    put_u8(payload + 1, message->hold_ticks);
     put_u16(payload + 2, message->flags);
     put_u32(payload + 4, message->echo_sequence);
     put_f32(payload + 8, message->torque);
@@ -54,6 +55,7 @@ int sc_unpack_command(const uint8_t *payload, size_t size, sc_command *message)
     if (size != SC_SIZE_COMMAND || payload[0] != SC_TYPE_COMMAND) {
         return 0;
     }
+    message->hold_ticks = get_u8(payload + 1);
     message->flags = get_u16(payload + 2);
     message->echo_sequence = get_u32(payload + 4);
     message->torque = get_f32(payload + 8);
@@ -168,5 +170,94 @@ int sc_unpack_config_echo(const uint8_t *payload, size_t size, sc_config_echo *m
     message->key = get_u16(payload + 2);
     message->nonce = get_u32(payload + 4);
     message->value = get_f32(payload + 8);
+    return 1;
+}
+
+size_t sc_pack_load_begin(const sc_load_begin *message, uint8_t *payload)
+{
+    put_u8(payload + 0, SC_TYPE_LOAD_BEGIN);
+    put_u8(payload + 1, 0);
+    put_u16(payload + 2, message->image_format);
+    put_u32(payload + 4, message->nonce);
+    put_u32(payload + 8, message->size);
+    put_u32(payload + 12, message->crc32);
+    return SC_SIZE_LOAD_BEGIN;
+}
+
+int sc_unpack_load_begin(const uint8_t *payload, size_t size, sc_load_begin *message)
+{
+    if (size != SC_SIZE_LOAD_BEGIN || payload[0] != SC_TYPE_LOAD_BEGIN) {
+        return 0;
+    }
+    message->image_format = get_u16(payload + 2);
+    message->nonce = get_u32(payload + 4);
+    message->size = get_u32(payload + 8);
+    message->crc32 = get_u32(payload + 12);
+    return 1;
+}
+
+size_t sc_pack_load_chunk(const sc_load_chunk *message, uint8_t *payload)
+{
+    put_u8(payload + 0, SC_TYPE_LOAD_CHUNK);
+    put_u8(payload + 1, message->count);
+    put_u16(payload + 2, 0);
+    put_u32(payload + 4, message->nonce);
+    put_u32(payload + 8, message->offset);
+    memcpy(payload + 12, message->bytes, sizeof message->bytes);
+    return SC_SIZE_LOAD_CHUNK;
+}
+
+int sc_unpack_load_chunk(const uint8_t *payload, size_t size, sc_load_chunk *message)
+{
+    if (size != SC_SIZE_LOAD_CHUNK || payload[0] != SC_TYPE_LOAD_CHUNK) {
+        return 0;
+    }
+    message->count = get_u8(payload + 1);
+    message->nonce = get_u32(payload + 4);
+    message->offset = get_u32(payload + 8);
+    memcpy(message->bytes, payload + 12, sizeof message->bytes);
+    return 1;
+}
+
+size_t sc_pack_load_commit(const sc_load_commit *message, uint8_t *payload)
+{
+    put_u8(payload + 0, SC_TYPE_LOAD_COMMIT);
+    put_u8(payload + 1, 0);
+    put_u16(payload + 2, 0);
+    put_u32(payload + 4, message->nonce);
+    return SC_SIZE_LOAD_COMMIT;
+}
+
+int sc_unpack_load_commit(const uint8_t *payload, size_t size, sc_load_commit *message)
+{
+    if (size != SC_SIZE_LOAD_COMMIT || payload[0] != SC_TYPE_LOAD_COMMIT) {
+        return 0;
+    }
+    message->nonce = get_u32(payload + 4);
+    return 1;
+}
+
+size_t sc_pack_load_echo(const sc_load_echo *message, uint8_t *payload)
+{
+    put_u8(payload + 0, SC_TYPE_LOAD_ECHO);
+    put_u8(payload + 1, message->status);
+    put_u16(payload + 2, 0);
+    put_u32(payload + 4, message->nonce);
+    put_u32(payload + 8, message->received);
+    put_u32(payload + 12, message->capacity);
+    put_u32(payload + 16, message->crc32);
+    return SC_SIZE_LOAD_ECHO;
+}
+
+int sc_unpack_load_echo(const uint8_t *payload, size_t size, sc_load_echo *message)
+{
+    if (size != SC_SIZE_LOAD_ECHO || payload[0] != SC_TYPE_LOAD_ECHO) {
+        return 0;
+    }
+    message->status = get_u8(payload + 1);
+    message->nonce = get_u32(payload + 4);
+    message->received = get_u32(payload + 8);
+    message->capacity = get_u32(payload + 12);
+    message->crc32 = get_u32(payload + 16);
     return 1;
 }

@@ -62,12 +62,17 @@ static int handle_fault(const sc_servo_config *config, sc_servo *servo, const sc
         sc_servo_stop(servo, SC_STOP_ENCODER_FAULT);
         return 1;
     }
+    if (state->flags & SC_STATE_NOT_HOMED) {
+        sc_servo_stop(servo, SC_STOP_NOT_HOMED);
+        return 1;
+    }
     if (!(state->flags & SC_STATE_FAULT_LATCHED)) {
         servo->fault_seen = 0;
         return 0;
     }
     if (!servo->fault_seen) {
         servo->fault_seen = 1;
+        servo->fault_cause = state->cause;
         servo->clearings_sent = 0;
         servo->faults += servo->enabled_once;
         servo->opening_integral = 0.0f;
@@ -222,6 +227,7 @@ static void begin_sample(sc_servo *servo, const sc_state *state)
 
 static void write_command(sc_servo *servo, uint16_t flags, sc_command *command)
 {
+    command->hold_ticks = 0;
     command->flags = flags;
     command->echo_sequence = servo->sequence;
     command->torque = servo->torque;

@@ -55,6 +55,7 @@ enum {
     SC_STOP_DEVICE_CLOCK = 11,
     SC_STOP_OVERSPEED = 12,
     SC_STOP_RESTARTED = 13,
+    SC_STOP_NOT_HOMED = 14,
     SC_STOP_CONTROL = 16, /* and above: by what ended CONTROL, SC_CONTROL_... */
     SC_STOP_WATCHED = 32 /* and above: by what a watch saw, SC_WATCH_... */
 };
@@ -178,6 +179,7 @@ typedef struct {
     float sent_force;
     uint32_t track_index;
     uint32_t fault_seen;
+    uint32_t fault_cause; /* of the last fault, SC_CAUSE_...; 0 of a device of version 1 */
     uint32_t clearings_sent; /* since the fault that stands was first seen */
     uint32_t enabled_once;
     uint32_t command_flags;
