@@ -13,7 +13,7 @@ PLAIN := $(VENV)/.plain
 STAMP := $(VENV)/.installed
 INSTALLED := $(if $(wildcard $(STAMP)),$(STAMP),$(PLAIN))
 PAGE := src/scissorcal/prototype/page
-KERNEL := setup.py src/scissorcal/kernel/build_kernel.py $(wildcard src/scissorcal/kernel/c/*.[ch])
+KERNEL := setup.py $(wildcard src/scissorcal/kernel/build_*.py src/scissorcal/kernel/c/*.[ch] firmware/core/*.[ch])
 READY := $(STAMP) $(if $(filter 1,$(SCISSORCAL_WITHOUT_PAGE)),,page)
 NODE := cd $(PAGE) && PATH="$(CURDIR)/$(RUN):$$PATH"
 PYTEST_ARGS ?=

@@ -76,6 +76,9 @@ class BuiltArchive(sdist):
 
 setup(
     cmdclass={"build_py": BuildWithData, "build_ext": BuildOnAllCores, "sdist": BuiltArchive},
-    cffi_modules=["src/scissorcal/kernel/build_kernel.py:builder"],
+    cffi_modules=[
+        "src/scissorcal/kernel/build_kernel.py:builder",
+        "src/scissorcal/kernel/build_firmware.py:builder",
+    ],
     options={"bdist_wheel": {"py_limited_api": "cp311"}},  # the C core uses the stable ABI
 )

@@ -12,7 +12,7 @@ import pytest
 
 import scissorcal
 
-SKIPPED = ("scissorcal.cli", "scissorcal.kernel._kernel")
+SKIPPED = ("scissorcal.cli", "scissorcal.kernel._kernel", "scissorcal.kernel._firmware")
 MODULES = [
     "scissorcal",
     *(

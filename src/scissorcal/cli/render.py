@@ -50,6 +50,11 @@ _OPTIONS = {
         help="Render a package of another rig (radius, joint, limits, serial number) or a "
         "stale one; what differs is said and recorded.",
     ),
+    "on_device": typer.Option(
+        "--on-device",
+        help="Load the package into the device, which then renders by itself: what is felt lags by "
+        "one tick, whatever this computer does, and this computer watches and records.",
+    ),
     "trusted_key": TRUSTED_KEY,
     "no_record": NO_RECORD,
 }

@@ -45,3 +45,5 @@ from .sim.truth import true_parameters as true_parameters
 from .trajectory import Plan as Plan
 from .trajectory import advance_plan as advance_plan
 from .trajectory import friction_plan as friction_plan
+from .upload import in_force as in_force
+from .upload import load_image as load_image

@@ -29,6 +29,10 @@ from scissorcal.kernel import (
     FrameDecoder,
     Hello,
     Identity,
+    LoadBegin,
+    LoadChunk,
+    LoadCommit,
+    LoadEcho,
     Message,
     State,
     decode,
@@ -58,6 +62,9 @@ SCHEMAS = {**EARLIER_SCHEMAS, PROTOCOL_VERSION: SCHEMA_HASH}
 """Schema hash of each protocol version that is served."""
 
 
+LoadMessage = LoadBegin | LoadChunk | LoadCommit
+
+
 class Link(Protocol):
     """What every link to a rig has; see PortLink for a port, LockstepLink for virtual time."""
 
@@ -68,6 +75,8 @@ class Link(Protocol):
     def garbled(self) -> int: ...
 
     def configure(self, key: int, value: float) -> float: ...
+
+    def load(self, message: LoadMessage) -> LoadEcho: ...
 
     def close(self) -> None: ...
 
@@ -165,6 +174,22 @@ class PortLink(AbstractContextManager["PortLink"]):
             f"{self.name} did not confirm {_key_name(key)} = {value:g} in {CONFIGURE_ATTEMPTS} "
             f"attempts ({self.received.garbled} frames were garbled): check the cable and the "
             "baud rate."
+        )
+
+    def load(self, message: LoadMessage) -> LoadEcho:
+        """Send a message of an upload, with a nonce of this link, and return the device's answer.
+
+        Lost frames are sent again. Raises DeviceError where the device does not answer.
+        """
+        for _ in range(CONFIGURE_ATTEMPTS):
+            nonce = self._nonce()
+            self.send(message._replace(nonce=nonce))
+            for reply in self.receive(CONFIGURE_WAIT_S):
+                if isinstance(reply, LoadEcho) and reply.nonce == nonce:
+                    return reply
+        raise DeviceError(
+            f"{self.name} did not confirm a part of the package in {CONFIGURE_ATTEMPTS} attempts "
+            f"({self.received.garbled} frames were garbled): check the cable and the baud rate."
         )
 
     def round_trip(self, timeout: float = 0.2) -> float:

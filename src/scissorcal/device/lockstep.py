@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from scissorcal.device.link import check_echo, check_identity
+from scissorcal.device.link import LoadMessage, check_echo, check_identity
 from scissorcal.device.sim.protocol import RigProtocol
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
 from scissorcal.device.sim.sensors import Faults
@@ -22,6 +22,7 @@ from scissorcal.kernel import (
     FrameDecoder,
     Hello,
     Identity,
+    LoadEcho,
     Message,
     State,
     decode,
@@ -144,6 +145,20 @@ class LockstepLink:
             )
         check_echo(self.name, answer, int(key), float(value))
         return float(answer.value)
+
+    def load(self, message: LoadMessage) -> LoadEcho:
+        """Send a message of an upload and return the answer, as a PortLink does."""
+        self._check_open()
+        answer = self._ask(
+            lambda nonce: message._replace(nonce=nonce),
+            lambda reply, nonce: isinstance(reply, LoadEcho) and reply.nonce == nonce,
+        )
+        if not isinstance(answer, LoadEcho):
+            raise DeviceError(
+                f"{self.name} did not confirm a part of the package in {ATTEMPTS} attempts: its "
+                "faults drop too many frames. Set fewer faults."
+            )
+        return answer
 
     def close(self) -> None:
         """Release the rig; may be called twice."""

@@ -160,6 +160,12 @@ class Motion(AbstractContextManager["Motion"], ABC):
         yield from self._for_ticks(round(seconds / self.tick_s))
         yield from self.idle(BLOCK_S)
 
+    def watch(self, seconds: float) -> Iterator[Samples]:
+        """Watch a device that renders by itself for ``seconds``, motors on; then motors off."""
+        self.engage(Mode.WATCH)
+        yield from self._for_ticks(round(seconds / self.tick_s))
+        yield from self.idle(BLOCK_S)
+
     def control(self) -> Iterator[Samples]:
         """Follow the path that :meth:`set_path` set until the caller ends it; then motors off.
 

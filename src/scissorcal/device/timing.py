@@ -91,12 +91,20 @@ class FeltLag:
     those whose command arrived just before it felt up to ``transport_ms`` less.
 
     Ticks with the motors on count where there are any, else those with the motors off.
+    ``by_device``: the device renders by itself, and the lag is that of its order of a tick.
     """
 
     ticks: Percentiles
     held_share: float
     transport_ms: float
     ms: Percentiles
+    by_device: bool = False
+
+    @classmethod
+    def of_device(cls, tick_s: float) -> "FeltLag":
+        """Of a device that answers each tick's measurement within it, and holds that for a tick."""
+        ticks, ms = Percentiles(*[1.0] * 4), Percentiles(*[1e3 * tick_s] * 4)
+        return cls(ticks=ticks, held_share=0.0, transport_ms=0.0, ms=ms, by_device=True)
 
     @classmethod
     def of(cls, lag: LagCounts, tick_s: float, transport_s: float) -> "FeltLag":
@@ -124,6 +132,11 @@ class FeltLag:
     def sentence(self) -> str:
         """The figures in a line for a person."""
         ticks, ms = self.ticks, self.ms
+        if self.by_device:
+            return (
+                f"1 tick of felt lag ({ms.worst:.3g} ms): the device renders by itself, whatever "
+                "this computer does."
+            )
         if math.isnan(ticks.p50):
             return "Felt lag: not measured, no command was sent."
         text = (

@@ -15,6 +15,15 @@ from .cut_fit import CutFitParameters as CutFitParameters
 from .cut_fit import cut_log_likelihood as cut_log_likelihood
 from .cut_fit import cut_log_likelihoods as cut_log_likelihoods
 from .cut_fit import walk_crack as walk_crack
+from .firmware import RECORD_BYTES as RECORD_BYTES
+from .firmware import Drive as Drive
+from .firmware import FirmwareBoard as FirmwareBoard
+from .firmware import FirmwareCore as FirmwareCore
+from .firmware import FirmwareInputs as FirmwareInputs
+from .firmware import FirmwareOutputs as FirmwareOutputs
+from .firmware import FirmwarePhase as FirmwarePhase
+from .firmware import HomeResult as HomeResult
+from .firmware import InputFlag as InputFlag
 from .hybrid import HYBRID_INPUT_DTYPE as HYBRID_INPUT_DTYPE
 from .hybrid import HYBRID_OUTPUT_DTYPE as HYBRID_OUTPUT_DTYPE
 from .hybrid import Hybrid as Hybrid
@@ -22,6 +31,8 @@ from .hybrid import HybridConfig as HybridConfig
 from .hybrid import HybridFlag as HybridFlag
 from .hybrid import NormalLaw as NormalLaw
 from .hybrid import hybrid_inputs as hybrid_inputs
+from .image import IMAGE_FORMAT as IMAGE_FORMAT
+from .image import model_image as model_image
 from .joint import estimated_rates as estimated_rates
 from .joint import presliding_path as presliding_path
 from .layout import fill_struct as fill_struct
@@ -92,9 +103,11 @@ __all__ = [
     "EARLIER_SCHEMAS",
     "HYBRID_INPUT_DTYPE",
     "HYBRID_OUTPUT_DTYPE",
+    "IMAGE_FORMAT",
     "MOST_PIECES",
     "MOST_STRIPS",
     "PROTOCOL_VERSION",
+    "RECORD_BYTES",
     "SAMPLE_DTYPE",
     "SCHEMA_HASH",
     "STEP_DTYPE",
@@ -115,15 +128,23 @@ __all__ = [
     "Curve",
     "CutFitData",
     "CutFitParameters",
+    "Drive",
     "EnergyLedger",
     "FaultCause",
+    "FirmwareBoard",
+    "FirmwareCore",
+    "FirmwareInputs",
+    "FirmwareOutputs",
+    "FirmwarePhase",
     "FrameDecoder",
     "Hello",
     "Histogram",
+    "HomeResult",
     "Hybrid",
     "HybridConfig",
     "HybridFlag",
     "Identity",
+    "InputFlag",
     "Kernel",
     "LagCounts",
     "LoadBegin",
@@ -170,6 +191,7 @@ __all__ = [
     "hybrid_inputs",
     "largest_overlap",
     "lock_memory",
+    "model_image",
     "presliding_path",
     "run_loop",
     "walk_crack",

@@ -22,6 +22,7 @@ HEADERS = (
     "sc_control.h",
     "sc_control_block.h",
     "sc_motion.h",
+    "sc_near_rest.h",
     "sc_passivity.h",
     "sc_plate.h",
     "sc_pieces.h",

@@ -15,13 +15,15 @@ from scissorcal.kernel.layout import dtype_of, fill_struct
 
 class Mode(IntEnum):
     """IDLE: motors off. TRACK: follow the reference. RENDER: the model. DAMP: damping only.
-    CONTROL: press on a surface and follow a path along it."""
+    CONTROL: press on a surface and follow a path along it. WATCH: motors on, without torque, while
+    the device renders by itself."""
 
     IDLE = 0
     TRACK = 1
     RENDER = 2
     DAMP = 3
     CONTROL = 4
+    WATCH = 5
 
 
 def refuse_mode(mode: Mode, has_model: bool, reference_size: int, path_size: int) -> None:

@@ -12,6 +12,7 @@ from .exact import ExactModel as ExactModel
 from .exact import FitDraws as FitDraws
 from .exact import central_model as central_model
 from .exact import pick_draws as pick_draws
+from .image import image_of as image_of
 from .keys import holds as holds
 from .keys import read_public_keys as read_public_keys
 from .keys import signer as signer
@@ -52,6 +53,7 @@ __all__ = [
     "Review",
     "build_package",
     "check_package",
+    "image_of",
     "manifest_schema_text",
     "open_package",
     "put_review",

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from scissorcal.device.motion import BLOCK_S, STOP_MARGIN_RAD, LoopTask, Motion
+from scissorcal.device.motion import BLOCK_S, IDLE, STOP_MARGIN_RAD, LoopTask, Motion
 from scissorcal.device.port_motion import open_motion
 from scissorcal.device.session import Confirm, RigSession, is_simulator, refuse_nobody, rig_facts
+from scissorcal.device.timing import FeltLag
 from scissorcal.device.watching import let_go_damping, watches_of
 from scissorcal.errors import InputError
 from scissorcal.kernel import ConfigKey, Identity, PlateConfig, ServoConfig
@@ -15,6 +16,7 @@ from scissorcal.package import ModelPackage
 from scissorcal.recipe.schema import Limits
 from scissorcal.recording import Joint, RecordingFacts, RecordingWriter
 from scissorcal.recording.probe import UNKNOWN_REST, RestFacts
+from scissorcal.render import on_device
 from scissorcal.render.admission import (
     Admission,
     admit_package,
@@ -67,13 +69,15 @@ class Rendering:
     """How a package is rendered: for how long, what a simulator's hand does, what a person accepts.
 
     ``accept_derated``: what is felt may differ from the package's by more than the scene's
-    tolerance. ``allow_mismatch``: the package may be of another rig (`mismatch`).
+    tolerance. ``allow_mismatch``: the package may be of another rig (`mismatch`). ``on_device``:
+    the device renders by itself, and this computer watches.
     """
 
     seconds: float = 30.0
     strokes: VirtualStrokes = VirtualStrokes()
     accept_derated: bool = False
     allow_mismatch: bool = False
+    on_device: bool = False
 
 
 def render(
@@ -110,6 +114,9 @@ def render(
     scene's tolerance, the verdict *felt torque* fails, unless a person wants it so
     (``how.accept_derated``), which result and recording then state.
 
+    With ``how.on_device`` the device is given the admitted package and its limits, renders by
+    itself from its own measurements, and this computer records and watches what the device states.
+
     Raises InputError, before anything moves, where package and device do not match, where the rig
     cannot render the package stably, or nobody can be asked; MissingError where an estimated plate
     has no pose; DeviceError where the rig fails, and what was recorded is kept.
@@ -129,25 +136,41 @@ def render(
             writer.note(sentence)
         if start.admission.is_felt:
             writer.note(felt_verdict(start.admission, accepted=start.accepted).why)
-    watch = Watch(_travel(package), writer, operator.progress, how.seconds)
+    by_device = how.on_device
+    limit = start.limits.torque_Nm if by_device else None
+    watch = Watch(_travel(package), writer, operator.progress, how.seconds, limit)
     task = LoopTask(tables, package.pieces or None)
+    if by_device:
+        loaded = on_device.load(session, package, config, tables)
+        config, task = on_device.watching(config), IDLE
+        if writer:
+            writer.note(loaded.sentence)
     every_s = EVERY_S if follower else BLOCK_S
     with open_motion(session.link, config, task, every_s) as motion:
         watch.wanted = _prepare(motion, how.strokes, operator.confirm)
         motion.fresh_sheet(0.0)
+        if by_device:
+            motion.configure(ConfigKey.RENDER, 1.0)
         with follower or nullcontext():
             if follower:
                 follower.follow(motion, motion.step())
-            for samples in motion.render(how.seconds):
+            rendered = motion.watch(how.seconds) if by_device else motion.render(how.seconds)
+            for samples in rendered:
                 if follower:
                     follower.follow(motion, samples)
                 if watch.take(samples):
                     break
         for samples in motion.idle(LOOK_EVERY_S):
             watch.record(samples)
+        if by_device:
+            motion.configure(ConfigKey.RENDER, 0.0)
         if session.simulated:
             motion.configure(ConfigKey.HAND_SPEED_rad_per_s, 0.0)
     result = _result(motion, watch, package, start, follower)
+    if by_device:
+        lag = FeltLag.of_device(motion.tick_s)
+        verdicts = on_device.watched_verdicts(result.verdicts)
+        result = replace(result, lag=lag, verdicts=verdicts)
     if writer:
         _note(writer, result, result.warnings[len(start.warnings) :])
     return result

@@ -50,7 +50,7 @@ class FeltTorque:
         """Relative rms difference of the felt torque where ``other`` is rendered instead.
 
         With a ``friction_width`` (rad) friction builds up over it after the blades turn round, as
-        in the loop (`sc_port_friction`). A bin counts where either opens the blades; zero where
+        in the loop (`sc_near_rest`). A bin counts where either opens the blades; zero where
         none does.
         """
         one, two = self._whole, self._binned(other, friction_width)

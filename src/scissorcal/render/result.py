@@ -6,8 +6,9 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from scissorcal.aliases import Array
 from scissorcal.device.motion import MotionReport, Samples, loop_verdicts
 from scissorcal.device.session import ShowProgress
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles, TimeHistogram
@@ -237,6 +238,9 @@ OPENED_SHARE = 0.5
 class Watch:
     """Records what is rendered, and decides when it is finished.
 
+    ``device_limit`` (N m) is the limit of a device that renders by itself: what it states of its
+    torque counts then, not the commands of this computer.
+
     The work for a block depends on the block alone, and memory grows by one number a stroke: an
     hour of rendering costs at its end what it costs at its beginning. ``travel`` (rad) is the
     least that counts as a stroke; ``wanted`` strokes end the rendering, None leaves that to the
@@ -244,7 +248,12 @@ class Watch:
     """
 
     def __init__(
-        self, travel: float, writer: RecordingWriter | None, tell: ShowProgress, seconds: float
+        self,
+        travel: float,
+        writer: RecordingWriter | None,
+        tell: ShowProgress,
+        seconds: float,
+        device_limit: float | None = None,
     ) -> None:
         self.wanted: int | None = None
         self.frames = 0
@@ -255,6 +264,7 @@ class Watch:
         self._travel = travel
         self._writer = writer
         self._tell = tell
+        self._device_limit = device_limit
         self._seconds = seconds
         self._began = self._looked_at = -np.inf
         self._lowest, self._highest = np.inf, -np.inf
@@ -283,11 +293,9 @@ class Watch:
         if len(samples) == 0:
             return False
         self.frames += len(samples)
-        met = int(SampleFlag.TORQUE_LIMITED | SampleFlag.FORCE_LIMITED)
-        self.limited += int(np.count_nonzero(samples["flags"] & met))
-        self.largest_torque = max(
-            self.largest_torque, float(np.max(np.abs(samples["torque_command"])))
-        )
+        torque, limited = self._torque(samples)
+        self.limited += int(np.count_nonzero(limited))
+        self.largest_torque = max(self.largest_torque, float(np.max(np.abs(torque))))
         sent = samples["latency_ns"]
         self._latency.add(sent[sent > 0])
         now = float(samples["device_time_us"][-1]) * 1e-6
@@ -300,6 +308,14 @@ class Watch:
             return False
         self._looked_at = now
         return self._look(now)
+
+    def _torque(self, samples: Samples) -> tuple[Array, NDArray[np.bool_]]:
+        """The torque (n,) that is rendered, and where it or the force met a limit."""
+        if self._device_limit is None:
+            met = int(SampleFlag.TORQUE_LIMITED | SampleFlag.FORCE_LIMITED)
+            return samples["torque_command"], (samples["flags"] & met) != 0
+        torque = samples["motor_torque"]
+        return torque, np.abs(torque) >= np.float32(self._device_limit)
 
     def record(self, samples: Samples) -> None:
         """Record a block of any mode."""

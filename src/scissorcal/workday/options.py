@@ -53,7 +53,8 @@ class RenderOptions:
     have signed package and review. On a simulator a virtual hand makes ``strokes`` at
     ``rate_rad_per_s``. ``camera`` (a number, or "sim" with the device "sim") follows an estimated
     plate, which a person taps for ``taps_s`` before. ``accept_derated`` and ``allow_mismatch`` are
-    those of `scissorcal.render.Rendering`. With ``no_record`` no recording is kept.
+    those of `scissorcal.render.Rendering`, as is ``on_device``. With ``no_record`` no recording is
+    kept.
     """
 
     package_path: Path | None = None
@@ -64,6 +65,7 @@ class RenderOptions:
     taps_s: float = 0.0
     accept_derated: bool = False
     allow_mismatch: bool = False
+    on_device: bool = False
     trusted_key: Path | None = None
     no_record: bool = False
 

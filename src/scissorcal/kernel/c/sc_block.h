@@ -13,7 +13,7 @@
 
 enum {
     SC_BLOCK_MAGIC = 0x4B4C4253,
-    SC_BLOCK_VERSION = 8, /* of this layout; both sides must agree */
+    SC_BLOCK_VERSION = 9, /* of this layout; both sides must agree */
     SC_RING_SAMPLES = 32768,
     SC_TICKS_OF_A_STALL = 5,
     SC_HISTOGRAM_BINS = 192,

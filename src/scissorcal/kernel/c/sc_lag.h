@@ -10,7 +10,7 @@
 #include <stdint.h>
 
 enum {
-    SC_LAG_MODES = 5, /* SC_MODE_... in force at the tick */
+    SC_LAG_MODES = 6, /* SC_MODE_... in force at the tick */
     SC_LAG_TICKS = 64 /* entry i counts lags of i + 1 ticks, the last all longer ones, too */
 };
 

@@ -48,29 +48,6 @@ static float within(float value, float limit)
     return fminf(fmaxf(value, -limit), limit);
 }
 
-void sc_port_friction(const sc_passivity_config *config, const sc_model *model, sc_port *port,
-                      float opening, float rate, sc_step_output *step)
-{
-    const float width = config->friction_width;
-    if (!model->render_friction || !(width > 0.0f) || (step->flags & SC_STEP_INVALID)) {
-        return;
-    }
-    if (!port->has_anchor) {
-        port->anchor = opening;
-        port->has_anchor = 1;
-    }
-    float stretch = opening - port->anchor;
-    if (fabsf(stretch) > width) {
-        stretch = within(stretch, width);
-        port->anchor = opening - stretch;
-    }
-    const float speed = fmaxf(fabsf(rate), model->friction_rate_eps);
-    const float level = sc_model_friction(model, opening, stretch > 0.0f ? speed : -speed);
-    const float torque = -fabsf(level) * stretch / width;
-    step->torque += torque - step->friction_torque;
-    step->friction_torque = torque;
-}
-
 static double mean_work(float before, float now, double way)
 {
     return 0.5 * ((double)before + (double)now) * way;
@@ -156,5 +133,5 @@ void sc_port_rest(sc_port *port, sc_ledger *ledger)
     ledger->engaged_J -= ledger->stored_J;
     ledger->stored_J = 0.0;
     port->started = 0;
-    port->has_anchor = 0;
+    port->anchor.is_set = 0;
 }

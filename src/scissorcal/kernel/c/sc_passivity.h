@@ -22,6 +22,7 @@
 
 #include "sc_model.h"
 #include "sc_motion.h"
+#include "sc_near_rest.h"
 
 typedef struct {
     uint32_t is_measured;  /* the states' motor_torque is what the motor exerts */
@@ -64,8 +65,7 @@ typedef struct {
     float hand_force;     /* positive closes, then */
     uint32_t had_hand;
     double observed_J;
-    uint32_t has_anchor;
-    float anchor; /* opening from which friction near rest is counted */
+    sc_anchor anchor;
 } sc_port;
 
 /* What passed since the last frame, and what the model answers now. */
@@ -88,12 +88,6 @@ double sc_port_delivered(const sc_passivity_config *config, sc_port *port, doubl
 /* Work of the hand since the last frame, by its measured force, trapezoidal; 0 without. What hand and
  * motor give the rig takes: a motor that pushes otherwise than it says makes that negative. */
 double sc_port_hand(const sc_passivity_config *config, sc_port *port, double turned, float force);
-
-/* Friction of the model, without regard to the rate at which the blades rest: it builds up over
- * friction_width of opening after a reversal (Hayward and Armstrong 2000, doi:10.1007/BFb0119420),
- * so that an encoder's count moves it by a small part. Replaces step's friction in step->torque. */
-void sc_port_friction(const sc_passivity_config *config, const sc_model *model, sc_port *port,
-                      float opening, float rate, sc_step_output *step);
 
 /* Book a rendered frame and return the torque that the controller adds. */
 float sc_port_render(const sc_passivity_config *config, sc_port *port, sc_ledger *ledger,

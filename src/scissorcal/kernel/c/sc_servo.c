@@ -140,8 +140,8 @@ static effort render(const sc_servo_config *config, const sc_model *model, sc_se
     if (!sc_servo_step_model(config, model, servo, &share)) {
         return wanted;
     }
-    sc_port_friction(&config->passivity, model, &servo->port, motion->opening,
-                     motion->opening_rate, &servo->step);
+    sc_near_rest(model, config->passivity.friction_width, &servo->port.anchor, motion->opening,
+                 motion->opening_rate, &servo->step);
     servo->sample.flags |= servo->step.flags << SC_SAMPLE_STEP_SHIFT;
     const sc_port_tick tick = {since->turned, since->moved,         since->delivered,
                                since->dt,     motion->opening_rate, share,

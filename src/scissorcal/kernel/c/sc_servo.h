@@ -5,6 +5,9 @@
  * RENDER  torque and force come from the model, ramped up from 0 when it engages
  * DAMP    torque = -damping * rate, no force
  * CONTROL the tip presses on a surface and follows a path along it: sc_control.h
+ * WATCH   motors on without torque or force: the device renders by itself. The watches take the
+ *         torque that it states for the command; what would end gently ends at once, and a missing
+ *         heartbeat ends without damping before
  *
  * All commands pass the same limits: at most torque_limit and force_limit, and from one command
  * that is sent to the next no faster than the slews; only to zero at once, on a state that is not
@@ -36,7 +39,8 @@ enum {
     SC_MODE_TRACK = 1,
     SC_MODE_RENDER = 2,
     SC_MODE_DAMP = 3,
-    SC_MODE_CONTROL = 4
+    SC_MODE_CONTROL = 4,
+    SC_MODE_WATCH = 5
 };
 
 /* Why the servo stopped; once it has, it stays stopped. */

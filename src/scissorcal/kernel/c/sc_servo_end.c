@@ -17,7 +17,9 @@ void sc_servo_stop(sc_servo *servo, uint32_t reason)
 
 static void begin(sc_servo *servo, uint32_t reason, uint32_t fall_us)
 {
-    if (servo->stop_reason == SC_STOP_NONE && servo->ending == SC_STOP_NONE) {
+    if (servo->mode == SC_MODE_WATCH) { /* a torque of the host's would add to the device's */
+        sc_servo_stop(servo, reason);
+    } else if (servo->stop_reason == SC_STOP_NONE && servo->ending == SC_STOP_NONE) {
         servo->ending = reason;
         servo->ending_us = 0;
         servo->fall_us = fall_us;

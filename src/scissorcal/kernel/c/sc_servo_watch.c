@@ -36,7 +36,7 @@ void sc_servo_obey(const sc_orders *orders, sc_servo *servo)
     if (orders->order != servo->order) {
         servo->order = orders->order;
         servo->fallback = 0;
-        sc_servo_engage(servo, orders->mode <= SC_MODE_CONTROL ? orders->mode : SC_MODE_IDLE);
+        sc_servo_engage(servo, orders->mode <= SC_MODE_WATCH ? orders->mode : SC_MODE_IDLE);
     }
     if (orders->sheet != servo->sheet) {
         servo->sheet = orders->sheet;
@@ -69,7 +69,8 @@ static void watch_supervisor(const sc_servo_config *config, const sc_orders *ord
     const uint32_t silent_ms = servo->silent_us / 1000u;
     if (silent_ms / SILENCE_UNTIL_STOP >= config->supervisor_ms) {
         sc_servo_stop(servo, SC_STOP_SUPERVISOR_LOST);
-    } else if (silent_ms >= config->supervisor_ms && !servo->fallback) {
+    } else if (silent_ms >= config->supervisor_ms && !servo->fallback &&
+               servo->mode != SC_MODE_WATCH) {
         servo->fallback = 1;
         servo->fallback_from = servo->mode;
         if (servo->mode != SC_MODE_IDLE) {
@@ -179,6 +180,7 @@ static sc_watch_input watched(const sc_servo_config *config, const sc_servo *ser
     const sc_motion *motion = &servo->motion;
     const uint32_t not_driven = SC_STATE_FAULT_LATCHED | SC_STATE_ENCODER_FAULT;
     const int enabled = (state->flags & SC_STATE_MOTOR_ENABLED) != 0;
+    const int by_itself = servo->mode == SC_MODE_WATCH;
     const sc_watch_input input = {
         time_s,
         usable,
@@ -187,7 +189,7 @@ static sc_watch_input watched(const sc_servo_config *config, const sc_servo *ser
         !enabled && !(state->flags & not_driven),
         servo->mode == SC_MODE_TRACK,
         (state->flags & SC_STATE_OPENING_AT_STOP) != 0,
-        servo->sent_torque,
+        by_itself ? state->motor_torque : servo->sent_torque,
         servo->sent_force,
         config->torque_limit,
         state->motor_torque,
@@ -199,7 +201,7 @@ static sc_watch_input watched(const sc_servo_config *config, const sc_servo *ser
         servo->aim_opening,
         servo->aim_rate,
         servo->aim_advance,
-        (float)servo->lag.late,
+        by_itself ? 1.0f : (float)servo->lag.late,
         servo->stamps.ticks * config->tick_us,
         servo->stamps.stated_us};
     return input;

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from scissorcal.device.session import Operator, RigSession
+from scissorcal.device.upload import refuse_without_rendering
 from scissorcal.errors import InputError, MissingError, ScissorcalError, VerdictError
 from scissorcal.files import replacing
 from scissorcal.package import ModelPackage, open_package
@@ -85,6 +86,8 @@ class _RenderTask(RigTask["RenderResult"]):
     stale: str
 
     def check(self, session: RigSession) -> None:
+        if self.options.on_device:
+            refuse_without_rendering(session.identity)
         if not self.options.allow_mismatch:
             refuse_other_rig(self.package, session.identity)
 
@@ -106,6 +109,7 @@ class _RenderTask(RigTask["RenderResult"]):
             VirtualStrokes(options.strokes, options.rate_rad_per_s),
             options.accept_derated,
             options.allow_mismatch,
+            options.on_device,
         )
         facts = with_probe(_known_rig(self.workspace, self.package), session.probe)
         return render(session, self.package, how, writer=writer, rig=facts, plate=source)

@@ -1,0 +1,104 @@
+/* What latches a fault. */
+#include "fw_parts.h"
+
+enum {
+    RATE_TICKS = 4,    /* the rate is smoothed over these; fw_board.c refuses too coarse encoders */
+    ENCODER_TICKS = 16 /* plausible readings in a row after which an encoder is believed again */
+};
+
+static int leaps(float from, float to, float farthest)
+{
+    return !(fw_magnitude(to - from) <= farthest);
+}
+
+static int encoders_wrong(const fw_core *core, const fw_inputs *inputs)
+{
+    if ((inputs->flags & FW_IN_ENCODER_BAD) != 0 || !fw_finite(inputs->opening)) {
+        return 1;
+    }
+    if (fw_has_carriage(core) && !fw_finite(inputs->advance)) {
+        return 1;
+    }
+    if (!core->measured) {
+        return 0;
+    }
+    return leaps(core->last_opening, inputs->opening, core->board.opening_leap) ||
+           (fw_has_carriage(core) &&
+            leaps(core->last_advance, inputs->advance, core->board.advance_leap));
+}
+
+static float current(const fw_core *core, const fw_inputs *inputs)
+{
+    return fw_has(core, SC_CAPABILITY_TORQUE_MEASURED) ? inputs->current
+                                                       : core->torque / core->board.torque_per_A;
+}
+
+static void warm(fw_core *core, float amperes)
+{
+    const fw_board *board = &core->board;
+    const float bears = board->current_continuous * board->current_continuous;
+    const float most = 2.0f * board->i2t_limit; /* so that it cools in bounded time */
+    core->heat += (amperes * amperes - bears) * core->tick_s;
+    if (!(core->heat < most)) {
+        core->heat = most;
+    } else if (core->heat < 0.0f) {
+        core->heat = 0.0f;
+    }
+}
+
+void fw_measure(fw_core *core, const fw_inputs *inputs)
+{
+    const float amperes = current(core, inputs);
+    if (fw_finite(amperes)) {
+        warm(core, amperes);
+    }
+    if (encoders_wrong(core, inputs)) {
+        core->encoder_doubt = ENCODER_TICKS;
+        core->rate = 0.0f;
+        if (fw_has(core, SC_CAPABILITY_HOMES)) {
+            core->homed = 0; /* counts may be lost */
+        }
+    } else if (core->measured) {
+        const float rate = (inputs->opening - core->last_opening) / core->tick_s;
+        core->rate += (rate - core->rate) / (float)RATE_TICKS;
+        if (core->encoder_doubt > 0) {
+            core->encoder_doubt--;
+        }
+    }
+    if (fw_finite(inputs->opening) && (fw_finite(inputs->advance) || !fw_has_carriage(core))) {
+        core->last_opening = inputs->opening;
+        core->last_advance = inputs->advance;
+        core->measured = 1;
+    }
+}
+
+uint8_t fw_present_cause(const fw_core *core, const fw_inputs *inputs)
+{
+    const fw_board *board = &core->board;
+    if ((inputs->flags & FW_IN_STOP_BUTTON) != 0) {
+        return SC_CAUSE_STOP_BUTTON;
+    }
+    if (board->supply_max > 0.0f &&
+        !(inputs->supply >= board->supply_min && inputs->supply <= board->supply_max)) {
+        return SC_CAUSE_SUPPLY;
+    }
+    if ((inputs->flags & FW_IN_DRIVER_FAULT) != 0) {
+        return SC_CAUSE_DRIVER;
+    }
+    if (core->encoder_doubt > 0) {
+        return SC_CAUSE_ENCODER;
+    }
+    if (!(fw_magnitude(current(core, inputs)) <= board->current_limit)) {
+        return SC_CAUSE_CURRENT;
+    }
+    if (core->phase >= FW_ENABLED || core->phase == FW_HOMING) {
+        if (!(fw_magnitude(core->rate) <= board->overspeed)) { /* a hand may be fast, motors off */
+            return SC_CAUSE_SPEED;
+        }
+    }
+    if (!(core->heat <= board->i2t_limit) ||
+        (board->temperature_max > 0.0f && !(inputs->temperature <= board->temperature_max))) {
+        return SC_CAUSE_HEAT;
+    }
+    return core->lost ? SC_CAUSE_WATCHDOG : SC_CAUSE_NONE;
+}
