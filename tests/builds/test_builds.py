@@ -1,14 +1,19 @@
 """The pages of docs/build: their figures, their cost, and that the probe accepts each build."""
 
+import dataclasses
+import math
 import re
 from pathlib import Path
 
 import pytest
 from benchmarks.drawings import build_wiring
 
+from scissorcal.kernel import Capability
+from scissorcal.kernel.firmware import FirmwareBoard, FirmwareCore
+
 from .faults import FIRST, faults_of
 from .page import FAULT_SEED, PAGES, block_of, blocks, compared, probed_values
-from .parts import BUILDS, COURSE, GIMBAL, LAB, Build
+from .parts import BEST, BUILDS, COURSE, GIMBAL, LAB, Build
 from .rig import probe_of
 
 FIRMWARE = PAGES.parents[1] / "firmware" / "boards"
@@ -64,6 +69,38 @@ def test_the_course_costs_no_more_than_it_may() -> None:
 
 
 @pytest.mark.parametrize(
+    ("build", "board"), [(COURSE, "stm32f405"), (LAB, "b_g431b_esc1"), (BEST, "teensy41")]
+)
+def test_the_table_of_a_page_is_a_possible_board(build: Build, board: str) -> None:
+    """Its fields in place of the example's; the torque limit is within the peak current's."""
+    head = (FIRMWARE / f"{board}_table.h").read_text(encoding="utf-8")
+    fields = dict(re.findall(r"\.(\w+) = ([-\d.e]+)f?,", head))
+    text = page_of(build).read_text(encoding="utf-8").partition("| field | value |")[2]
+    for names, values in re.findall(r"^\| (`.*?`) \| ([^|]*) \|", text, re.MULTILINE):
+        found = re.findall(r"`(\w+)`", names)
+        stated = values.split(", ") if len(values.split(", ")) == len(found) else [values] * 2
+        fields |= {
+            name: value for name, value in zip(found, stated, strict=False) if name in fields
+        }
+    numbers = {name: float(value) for name, value in fields.items()}
+    whole = ("tick_us", "home_at_stop", "firmware_version")
+    known = {f.name for f in dataclasses.fields(FirmwareBoard)} - {"name", "serial"}
+    given = {name: int(v) if name in whole else v for name, v in numbers.items() if name in known}
+    homes = int(Capability.HOMES | Capability.TORQUE_MEASURED)
+    FirmwareCore(FirmwareBoard("page", "1", **{"capabilities": homes, **given}))
+    assert given["torque_limit"] <= build.torque_limit
+    assert given["torque_limit"] > 0.98 * build.torque_limit
+    assert given["opening_resolution"] == pytest.approx(
+        2.0 * math.pi / build.blades_counts, rel=1e-6
+    )
+    assert given["tick_us"] == build.tick_us
+    assert given["torque_per_A"] == pytest.approx(build.blades_torque_per_ampere, rel=1e-3)
+    ticks_s = 4e-6 * build.tick_us
+    assert given["home_torque"] / given["home_speed"] < 0.8 * build.inertia / ticks_s
+    assert build.peak_A < given["current_limit"] <= build.sensor_range_A
+
+
+@pytest.mark.parametrize(
     ("drawn", "board"),
     [
         (build_wiring.COURSE, "stm32f405.c"),
@@ -72,8 +109,6 @@ def test_the_course_costs_no_more_than_it_may() -> None:
     ],
 )
 def test_pins_in_the_wiring_are_those_of_the_board(drawn: build_wiring.Wiring, board: str) -> None:
-    if not (FIRMWARE / board).is_file():
-        pytest.skip("firmware/boards is not here")
     head = (FIRMWARE / board).read_text(encoding="utf-8").partition("*/")[0]
     lines = (drawn.to_driver, drawn.from_current, drawn.from_encoder, drawn.from_stop)
     pins = re.findall(r"\bP[A-C]\d+\b|\bA\d\b", " ".join((*lines, drawn.from_force)))
