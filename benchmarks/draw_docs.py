@@ -1,4 +1,4 @@
-"""Draw the four drawings of the documentation as SVG: scissors, stroke, data flow, loop.
+"""Draw the drawings of the documentation as SVG: scissors, stroke, data flow, loop, builds.
 
     python -m benchmarks.draw_docs [--out docs/pictures]
 
@@ -8,8 +8,10 @@ computes. The same code gives the same bytes; tests/test_docs.py compares them.
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+from benchmarks.drawings import build_wiring, builds
 from benchmarks.drawings.canvas import Drawing
 from benchmarks.drawings.diagrams import dataflow, loop
 from benchmarks.drawings.scissors import geometry
@@ -20,6 +22,12 @@ PICTURES: dict[str, Callable[[], Drawing]] = {
     "stroke": stroke,
     "dataflow": dataflow,
     "loop": loop,
+    "build-course-mechanics": partial(builds.mechanics, builds.COURSE),
+    "build-course-wiring": partial(builds.wiring, build_wiring.COURSE),
+    "build-lab-mechanics": partial(builds.mechanics, builds.LAB),
+    "build-lab-wiring": partial(builds.wiring, build_wiring.LAB),
+    "build-best-mechanics": partial(builds.mechanics, builds.BEST),
+    "build-best-wiring": partial(builds.wiring, build_wiring.BEST),
 }
 
 

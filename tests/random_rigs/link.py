@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.device import check_echo, check_identity
+from scissorcal.device.link import LoadMessage
 from scissorcal.errors import DeviceError
-from scissorcal.kernel import Config, ConfigEcho, Hello, Identity, decode, encode
+from scissorcal.kernel import Config, ConfigEcho, Hello, Identity, LoadEcho, decode, encode
 
 from ..strange_device import wire
 from .rigs import RigParameters
@@ -135,6 +136,10 @@ class RigLink:
         assert isinstance(answer, ConfigEcho)
         check_echo(self.name, answer, int(key), float(value))
         return float(answer.value)
+
+    def load(self, message: LoadMessage) -> LoadEcho:
+        """It renders nothing itself."""
+        raise DeviceError(f"{self.name} takes no package.")
 
     def close(self) -> None:
         """Nothing to release."""

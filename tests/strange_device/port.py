@@ -1,8 +1,9 @@
 """A strange device in virtual time, as a link that scissorcal takes."""
 
 from scissorcal.device import check_echo, check_identity
+from scissorcal.device.link import LoadMessage
 from scissorcal.errors import DeviceError
-from scissorcal.kernel import Config, ConfigEcho, Hello, Identity, decode, encode
+from scissorcal.kernel import Config, ConfigEcho, Hello, Identity, LoadEcho, decode, encode
 
 from . import wire
 from .device import StrangeDevice
@@ -44,6 +45,10 @@ class VirtualPort:
         assert isinstance(answer, ConfigEcho)
         check_echo(self.name, answer, int(key), float(value))
         return float(answer.value)
+
+    def load(self, message: LoadMessage) -> LoadEcho:
+        """It renders nothing itself."""
+        raise DeviceError(f"{self.name} takes no package.")
 
     def close(self) -> None:
         """Nothing to release."""

@@ -1,0 +1,158 @@
+"""The pages of docs/build: their figures, their cost, and that the probe accepts each build."""
+
+import dataclasses
+import math
+import re
+from pathlib import Path
+
+import pytest
+from benchmarks.drawings import build_wiring
+
+from scissorcal.kernel import Capability
+from scissorcal.kernel.firmware import FirmwareBoard, FirmwareCore
+
+from .faults import FIRST, faults_of
+from .page import FAULT_SEED, PAGES, block_of, blocks, compared, probed_values
+from .parts import BEST, BUILDS, COURSE, GIMBAL, LAB, Build
+from .rig import probe_of
+
+FIRMWARE = PAGES.parents[1] / "firmware" / "boards"
+PAGE_OF = {**{name: f"{name}.md" for name in BUILDS}, GIMBAL.name: "not-working.md"}
+MOST_EUR = 200
+TOLERANCE = 0.05
+"""Of a figure in a page, for other versions of numpy and other processors."""
+NUMBER = re.compile(r"[+-]?\d[\d.]*(?:e[+-]?\d+)?")
+
+
+def page_of(build: Build) -> Path:
+    return PAGES / PAGE_OF[build.name]
+
+
+def rows_of(page: Path, mark: str) -> dict[str, list[str]]:
+    """The rows of a table between marks, by their first cell."""
+    rows = [line.strip("|").split("|") for line in block_of(page, mark).splitlines()]
+    return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if len(row) > 1}
+
+
+def words_of(sentence: str) -> str:
+    """A sentence without its numbers."""
+    return NUMBER.sub("#", sentence)
+
+
+@pytest.mark.parametrize("build", [*BUILDS.values(), GIMBAL], ids=lambda build: build.name)
+def test_figures_follow_from_the_parts(build: Build) -> None:
+    for mark, block in blocks(build, probes=False).items():
+        assert block_of(page_of(build), mark) == block
+
+
+def test_the_comparison_is_of_the_parts() -> None:
+    assert block_of(PAGES / "index.md", "COMPARED") == compared()
+
+
+def test_energy_of_a_dead_host_is_that_of_limit_and_inertia() -> None:
+    text = (PAGES / "index.md").read_text(encoding="utf-8")
+    for build in BUILDS.values():
+        limit, inertia = build.torque_limit, build.inertia
+        rate = limit * 10e-3 / inertia
+        energy = 0.5e3 * inertia * rate**2
+        row = f"| {build.name} | {limit:.3g} N m | {inertia:.2e} kg m^2 | {rate:.1f} rad/s "
+        assert f"{row}| {energy:.0f} mJ |".replace("e-0", "e-") in text
+
+
+def test_the_course_costs_no_more_than_it_may() -> None:
+    text = (PAGES / "course.md").read_text(encoding="utf-8")
+    table = text.partition("| part | EUR |")[2].partition("\n\n")[0]
+    prices = [int(eur) for eur in re.findall(r"^\| [^*|]+ \| (\d+) \|$", table, re.MULTILINE)]
+    (total,) = re.findall(r"\*\*(\d+)\*\*", table)
+    assert len(prices) > 10
+    assert sum(prices) == int(total) <= MOST_EUR
+
+
+@pytest.mark.parametrize(
+    ("build", "board"), [(COURSE, "stm32f405"), (LAB, "b_g431b_esc1"), (BEST, "teensy41")]
+)
+def test_the_table_of_a_page_is_a_possible_board(build: Build, board: str) -> None:
+    """Its fields in place of the example's; the torque limit is within the peak current's."""
+    head = (FIRMWARE / f"{board}_table.h").read_text(encoding="utf-8")
+    fields = dict(re.findall(r"\.(\w+) = ([-\d.e]+)f?,", head))
+    text = page_of(build).read_text(encoding="utf-8").partition("| field | value |")[2]
+    for names, values in re.findall(r"^\| (`.*?`) \| ([^|]*) \|", text, re.MULTILINE):
+        found = re.findall(r"`(\w+)`", names)
+        stated = values.split(", ") if len(values.split(", ")) == len(found) else [values] * 2
+        fields |= {
+            name: value for name, value in zip(found, stated, strict=False) if name in fields
+        }
+    numbers = {name: float(value) for name, value in fields.items()}
+    whole = ("tick_us", "home_at_stop", "firmware_version")
+    known = {f.name for f in dataclasses.fields(FirmwareBoard)} - {"name", "serial"}
+    given = {name: int(v) if name in whole else v for name, v in numbers.items() if name in known}
+    homes = int(Capability.HOMES | Capability.TORQUE_MEASURED)
+    FirmwareCore(FirmwareBoard("page", "1", **{"capabilities": homes, **given}))
+    assert given["torque_limit"] <= build.torque_limit
+    assert given["torque_limit"] > 0.98 * build.torque_limit
+    assert given["opening_resolution"] == pytest.approx(
+        2.0 * math.pi / build.blades_counts, rel=1e-6
+    )
+    assert given["tick_us"] == build.tick_us
+    assert given["torque_per_A"] == pytest.approx(build.blades_torque_per_ampere, rel=1e-3)
+    ticks_s = 4e-6 * build.tick_us
+    assert given["home_torque"] / given["home_speed"] < 0.8 * build.inertia / ticks_s
+    assert build.peak_A < given["current_limit"] <= build.sensor_range_A
+
+
+@pytest.mark.parametrize(
+    ("drawn", "board"),
+    [
+        (build_wiring.COURSE, "stm32f405.c"),
+        (build_wiring.LAB, "b_g431b_esc1.c"),
+        (build_wiring.BEST, "teensy41.c"),
+    ],
+)
+def test_pins_in_the_wiring_are_those_of_the_board(drawn: build_wiring.Wiring, board: str) -> None:
+    head = (FIRMWARE / board).read_text(encoding="utf-8").partition("*/")[0]
+    lines = (drawn.to_driver, drawn.from_current, drawn.from_encoder, drawn.from_stop)
+    pins = re.findall(r"\bP[A-C]\d+\b|\bA\d\b", " ".join((*lines, drawn.from_force)))
+    assert pins
+    assert not [pin for pin in pins if not re.search(rf"\b{pin}\b", head)]
+
+
+@pytest.mark.parametrize(
+    ("build", "seed"),
+    [
+        (COURSE, 101),
+        *(
+            pytest.param(build, seed, marks=pytest.mark.slow)
+            for build in (*BUILDS.values(), GIMBAL)
+            for seed in (102, 105)
+        ),
+    ],
+    ids=lambda value: value.name if isinstance(value, Build) else str(value),
+)
+def test_the_probe_accepts_a_right_build_with_the_figures_of_its_page(
+    build: Build, seed: int
+) -> None:
+    said = probe_of(build, seed)
+    assert said.result is not None, said.refusal
+    stated = rows_of(page_of(build), "PROBE")
+    for name, value in probed_values(said).items():
+        low, high = (float(cell) for cell in stated[name])
+        assert low - TOLERANCE * abs(low) <= value <= high + TOLERANCE * abs(high), name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("build", [COURSE, LAB, GIMBAL], ids=lambda build: build.name)
+def test_each_fault_is_named_as_on_the_page(build: Build) -> None:
+    stated = rows_of(page_of(build), "FAULTS")
+    for name, wrong in faults_of(build).items():
+        said = probe_of(build, FAULT_SEED, wrong)
+        sentence = said.refusal or stated[name][0]
+        assert words_of(sentence) == words_of(stated[name][0]), name
+        assert bool(said.refusal) != stated[name][0].startswith("accepted"), name
+
+
+@pytest.mark.slow
+def test_the_first_steps_go_as_on_the_page() -> None:
+    unplugged = probe_of(COURSE, FAULT_SEED, FIRST["motor unplugged"])
+    assert "The blades did not move either way" in unplugged.refusal
+    weak = probe_of(COURSE, FAULT_SEED, FIRST["a tenth of the limit"])
+    assert weak.result is not None, weak.refusal
