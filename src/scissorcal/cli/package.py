@@ -10,13 +10,14 @@ from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder, Seed, TrustedKey
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.report import SigningKey, signer_of
+from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
     from scissorcal.package import Manifest
 
 _COMMANDS = {
     "build": ("scissorcal.cli.package:build", "Compile the fits into tables with an error bound."),
-    "export": ("scissorcal.cli.package:export", "Write the package as a page that runs anywhere."),
+    "export": ("scissorcal.cli.package:export", "Write the package as a page, C sources, a header or an FMU."),
     "check": ("scissorcal.cli.package:check", "Hold a package to what it states."),
 }
 
@@ -111,9 +112,7 @@ def check(
     from scissorcal.package import check_package, open_package
     from scissorcal.package.keys import read_public_keys
 
-    if path is None:
-        workspace = open_workspace(folder)
-        path = workspace.package_path(workspace.recipe())
+    path = _package_path(path, folder)
     trusted = read_public_keys(trusted_key) if trusted_key else None
     package = open_package(path, warn=False)
     manifest = package.manifest
@@ -125,33 +124,112 @@ def check(
 @command
 def export(
     html: Annotated[
-        Path,
+        Path | None,
         typer.Option("--html", metavar="FILE", dir_okay=False, help="The page to write (.html)."),
-    ],
+    ] = None,
+    c: Annotated[
+        Path | None,
+        typer.Option(
+            "--c", metavar="DIR", file_okay=False, help="The folder of C sources to write."
+        ),
+    ] = None,
+    header: Annotated[
+        Path | None,
+        typer.Option(
+            "--header", metavar="FILE", dir_okay=False, help="The C header of tables to write (.h)."
+        ),
+    ] = None,
+    fmu: Annotated[
+        Path | None,
+        typer.Option("--fmu", metavar="FILE", dir_okay=False, help="The FMU to write (.fmu)."),
+    ] = None,
     package_path: Annotated[
         Path | None,
-        typer.Option("--package", help="The package to show; the workspace's if not given."),
+        typer.Option("--package", help="The package to export; the workspace's if not given."),
     ] = None,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace FILE if it exists.")
+        bool, typer.Option("--overwrite", help="Replace what exists.")
     ] = False,
     folder: Folder = None,
 ) -> Answer:
-    """Write the package and the C core, compiled to WebAssembly, as one page.
+    """Write the package as a page, C sources, a header or an FMU, which need no Python.
 
-    It runs in any browser, from a disk or a web server, and fetches nothing. It computes what the
-    rig's loop computes.
+    \b
+    --html    a page for any browser, which fetches nothing
+    --c       sources of the step, the tables, a program, CMake, pkg-config and README
+    --header  the tables and the model as constants, for a microcontroller with those sources
+    --fmu     FMI 3.0 co-simulation, for Simulink, OpenModelica or Python
+
+    All compute what the rig's loop computes, bit for bit.
 
     \b
     Example:
       $ scissorcal package export --html paper.html
       paper.html: 0.9 MB; open it in a browser, it needs no server and no network
+      $ scissorcal package export --c paper-c --fmu paper.fmu
+      paper-c: 19 files, 66 kB; tables 340 bytes, error bound 6.8e-05 N m, not signed
+      paper.fmu: 64 kB, FMI 3.0 co-simulation for x86_64-linux; mean and 200 draws, not signed
     """
-    from scissorcal.workday.runs.prototype import export_page
+    wanted = {"html": html, "c": c, "header": header, "fmu": fmu}
+    if not any(wanted.values()):
+        raise InputError("Nothing to export: give --html FILE, --c DIR, --header FILE or --fmu FILE.")
+    parts = []
+    if html is not None:
+        from scissorcal.workday.runs.prototype import export_page
 
-    size = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
-    text = f"{html}: {size / 1e6:.2g} MB; open it in a browser, it needs no server and no network"
-    return Answer({"page": html, "bytes": size}, text, files=[html])
+        size = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
+        text = f"{html}: {size / 1e6:.2g} MB; open it in a browser, it needs no server and no network"
+        parts.append(Answer({"page": html, "bytes": size}, text, files=[html]))
+    if c or header or fmu:
+        parts += _exports(_package_path(package_path, folder), c, header, fmu, overwrite)
+    return Answer(
+        {key: value for part in parts for key, value in part.result.items()},
+        "\n".join(part.text for part in parts),
+        files=[file for part in parts for file in part.files],
+    )
+
+
+def _exports(
+    package_path: Path, c: Path | None, header: Path | None, fmu: Path | None, overwrite: bool
+) -> list[Answer]:
+    """The package in C and as an FMU; its warnings are notes of the first."""
+    from scissorcal.package import open_package
+    from scissorcal.package.export import write_c, write_fmu, write_header
+    from scissorcal.package.export.facts import export_facts
+
+    package = open_package(package_path, warn=False)
+    facts = export_facts(package)
+    stated = f"error bound {facts.manifest.bound.stated_Nm:.2g} N m, {facts.signature}"
+    answers = []
+    if c is not None:
+        files = write_c(package, facts, c, overwrite=overwrite)
+        size = sum(file.stat().st_size for file in files)
+        text = f"{c}: {len(files)} files, {size / 1e3:.2g} kB; tables {facts.table_bytes} bytes, {stated}"
+        answers.append(Answer({"c": {"folder": c, "bytes": size}}, text, files=files))
+    if header is not None:
+        size = write_header(package, facts, header, overwrite=overwrite)
+        text = f"{header}: tables {facts.table_bytes} bytes, {facts.instructions}, {stated}"
+        answers.append(Answer({"header": {"file": header, "bytes": size}}, text, files=[header]))
+    if fmu is not None:
+        made = write_fmu(package, facts, fmu, overwrite=overwrite)
+        text = (
+            f"{fmu}: {made.bytes / 1e3:.2g} kB, FMI 3.0 co-simulation for {made.words}; "
+            f"mean and {made.draws} draws, {stated}"
+        )
+        answers.append(Answer({"fmu": made.result}, text, files=[fmu]))
+    notes = "\n".join(f"note: {sentence}" for sentence in facts.warnings)
+    return [*answers, Answer({"package": facts.result}, notes)] if notes else [
+        *answers,
+        Answer({"package": facts.result}),
+    ]
+
+
+def _package_path(path: Path | None, folder: Path | None) -> Path:
+    """The package that is named, or the workspace's."""
+    if path is not None:
+        return path
+    workspace = open_workspace(folder)
+    return workspace.package_path(workspace.recipe())
 
 
 def _contents(manifest: "Manifest") -> str:
