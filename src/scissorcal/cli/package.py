@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 _COMMANDS = {
     "build": ("scissorcal.cli.package:build", "Compile the fits into tables with an error bound."),
-    "export": ("scissorcal.cli.package:export", "Write the package as a page, C sources, a header or an FMU."),
+    "export": (
+        "scissorcal.cli.package:export",
+        "Write the package as a page, C sources, a header or an FMU.",
+    ),
     "check": ("scissorcal.cli.package:check", "Hold a package to what it states."),
 }
 
@@ -147,9 +150,7 @@ def export(
         Path | None,
         typer.Option("--package", help="The package to export; the workspace's if not given."),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace what exists.")
-    ] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what exists.")] = False,
     folder: Folder = None,
 ) -> Answer:
     """Write the package as a page, C sources, a header or an FMU, which need no Python.
@@ -170,58 +171,71 @@ def export(
       paper-c: 19 files, 66 kB; tables 340 bytes, error bound 6.8e-05 N m, not signed
       paper.fmu: 64 kB, FMI 3.0 co-simulation for x86_64-linux; mean and 200 draws, not signed
     """
-    wanted = {"html": html, "c": c, "header": header, "fmu": fmu}
-    if not any(wanted.values()):
-        raise InputError("Nothing to export: give --html FILE, --c DIR, --header FILE or --fmu FILE.")
-    parts = []
+    answers = []
     if html is not None:
         from scissorcal.workday.runs.prototype import export_page
 
         size = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
-        text = f"{html}: {size / 1e6:.2g} MB; open it in a browser, it needs no server and no network"
-        parts.append(Answer({"page": html, "bytes": size}, text, files=[html]))
+        text = (
+            f"{html}: {size / 1e6:.2g} MB; open it in a browser, it needs no server and no network"
+        )
+        answers.append(Answer({"page": html, "bytes": size}, text, files=[html]))
     if c or header or fmu:
-        parts += _exports(_package_path(package_path, folder), c, header, fmu, overwrite)
+        path = _package_path(package_path, folder)
+        answers.append(_export_step(path, c=c, header=header, fmu=fmu, overwrite=overwrite))
+    if not answers:
+        raise InputError(
+            "Nothing to export: give --html FILE, --c DIR, --header FILE or --fmu FILE."
+        )
     return Answer(
-        {key: value for part in parts for key, value in part.result.items()},
-        "\n".join(part.text for part in parts),
-        files=[file for part in parts for file in part.files],
+        {key: value for answer in answers for key, value in answer.result.items()},
+        "\n".join(answer.text for answer in answers),
+        files=[file for answer in answers for file in answer.files],
     )
 
 
-def _exports(
-    package_path: Path, c: Path | None, header: Path | None, fmu: Path | None, overwrite: bool
-) -> list[Answer]:
-    """The package in C and as an FMU; its warnings are notes of the first."""
+def _export_step(
+    package_path: Path, *, c: Path | None, header: Path | None, fmu: Path | None, overwrite: bool
+) -> Answer:
+    """The model's step in C and as an FMU."""
     from scissorcal.package import open_package
-    from scissorcal.package.export import write_c, write_fmu, write_header
-    from scissorcal.package.export.facts import export_facts
+    from scissorcal.package.export import export_facts, write_c, write_fmu, write_header
 
     package = open_package(package_path, warn=False)
     facts = export_facts(package)
+    result: dict[str, object] = {"package": facts.result}
+    lines, files, notes = [], [], list(facts.warnings)
+    tables = f"tables {facts.table_bytes} bytes"
     stated = f"error bound {facts.manifest.bound.stated_Nm:.2g} N m, {facts.signature}"
-    answers = []
     if c is not None:
-        files = write_c(package, facts, c, overwrite=overwrite)
-        size = sum(file.stat().st_size for file in files)
-        text = f"{c}: {len(files)} files, {size / 1e3:.2g} kB; tables {facts.table_bytes} bytes, {stated}"
-        answers.append(Answer({"c": {"folder": c, "bytes": size}}, text, files=files))
+        written = write_c(package, facts, c, overwrite=overwrite)
+        size = sum(file.stat().st_size for file in written)
+        lines.append(f"{c}: {len(written)} files, {size / 1e3:.2g} kB; {tables}, {stated}")
+        result["c"] = {"folder": c, "files": len(written), "bytes": size}
+        files += written
     if header is not None:
         size = write_header(package, facts, header, overwrite=overwrite)
-        text = f"{header}: tables {facts.table_bytes} bytes, {facts.instructions}, {stated}"
-        answers.append(Answer({"header": {"file": header, "bytes": size}}, text, files=[header]))
+        lines.append(
+            f"{header}: {tables}, model {facts.model_bytes} bytes, {stated}; {facts.instructions}"
+        )
+        result["header"] = {"file": header, "bytes": size}
+        files.append(header)
     if fmu is not None:
         made = write_fmu(package, facts, fmu, overwrite=overwrite)
-        text = (
-            f"{fmu}: {made.bytes / 1e3:.2g} kB, FMI 3.0 co-simulation for {made.words}; "
-            f"mean and {made.draws} draws, {stated}"
-        )
-        answers.append(Answer({"fmu": made.result}, text, files=[fmu]))
-    notes = "\n".join(f"note: {sentence}" for sentence in facts.warnings)
-    return [*answers, Answer({"package": facts.result}, notes)] if notes else [
-        *answers,
-        Answer({"package": facts.result}),
-    ]
+        size, where = len(made.data), ", ".join(made.platforms) or "no platform"
+        held = f"binaries for {where}; mean and {made.draws} draws"
+        lines.append(f"{fmu}: {size / 1e3:.2g} kB, {held}, {stated}")
+        result["fmu"] = {
+            "file": fmu,
+            "bytes": size,
+            "platforms": made.platforms,
+            "draws": made.draws,
+            "notes": made.notes,
+        }
+        files.append(fmu)
+        notes += made.notes
+    lines += [f"note: {sentence}" for sentence in notes]
+    return Answer(result, "\n".join(lines), files=files)
 
 
 def _package_path(path: Path | None, folder: Path | None) -> Path:

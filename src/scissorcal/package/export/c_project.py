@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from string import Template
 
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
@@ -42,58 +43,14 @@ def write_files(folder: Path, files: Mapping[str, bytes], *, overwrite: bool) ->
 
 
 def _readme(facts: ExportFacts) -> str:
-    manifest = facts.manifest
-    warnings = [f"- {sentence}" for sentence in facts.warnings] or ["None."]
-    return f"""# {manifest.name}: a fitted model of cutting in C
-
-One step from opening (rad), rate (rad/s) and advance (m) to torque (N m), force along the cut (N) and
-the crack's tip (m), in float, without allocation and without a state but the caller's.
-
-{_list(facts.identity)}
-
-## Build
-
-    cmake -B build && cmake --build build && build/stroke
-
-or without CMake:
-
-    cc -std=c99 -O2 -ffp-contract=off -o stroke main.c sc_*.c -lm
-
-`-ffp-contract=off` keeps the compiler from contracting products and sums; then the step gives on any
-processor the bits that scissorcal's own kernel gives. `build/stroke` prints a closing stroke, `build/stroke -`
-a step for each line "opening rate advance" that it reads. `cmake --install build` installs the library, its headers
-and a pkg-config file, scissorcal-model. A compiler without a C library takes `-Ifreestanding -fno-builtin` and
-`freestanding/string.c` besides.
-
-## Use
-
-    #include "scissorcal_package.h"
-    sc_crack crack = {{0}};                  /* a fresh sheet; one for each cut */
-    sc_step_output out;
-    sc_model_step(&scissorcal_package, &crack, opening, rate, advance, &out);
-
-Torque on the pivot opens the blades where it is positive. Hold torque and force, and how fast they change, within the
-limits of the header: the step does not. Flags of a step stand in `sc_model.h`; an input that is not finite gives zero
-torque and `SC_STEP_INVALID`.
-
-## Valid
-
-{_list(facts.covered)}
-
-Outside these ranges a step has no stated error, and is flagged `SC_STEP_OUT_OF_RANGE` for opening and contact.
-
-## Size
-
-{_list(facts.size)}
-
-## Warnings
-
-{chr(10).join(warnings)}
-
-## Licence
-
-BSD-3-Clause, see LICENSE: for these sources. The tables are data of whoever fitted them.
-"""
+    text = (C_FILES / "README.template").read_text(encoding="utf-8")
+    return Template(text).substitute(
+        name=facts.manifest.name,
+        identity=_list(facts.identity),
+        covered=_list(facts.covered),
+        size=_list(facts.size),
+        warnings=_list(facts.warnings or ("none",)),
+    )
 
 
 def _list(lines: tuple[str, ...]) -> str:

@@ -74,6 +74,21 @@ class ExportFacts:
             f"state of a step: 16 bytes; {self.instructions}",
         )
 
+    @property
+    def result(self) -> dict[str, object]:
+        """The same for ``--json``."""
+        return {
+            "name": self.manifest.name,
+            "content_hash": self.manifest.content_hash,
+            "signature": self.signature,
+            "ranges": self.manifest.ranges.model_dump(),
+            "bound": self.manifest.bound.model_dump(),
+            "table_bytes": self.table_bytes,
+            "model_bytes": self.model_bytes,
+            "instructions": self.instructions,
+            "warnings": self.warnings,
+        }
+
 
 def export_facts(package: ModelPackage, *, count: bool = True) -> ExportFacts:
     """What is stated of a package; ``count`` asks for its instructions where tools are installed.
