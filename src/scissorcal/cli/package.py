@@ -168,8 +168,8 @@ def export(
       $ scissorcal package export --html paper.html
       paper.html: 0.9 MB; open it in a browser, it needs no server and no network
       $ scissorcal package export --c paper-c --fmu paper.fmu
-      paper-c: 19 files, 66 kB; tables 340 bytes, error bound 6.8e-05 N m, not signed
-      paper.fmu: 64 kB, FMI 3.0 co-simulation for x86_64-linux; mean and 200 draws, not signed
+      paper-c: 21 files, 69.8 kB; tables 340 bytes, error bound 6.8e-05 N m, not signed
+      paper.fmu: 112 kB, binaries for x86_64-linux; 200 draws, error bound 6.8e-05 N m, not signed
     """
     answers = []
     if html is not None:
@@ -210,7 +210,7 @@ def _export_step(
     if c is not None:
         written = write_c(package, facts, c, overwrite=overwrite)
         size = sum(file.stat().st_size for file in written)
-        lines.append(f"{c}: {len(written)} files, {size / 1e3:.2g} kB; {tables}, {stated}")
+        lines.append(f"{c}: {len(written)} files, {size / 1e3:.3g} kB; {tables}, {stated}")
         result["c"] = {"folder": c, "files": len(written), "bytes": size}
         files += written
     if header is not None:
@@ -223,8 +223,8 @@ def _export_step(
     if fmu is not None:
         made = write_fmu(package, facts, fmu, overwrite=overwrite)
         size, where = len(made.data), ", ".join(made.platforms) or "no platform"
-        held = f"binaries for {where}; mean and {made.draws} draws"
-        lines.append(f"{fmu}: {size / 1e3:.2g} kB, {held}, {stated}")
+        held = f"binaries for {where}; {made.draws} draws"
+        lines.append(f"{fmu}: {size / 1e3:.3g} kB, {held}, {stated}")
         result["fmu"] = {
             "file": fmu,
             "bytes": size,

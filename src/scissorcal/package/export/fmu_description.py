@@ -63,7 +63,7 @@ def model_description(facts: ExportFacts, draws: int) -> bytes:
         instantiationToken=token(facts),
         description=" ".join(f"{line}." for line in (*facts.identity, *facts.covered)),
         version=manifest.content_hash[:16],
-        license="BSD-3-Clause (sources); tables: of whoever fitted them",
+        license="BSD-3-Clause for the sources; the tables belong to the lab that fitted them",
         generationTool=f"scissorcal {VERSION}",
         variableNamingConvention="structured",
     )
@@ -105,48 +105,42 @@ def _units(parent: Xml.Element) -> None:
             base.set(name_of_base, str(power))
 
 
+_FIXED = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
+_CALCULATED = {"causality": "output", "initial": "calculated"}
+_FLAGS = "1 invalid, 2 touching, 4 advanced, 8 out of range, 16 beyond tip, 32 not cutting"
+_DRAW = "index of the posterior draw that is simulated; -1: the package's own parameters"
+
+
 def _variables(
     parent: Xml.Element, facts: ExportFacts, own: Sequence[tuple[str, Parameter]], draws: int
 ) -> None:
-    reference = {name: str(NAMES.index(name)) for name in NAMES}
+    """In the order of their references."""
     opening, advance = start_values(facts)
 
     def add(kind: str, name: str, description: str, **more: str) -> None:
-        number = reference.get(name, str(parent_size()))
-        Xml.SubElement(
-            parent, kind, name=name, valueReference=number, description=description, **more
-        )
+        facts = {"name": name, "valueReference": str(len(parent)), "description": description}
+        Xml.SubElement(parent, kind, facts | more)
 
-    def parent_size() -> int:
-        return len(parent)
+    def real(name: str, unit: str, description: str, **more: str) -> None:
+        add("Float64", name, description, unit=unit, **{"variability": "continuous"} | more)
 
-    add("Float64", "time", "simulated time", causality="independent", variability="continuous",
-        unit="s")  # fmt: skip
+    real("time", "s", "simulated time", causality="independent")
     for name, unit, start, words in (
         ("opening", "rad", opening, "opening of the blades"),
         ("rate", "rad/s", 0.0, "rate of the opening, negative while closing"),
         ("advance", "m", advance, "place of the pivot along the cut"),
     ):
-        add("Float64", name, f"{words}; held over each step", causality="input",
-            variability="continuous", unit=unit, start=repr(float(start)))  # fmt: skip
-    for name, unit, words in (
-        ("torque", "N.m", "torque on the pivot, positive opens; not limited"),
-        ("force", "N", "force on the pivot along the cut; not limited"),
-        ("crack", "m", "place of the crack's tip; it never goes back"),
-    ):
-        add("Float64", name, words, causality="output", variability="continuous",
-            initial="calculated", unit=unit)  # fmt: skip
-    words = "1 invalid, 2 touching, 4 advanced, 8 out of range, 16 beyond tip, 32 not cutting"
-    add("UInt32", "flags", words, causality="output", variability="discrete", initial="calculated")
-    words = "index of the posterior draw that is simulated; -1: the mean, as the package is built"
-    add("Int32", "draw", words, causality="parameter", variability="fixed", initial="exact",
-        start="-1", min="-1", max=str(draws - 1))  # fmt: skip
-    add("Float64", "crack_start", "place of the crack's tip at the start", causality="parameter",
-        variability="fixed", initial="exact", unit="m", start="0.0")  # fmt: skip
+        real(name, unit, f"{words}; held over each step", causality="input", start=f"{start!r}")
+    real("torque", "N.m", "torque on the pivot, positive opens; not limited", **_CALCULATED)
+    real("force", "N", "force on the pivot along the cut; not limited", **_CALCULATED)
+    real("crack", "m", "place of the crack's tip; it never goes back", **_CALCULATED)
+    add("UInt32", "flags", _FLAGS, variability="discrete", **_CALCULATED)
+    add("Int32", "draw", _DRAW, start="-1", min="-1", max=str(draws - 1), **_FIXED)
+    real("crack_start", "m", "place of the crack's tip at the start", start="0.0", **_FIXED)
+    calculated = {"causality": "calculatedParameter", "variability": "fixed"}
     for name, item in own:
-        words = f"{item.unit}; posterior mean {item.mean:.6g}, sd {item.sd:.2g}; of the draw"
-        add("Float64", name, words, causality="calculatedParameter", variability="fixed",
-            initial="calculated")  # fmt: skip
+        words = f"{item.unit}; posterior mean {item.mean:.6g}, sd {item.sd:.2g}; value of the draw"
+        add("Float64", name, words, initial="calculated", **calculated)
 
 
 def _structure(parent: Xml.Element, parameters_count: int) -> None:

@@ -29,7 +29,7 @@ typedef struct {
     double time;      /* end of the last step [s] */
     double last_size; /* of the last step [s]; 0: none yet */
     double opening, rate, advance, crack_start;
-    int32_t draw; /* -1: the mean */
+    int32_t draw; /* -1: the package's own parameters */
     sc_crack crack;
     sc_step_output out; /* of the last step */
 } fmu_state;
@@ -45,7 +45,7 @@ typedef struct {
 /* Report, and give the status back. */
 fmi3Status fmu_log(const fmu *self, fmi3Status status, const char *message);
 
-/* Put the model of the state's draw in place: -1, the mean, is as the package holds it. */
+/* Put the model of the state's draw in place: -1 is the package as it is. */
 void fmu_choose(fmu *self);
 
 /* The outputs: of the last step; before the first, of a step at the inputs that moves no crack. */

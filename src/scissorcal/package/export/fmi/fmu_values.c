@@ -111,7 +111,7 @@ fmi3Status fmi3SetInt32(fmi3Instance instance, const fmi3ValueReference valueRef
             return fmu_log(self, fmi3Error, NOT_NOW);
         }
         if (values[i] < -1 || values[i] >= FMU_DRAWS) {
-            return fmu_log(self, fmi3Error, "draw is -1 for the mean, or the index of a draw");
+            return fmu_log(self, fmi3Error, "draw is -1 for the package's own parameters, or a draw's index");
         }
         self->state.draw = values[i];
         fmu_choose(self);
