@@ -115,7 +115,9 @@ def check(
     from scissorcal.package import check_package, open_package
     from scissorcal.package.keys import read_public_keys
 
-    path = _package_path(path, folder)
+    if path is None:
+        workspace = open_workspace(folder)
+        path = workspace.package_path(workspace.recipe())
     trusted = read_public_keys(trusted_key) if trusted_key else None
     package = open_package(path, warn=False)
     manifest = package.manifest
@@ -181,7 +183,9 @@ def export(
         )
         answers.append(Answer({"page": html, "bytes": size}, text, files=[html]))
     if c or header or fmu:
-        path = _package_path(package_path, folder)
+        from scissorcal.workday.runs.package import built_package
+
+        path = package_path or built_package(open_workspace(folder), "export")
         answers.append(_export_step(path, c=c, header=header, fmu=fmu, overwrite=overwrite))
     if not answers:
         raise InputError(
@@ -236,14 +240,6 @@ def _export_step(
         notes += made.notes
     lines += [f"note: {sentence}" for sentence in notes]
     return Answer(result, "\n".join(lines), files=files)
-
-
-def _package_path(path: Path | None, folder: Path | None) -> Path:
-    """The package that is named, or the workspace's."""
-    if path is not None:
-        return path
-    workspace = open_workspace(folder)
-    return workspace.package_path(workspace.recipe())
 
 
 def _contents(manifest: "Manifest") -> str:

@@ -58,7 +58,7 @@ def build_fmu(package: ModelPackage, facts: ExportFacts) -> Fmu:
 
     This computer's by its C compiler (``cc``); the others of x86_64-linux, aarch64-linux and
     x86_64-windows by ziglang, where the extra "page" is installed. An FMU without a binary still
-    has its sources, which importers compile. Raises RuntimeError where a compiler fails.
+    has its sources, which importers compile; a note says what a compiler said that failed.
     """
     draws = draw_tables(package)
     sources = {path.name: path.read_bytes() for path in step_sources()}
@@ -66,7 +66,7 @@ def build_fmu(package: ModelPackage, facts: ExportFacts) -> Fmu:
     sources[HEADER_FILE] = header_text(package, facts).encode()
     sources["scissorcal_fmu.h"] = _data_header(facts, draws).encode()
     compiled = sorted(name for name in sources if name.endswith(".c"))
-    binaries = _binaries(sources, compiled)
+    binaries, refused = _binaries(sources, compiled)
     identifier = model_identifier(facts)
     files = {"modelDescription.xml": model_description(facts, len(draws.models))}
     files |= {f"sources/{name}": data for name, data in sorted(sources.items())}
@@ -75,14 +75,16 @@ def build_fmu(package: ModelPackage, facts: ExportFacts) -> Fmu:
         files[f"binaries/{place}/{identifier}{suffix}"] = data
     files["documentation/index.html"] = _page(facts).encode()
     files["documentation/licenses/license.txt"] = (C_FILES / "LICENSE").read_bytes()
-    return Fmu(_zipped(files), tuple(binaries), len(draws.models), _notes(binaries, draws))
+    return Fmu(
+        _zipped(files), tuple(binaries), len(draws.models), (*refused, *_notes(binaries, draws))
+    )
 
 
 def _notes(binaries: Mapping[str, object], draws: DrawTables) -> tuple[str, ...]:
     notes = []
     if not binaries:
         notes.append(
-            "No C compiler was found, so the FMU has sources only: install one (cc), or "
+            "No C compiler built a binary here, so the FMU has sources only: install one (cc), or "
             "pip install 'scissorcal[page]', or let the importer compile them."
         )
     if draws.limited:
@@ -95,10 +97,11 @@ def _notes(binaries: Mapping[str, object], draws: DrawTables) -> tuple[str, ...]
 
 def _binaries(
     sources: Mapping[str, bytes], compiled: Sequence[str]
-) -> dict[str, tuple[str, bytes]]:
-    """Suffix and bytes of a shared library for each platform that can be compiled for."""
+) -> tuple[dict[str, tuple[str, bytes]], list[str]]:
+    """Suffix and bytes of a library for each platform, and what a compiler said that failed."""
     here = f"{platform.machine()}-{platform.system().lower()}"
     made: dict[str, tuple[str, bytes]] = {}
+    refused = []
     with tempfile.TemporaryDirectory() as build:
         for name, data in sources.items():
             (Path(build) / name).write_bytes(data)
@@ -111,12 +114,18 @@ def _binaries(
             else:
                 continue
             library = Path(build) / f"{place}{suffix}"
-            _run([*command, *_FLAGS, "-o", library.name, *compiled, "-lm"], Path(build))
-            made[place] = (suffix, library.read_bytes())
-    return made
+            said = _run([*command, *_FLAGS, "-o", library.name, *compiled, "-lm"], Path(build))
+            if said:
+                refused.append(
+                    f"There is no binary for {place}: {Path(command[0]).name} said {said}"
+                )
+            else:
+                made[place] = (suffix, library.read_bytes())
+    return made, refused
 
 
-def _run(command: list[str], folder: Path) -> None:
+def _run(command: list[str], folder: Path) -> str:
+    """Run a compiler; what it said where it failed, else nothing."""
     ran = subprocess.run(
         command,
         cwd=folder,
@@ -126,9 +135,7 @@ def _run(command: list[str], folder: Path) -> None:
         timeout=_TIMEOUT_s,
         stdin=subprocess.DEVNULL,
     )
-    if ran.returncode:
-        said = (ran.stderr + ran.stdout).strip()[-2000:]
-        raise RuntimeError(f"{command[0]} could not compile the FMU: {said}")
+    return (ran.stderr + ran.stdout).strip()[-2000:] if ran.returncode else ""
 
 
 def _data_header(facts: ExportFacts, draws: DrawTables) -> str:
