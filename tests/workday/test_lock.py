@@ -129,7 +129,8 @@ def test_another_user_waits_too(tmp_path: Path) -> None:
     """In a folder that both may write, with a lock that the first one made."""
     root = Path(tempfile.mkdtemp())
     root.chmod(0o777)
-    script = HOLDS.replace("with writing", "os.setgid(65534); os.setuid(65534)\nwith writing")
+    other = "import filelock\nos.setgid(65534); os.setuid(65534)\nwith writing"
+    script = HOLDS.replace("with writing", other)
     try:
         with writing(Workspace(root), "scissorcal fit"):
             (root / ".scissorcal").chmod(0o777)

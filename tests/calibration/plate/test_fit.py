@@ -223,9 +223,7 @@ def test_positions_that_do_not_fit_the_card_fail(still: tuple[SimPose, list[Pose
     _, seen = card_views(
         [(a, b) for a in (0.0, 0.03) for b in (0.1, 0.3)], np.random.default_rng(1)
     )
-    told = tuple(
-        dataclasses.replace(view, blade_angle_rad=2.0 * view.blade_angle_rad) for view in seen
-    )
-    honest, wrong = (locate_rig(views, CARD_CAMERA, MIDDLE) for views in (seen, told))
+    doubled = tuple(view._replace(blade_angle_rad=2.0 * view.blade_angle_rad) for view in seen)
+    honest, wrong = (locate_rig(views, CARD_CAMERA, MIDDLE) for views in (seen, doubled))
     assert verdict(fit_plate(still[1], SURE, rig=honest), "rig frame") == "pass"
     assert verdict(fit_plate(still[1], SURE, rig=wrong), "rig frame") == "fail"
