@@ -10,13 +10,17 @@ from scissorcal.cli.opening import open_workspace, writes_in
 from scissorcal.cli.options import Folder, Seed, TrustedKey
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.report import SigningKey, signer_of
+from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
     from scissorcal.package import Manifest
 
 _COMMANDS = {
     "build": ("scissorcal.cli.package:build", "Compile the fits into tables with an error bound."),
-    "export": ("scissorcal.cli.package:export", "Write the package as a page that runs anywhere."),
+    "export": (
+        "scissorcal.cli.package:export",
+        "Write the package as a page, C sources, a header or an FMU.",
+    ),
     "check": ("scissorcal.cli.package:check", "Hold a package to what it states."),
 }
 
@@ -125,33 +129,117 @@ def check(
 @command
 def export(
     html: Annotated[
-        Path,
+        Path | None,
         typer.Option("--html", metavar="FILE", dir_okay=False, help="The page to write (.html)."),
-    ],
+    ] = None,
+    c: Annotated[
+        Path | None,
+        typer.Option(
+            "--c", metavar="DIR", file_okay=False, help="The folder of C sources to write."
+        ),
+    ] = None,
+    header: Annotated[
+        Path | None,
+        typer.Option(
+            "--header", metavar="FILE", dir_okay=False, help="The C header of tables to write (.h)."
+        ),
+    ] = None,
+    fmu: Annotated[
+        Path | None,
+        typer.Option("--fmu", metavar="FILE", dir_okay=False, help="The FMU to write (.fmu)."),
+    ] = None,
     package_path: Annotated[
         Path | None,
-        typer.Option("--package", help="The package to show; the workspace's if not given."),
+        typer.Option("--package", help="The package to export; the workspace's if not given."),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace FILE if it exists.")
-    ] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what exists.")] = False,
     folder: Folder = None,
 ) -> Answer:
-    """Write the package and the C core, compiled to WebAssembly, as one page.
+    """Write the package as a page, C sources, a header or an FMU, which need no Python.
 
-    It runs in any browser, from a disk or a web server, and fetches nothing. It computes what the
-    rig's loop computes.
+    \b
+    --html    a page for any browser, which fetches nothing
+    --c       sources of the step, the tables, a program, CMake, pkg-config and README
+    --header  the tables and the model as constants, for a microcontroller with those sources
+    --fmu     FMI 3.0 co-simulation, for Simulink, OpenModelica or Python
+
+    All compute what the rig's loop computes, bit for bit.
 
     \b
     Example:
       $ scissorcal package export --html paper.html
       paper.html: 0.9 MB; open it in a browser, it needs no server and no network
+      $ scissorcal package export --c paper-c --fmu paper.fmu
+      paper-c: 21 files, 69.8 kB; tables 340 bytes, error bound 6.8e-05 N m, not signed
+      paper.fmu: 112 kB, binaries for x86_64-linux; 200 draws, error bound 6.8e-05 N m, not signed
     """
-    from scissorcal.workday.runs.prototype import export_page
+    answers = []
+    if html is not None:
+        from scissorcal.workday.runs.prototype import export_page
 
-    size = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
-    text = f"{html}: {size / 1e6:.2g} MB; open it in a browser, it needs no server and no network"
-    return Answer({"page": html, "bytes": size}, text, files=[html])
+        size = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
+        text = (
+            f"{html}: {size / 1e6:.2g} MB; open it in a browser, it needs no server and no network"
+        )
+        answers.append(Answer({"page": html, "bytes": size}, text, files=[html]))
+    if c or header or fmu:
+        from scissorcal.workday.runs.package import built_package
+
+        path = package_path or built_package(open_workspace(folder), "export")
+        answers.append(_export_step(path, c=c, header=header, fmu=fmu, overwrite=overwrite))
+    if not answers:
+        raise InputError(
+            "Nothing to export: give --html FILE, --c DIR, --header FILE or --fmu FILE."
+        )
+    return Answer(
+        {key: value for answer in answers for key, value in answer.result.items()},
+        "\n".join(answer.text for answer in answers),
+        files=[file for answer in answers for file in answer.files],
+    )
+
+
+def _export_step(
+    package_path: Path, *, c: Path | None, header: Path | None, fmu: Path | None, overwrite: bool
+) -> Answer:
+    """The model's step in C and as an FMU."""
+    from scissorcal.package import open_package
+    from scissorcal.package.export import export_facts, write_c, write_fmu, write_header
+
+    package = open_package(package_path, warn=False)
+    facts = export_facts(package)
+    result: dict[str, object] = {"package": facts.result}
+    lines, files, notes = [], [], list(facts.warnings)
+    tables = f"tables {facts.table_bytes} bytes"
+    stated = f"error bound {facts.manifest.bound.stated_Nm:.2g} N m, {facts.signature}"
+    if c is not None:
+        written = write_c(package, facts, c, overwrite=overwrite)
+        size = sum(file.stat().st_size for file in written)
+        lines.append(f"{c}: {len(written)} files, {size / 1e3:.3g} kB; {tables}, {stated}")
+        result["c"] = {"folder": c, "files": len(written), "bytes": size}
+        files += written
+    if header is not None:
+        size = write_header(package, facts, header, overwrite=overwrite)
+        lines.append(
+            f"{header}: {tables}, model {facts.model_bytes} bytes, {stated}; {facts.instructions}"
+        )
+        result["header"] = {"file": header, "bytes": size}
+        files.append(header)
+    if fmu is not None:
+        made = write_fmu(package, facts, fmu, overwrite=overwrite)
+        size, where = len(made.data), ", ".join(made.platforms) or "no platform"
+        held = f"binaries for {where}; {made.draws} draws"
+        lines.append(f"{fmu}: {size / 1e3:.3g} kB, {held}, {stated}")
+        result["fmu"] = {
+            "file": fmu,
+            "bytes": size,
+            "platforms": made.platforms,
+            "draws": made.draws,
+            "notes": made.notes,
+        }
+        files.append(fmu)
+        notes += made.notes
+    lines += [f"note: {sentence}" for sentence in notes]
+    return Answer(result, "\n".join(lines), files=files)
 
 
 def _contents(manifest: "Manifest") -> str:

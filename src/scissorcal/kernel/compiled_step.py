@@ -5,6 +5,7 @@ sources with the model's tables inside, in float or in double, for this computer
 Cortex-M4F that qemu runs while it counts instructions.
 """
 
+import re
 import shutil
 import subprocess
 import tempfile
@@ -32,6 +33,21 @@ def c_sources() -> Path:
     return Path(__file__).parent / "c"
 
 
+def step_sources() -> tuple[Path, ...]:
+    """The files of the C core that a model's step needs: headers by inclusion, then sources.
+
+    >>> [path.name for path in step_sources() if path.suffix == ".c"][:3]
+    ['sc_edge.c', 'sc_fracture.c', 'sc_model.c']
+    """
+    queue = [c_sources() / "sc_model.c", c_sources() / "sc_release.c"]  # both of sc_model.h
+    for path in queue:
+        for name in _INCLUDED.findall(path.read_text(encoding="utf-8")):
+            header = path.with_name(name)
+            beside = (header, header.with_suffix(".c"))
+            queue += [file for file in beside if file.is_file() and file not in queue]
+    return tuple(sorted(queue, key=lambda path: (path.suffix != ".h", path.name)))
+
+
 Target = Literal["host", "cortex-m4f"]
 Rows = tuple[Row16, Row16, Row16]
 
@@ -40,6 +56,7 @@ SLOW_STROKE_rad_per_s = 0.5
 _TIMEOUT_s = 300.0
 
 _CORE = ("table", "table16", "turn", "edge", "fracture", "release", "model")
+_INCLUDED = re.compile(r'^#include "(sc_\w+\.h)"', re.MULTILINE)
 _COMMON = ("-std=c99", "-Wall", "-Wextra", "-fno-math-errno", "-ffp-contract=off")
 _HOST = ("cc", *_COMMON, "-D_POSIX_C_SOURCE=200809L", "-O3")
 _CORTEX = (

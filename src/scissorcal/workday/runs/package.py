@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from scissorcal.calibration.store import load
 from scissorcal.calibration.verify.result import VerifyResult
-from scissorcal.errors import InputError, VerdictError
+from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.fit import load_result
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from scissorcal.package.manifest import RigRecord
     from scissorcal.package.signature import Sign
     from scissorcal.package.simplest.choice import SceneChoice
+    from scissorcal.workday.workspace import Workspace
 
 UNSIGNED = (
     "The package's signature was left out, as it was given with another review: sign it again "
@@ -114,6 +115,18 @@ def build_workspace_package(
     warnings = _void(engine) + summary.warnings
     choice = store_scene_choice(engine, summary.simplified, fits)
     return Built(path, summary.manifest, summary.verdicts, warnings, False, choice)
+
+
+def built_package(workspace: "Workspace", purpose: str) -> Path:
+    """The workspace's package; MissingError, with the command that leads to one, without it.
+
+    ``purpose`` is what it is wanted for, as a verb.
+    """
+    path = workspace.package_path(workspace.recipe())
+    if not path.is_file():
+        command = Engine.of(workspace).leads_to("package build")
+        raise MissingError(f"There is no package to {purpose} yet: run '{command}' first.")
+    return path
 
 
 def _fits(engine: Engine) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from scissorcal.device.capture import CLEAR_REQUEST
 from scissorcal.device.trajectory import EMPTY_REQUEST
-from scissorcal.errors import InputError, MissingError, needs_extra
+from scissorcal.errors import InputError, needs_extra
 from scissorcal.files import replacing
 from scissorcal.identity import VERSION
 from scissorcal.kernel import Capability
@@ -28,6 +28,7 @@ from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, PrototypeOptions
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.runs.fit import available, load_result
+from scissorcal.workday.runs.package import built_package
 from scissorcal.workday.runs.render import package_warnings
 from scissorcal.workday.workspace import Workspace
 
@@ -52,10 +53,7 @@ def workspace_scene(
     Raises MissingError where there is no package, with the command that builds it, and what opening
     one raises.
     """
-    path = package_path or workspace.package_path(workspace.recipe())
-    if package_path is None and not path.is_file():
-        command = Engine.of(workspace).leads_to("package build")
-        raise MissingError(f"There is no package to show yet: run '{command}' first.")
+    path = package_path or built_package(workspace, "show")
     engine = Engine.of(workspace)
     fits = [load_result(engine, what) for what in available(engine, ("cut", "friction"))]
     package = open_package(path, warn=False)
