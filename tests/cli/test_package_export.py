@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from scissorcal.package import open_package
-from scissorcal.package.export import fmu
 from scissorcal.workday import Workspace
 
 from .conftest import Cli
@@ -16,7 +15,7 @@ from .conftest import Cli
 def test_a_workspaces_package_is_exported_in_each_form(
     packed: Workspace, cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fmu, "find_spec", lambda name: None)
+    monkeypatch.setattr("scissorcal.package.export.fmu.find_spec", lambda name: None)
     folder, header, unit = tmp_path / "c", tmp_path / "paper.h", tmp_path / "paper.fmu"
     words = ("package", "export", "--c", folder, "--header", header, "--fmu", unit)
     said = cli(*words, "--json")

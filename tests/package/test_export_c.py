@@ -197,6 +197,14 @@ def test_the_project_holds_the_steps_sources_and_no_other(
         assert (folder / name).read_bytes() == (c_sources() / name).read_bytes()
 
 
+def test_the_licence_is_that_of_the_project(paper: PackageSummary, tmp_path: Path) -> None:
+    licence = Path(__file__).parents[2] / "LICENSE"
+    if not licence.is_file():
+        pytest.skip("runs from a checkout only")
+    folder = exported(open_package(paper.path, warn=False), tmp_path / "c")
+    assert (folder / "LICENSE").read_bytes() == licence.read_bytes()
+
+
 def test_the_header_states_its_package_and_bytes(paper: PackageSummary, tmp_path: Path) -> None:
     package = open_package(paper.path, warn=False)
     facts = export_facts(package)
