@@ -28,8 +28,8 @@ from scissorcal.package.export.header import HEADER_FILE, header_text
 from scissorcal.package.model_package import ModelPackage
 
 FMI_FILES = Path(__file__).parent / "fmi"
-_OWN = ("fmu.c", "fmu_values.c", "fmu_unsupported.c", "fmu.h")
-_STANDARD = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")
+_OWN = ("fmu.c", "fmu_values.c", "fmu_unsupported.c", "fmu.h", "fmi3.h")
+
 _TIMEOUT_s = 300.0
 _FLAGS = (
     *("-std=c99", "-O2", "-s", "-shared", "-fvisibility=hidden", "-ffp-contract=off"),
@@ -62,7 +62,7 @@ def build_fmu(package: ModelPackage, facts: ExportFacts) -> Fmu:
     """
     draws = draw_tables(package)
     sources = {path.name: path.read_bytes() for path in step_sources()}
-    sources |= {name: (FMI_FILES / name).read_bytes() for name in (*_OWN, *_STANDARD)}
+    sources |= {name: (FMI_FILES / name).read_bytes() for name in _OWN}
     sources[HEADER_FILE] = header_text(package, facts).encode()
     sources["scissorcal_fmu.h"] = _data_header(facts, draws).encode()
     compiled = sorted(name for name in sources if name.endswith(".c"))
@@ -196,8 +196,7 @@ def _page(facts: ExportFacts) -> str:
 {items}</ul>
 <p>A step of the importer is one step of the model at the inputs as they were set, held over the
 whole step; nothing is interpolated. Computed in float. Torque and force are not limited.</p>
-<p>Headers fmi3*.h: Modelica Association Project FMI, BSD-2-Clause, as stated in them. All else:
-licenses/license.txt.</p>
+<p>Licence: licenses/license.txt.</p>
 </body></html>
 """
 

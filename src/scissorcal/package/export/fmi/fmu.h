@@ -4,7 +4,7 @@
 
 #include "scissorcal_fmu.h" /* of the package: FMI3_FUNCTION_PREFIX, token, draws, parameters */
 
-#include "fmi3Functions.h"
+#include "fmi3.h"
 
 /* Value references; those of the parameters follow. */
 enum {
