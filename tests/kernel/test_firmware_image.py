@@ -110,7 +110,7 @@ def test_an_image_is_put_in_force_and_named_by_its_checksum() -> None:
 def test_a_core_without_memory_refuses_an_upload() -> None:
     bench = Bench(image_bytes=0)
     echo = bench.upload(model_image(make_tables(), DRIVE))
-    assert (LoadStatus(echo.status), echo.capacity, echo.crc32) == (LoadStatus.TOO_LARGE, 0, 0)
+    assert (LoadStatus(echo.status), echo.capacity, echo.crc32) == (LoadStatus.OTHER_FORMAT, 0, 0)
     assert bench.configure(ConfigKey.RENDER, 1.0).status == ConfigStatus.UNKNOWN_KEY
     (identity,) = (r for r in bench.tick(Hello(1))[0] if isinstance(r, Identity))
     assert not identity.capabilities & Capability.RENDERS
