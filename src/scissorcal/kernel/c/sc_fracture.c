@@ -128,17 +128,17 @@ static int is_coarse(const sc_model *model, const bearing *at, const sc_edge_poi
     return fabsf(at->gap) > ROUNDED * (fabsf(model->upper_face) + fabsf(point->y));
 }
 
+typedef enum { SC_AT_TIP, SC_RESTS, SC_OPEN } ending;
+
 /* The crack rests where the gap is closed. */
-static int rest(const sc_model *model, const bearing *at, sc_bite *bite)
+static ending rest(const sc_model *model, const bearing *at, sc_bite *bite)
 {
     bite->indentation = at->response.x;
     bite->force = at->response.y;
     bite->stored = (float)model->moving_blades * at->response.area;
     bite->knot = at->response.index;
-    return 1;
+    return SC_RESTS;
 }
-
-typedef enum { SC_AT_TIP, SC_RESTS, SC_OPEN } ending;
 
 /* Where nothing is found in between: the near side of what holds, or of what is past the tip. */
 static ending hold_at(const sc_model *model, sc_turn turn, float target, float station, sc_bite *bite)

@@ -1,0 +1,12 @@
+/* What the core uses of the C library's string functions; library.c defines them. */
+#ifndef FW_STRING_H
+#define FW_STRING_H
+
+#include <stddef.h>
+
+void *memcpy(void *restrict to, const void *restrict from, size_t size);
+void *memmove(void *to, const void *from, size_t size);
+void *memset(void *to, int value, size_t size);
+int memcmp(const void *first, const void *second, size_t size);
+
+#endif
