@@ -78,7 +78,16 @@ def test_every_command_that_installs_an_extra_names_one(project: dict[str, list[
     named = {name for text in texts for one in EXTRA.findall(text) for name in one.split(",")}
     assert named <= set(project)
     refused = {extra for text in texts[len(pages) :] for extra in refused_in(text)}
-    assert refused == {"analysis", "bench", "cluster", "keys", "parquet", "plots", "prototype"}
+    assert refused == {
+        "analysis",
+        "bench",
+        "cluster",
+        "keys",
+        "moteus",
+        "parquet",
+        "plots",
+        "prototype",
+    }
     assert refused < set(project)
 
 

@@ -172,6 +172,7 @@ def test_nothing_is_built_from_a_source_archive(
     assert (source / "src/scissorcal/prototype/page/src/page.html").is_file()
     assert (source / "recipes/paper-with-hole.svg").is_file()
     assert (source / "build_backend/scissorcal_build.py").is_file()
+    assert (source / "firmware/core/fw_core.c").is_file(), "the core of the firmware builds there"
     for name in FOR_BROWSERS:  # an unpacker need not keep times
         os.utime(source / "src" / name, (0, 0))
     assert not asked_for(source), "a source archive carries what compilers would build"
@@ -252,7 +253,7 @@ def test_the_lock_of_the_page_names_no_registry() -> None:
 def test_it_runs_from_another_folder(unpacked: Path, tmp_path: Path) -> None:
     code = (
         "from scissorcal.recipe.load import recipe_names, recipes_dir, schemas_dir\n"
-        "import scissorcal.kernel\n"
+        "from scissorcal.kernel import FirmwareCore\n"
         "print(recipes_dir(), schemas_dir(), *recipe_names(), sep='\\n')\n"
     )
     recipes, schemas, *names = run(unpacked, tmp_path, code).split()

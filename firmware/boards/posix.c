@@ -4,6 +4,7 @@
  *   posix --records  no port and no clock: a board, then fw_record_in from stdin, fw_record_out out
  *
  * Behind it stand blades with inertia, dry and viscous friction between two stops, and a carriage.
+ * A hand at the blades follows stdin: c closes, o opens, h leaves them half open, l lets go.
  */
 #include "fw_record.h"
 
@@ -18,9 +19,7 @@
 #include <unistd.h>
 
 static const fw_board BOARD = {
-    .name = "posix",
-    .serial = "1",
-    .firmware_version = 1,
+    .name = "posix", .serial = "1", .firmware_version = 1,
     .tick_us = 1000,
     .capabilities = SC_CAPABILITY_ADVANCE_MOTOR | SC_CAPABILITY_TORQUE_MEASURED,
     .torque_limit = 0.8f,
@@ -48,12 +47,12 @@ static const fw_board BOARD = {
 
 /* One axis: speed and place, SI. */
 typedef struct {
-    float place, speed, inertia, dry, viscous, braking, low, high;
+    float place, speed, inertia, dry, viscous, braking, low, high, push;
 } axis;
 
 static void plant_step(axis *a, float effort, int brakes, float dt)
 {
-    const float damped = effort - (a->viscous + (brakes ? a->braking : 0.0f)) * a->speed;
+    const float damped = effort + a->push - (a->viscous + (brakes ? a->braking : 0.0f)) * a->speed;
     const float free = a->speed + damped / a->inertia * dt;
     const float grip = a->dry / a->inertia * dt; /* what dry friction can take away in a step */
     a->speed = free > grip ? free - grip : free < -grip ? free + grip : 0.0f;
@@ -86,9 +85,10 @@ static void plant_tick(axis axes[2], const fw_outputs *drive, fw_inputs *inputs)
 
 static void serve(fw_core *core, fw_record_in *in, fw_record_out *out, int port)
 {
-    axis axes[2] = {{0.5f, 0.0f, 3e-4f, 0.012f, 2e-3f, 0.05f, 0.05f, 1.0f},
-                    {-0.05f, 0.0f, 0.35f, 0.6f, 3.0f, 40.0f, -0.12f, 0.25f}};
+    axis axes[2] = {{0.5f, 0.0f, 3e-4f, 0.012f, 2e-3f, 0.05f, 0.05f, 1.0f, 0.0f},
+                    {-0.05f, 0.0f, 0.35f, 0.6f, 3.0f, 40.0f, -0.12f, 0.25f, 0.0f}};
     struct timespec due;
+    float hand = -1.0f;
     struct pollfd parent = {STDIN_FILENO, POLLIN, 0};
     in->inputs.supply = 12.0f;
     clock_gettime(CLOCK_MONOTONIC, &due);
@@ -101,16 +101,17 @@ static void serve(fw_core *core, fw_record_in *in, fw_record_out *out, int port)
         if (write(port, out->sent, out->sent_size) < 0 && errno != EAGAIN && errno != EIO) {
             return; /* a full buffer loses frames, as a line that nobody reads does */
         }
-        if (poll(&parent, 1, 0) > 0 && read(STDIN_FILENO, &byte, 1) <= 0) {
-            return;
+        if (poll(&parent, 1, 0) > 0) {
+            if (read(STDIN_FILENO, &byte, 1) <= 0) {
+                return;
+            }
+            hand = byte == 'c' ? 0.0f : byte == 'o' ? 2.0f : byte == 'h' ? 0.5f : -1.0f;
         }
+        axes[0].push = hand < 0.0f ? 0.0f : 2.0f * (hand - axes[0].place) - 0.1f * axes[0].speed;
         due.tv_nsec += 1000L * (long)BOARD.tick_us;
-        if (due.tv_nsec >= 1000000000L) {
-            due.tv_nsec -= 1000000000L;
-            due.tv_sec++;
-        }
-        while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, 0) == EINTR) {
-        }
+        due.tv_sec += due.tv_nsec / 1000000000L;
+        due.tv_nsec %= 1000000000L;
+        (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, 0);
     }
 }
 
@@ -132,15 +133,14 @@ int main(int count, char **words)
         fw_record_tick(&core, &in, &out);
         fwrite(&out, sizeof out, 1, stdout);
     }
-    if (records) {
-        return 0;
-    }
+    static fw_render render;
+    static float image[FW_IMAGE_MOST_BYTES / 4];
+    fw_let_render(&core, &render, image, sizeof image);
     const int port = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK);
-    if (port < 0 || grantpt(port) != 0 || unlockpt(port) != 0) {
-        perror("posix: no pseudo-terminal");
-        return 1;
+    if (records || port < 0 || grantpt(port) != 0 || unlockpt(port) != 0) {
+        return !records;
     }
-    const int own = open(ptsname(port), O_RDWR | O_NOCTTY); /* keeps the port open between hosts */
+    const int own = open(ptsname(port), O_RDWR | O_NOCTTY); /* it stays open between hosts */
     struct termios line = {.c_cflag = CS8 | CREAD | CLOCAL, .c_cc = {[VMIN] = 1}}; /* raw */
     tcsetattr(own, TCSANOW, &line);
     printf("%s\n", ptsname(port));

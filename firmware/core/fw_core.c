@@ -174,7 +174,8 @@ static void load(fw_core *core, const uint8_t *payload, size_t size)
     uint8_t reply[SC_SIZE_LOAD_ECHO];
     sc_load_echo echo;
     const int is_busy = core->phase == FW_ENABLED || enable_asked(core);
-    if (fw_render_load(core->render, payload, size, is_busy, &echo)) {
+    if (core->render == NULL ? fw_refuse_load(payload, size, &echo)
+                             : fw_render_load(core->render, payload, size, is_busy, &echo)) {
         fw_put_reply(&core->outbox, reply, sc_pack_load_echo(&echo, reply));
     }
 }
@@ -190,7 +191,7 @@ static void handle(fw_core *core, const uint8_t *payload, size_t size)
         introduce(core, hello.nonce);
     } else if (sc_unpack_config(payload, size, &config)) {
         configure(core, &config);
-    } else if (core->render != NULL) {
+    } else {
         load(core, payload, size);
     }
 }
@@ -252,9 +253,11 @@ static void change_phase(fw_core *core, const fw_inputs *inputs)
     }
 }
 
-/* The wanted value, or what the slew allows of the way there from the last one. */
+/* The wanted value, or what the slew allows of the way there from the last one; what is not a number
+ * counts as 0. */
 static float slewed(float last, float wanted, float step)
 {
+    wanted = fw_finite(wanted) ? wanted : 0.0f;
     if (fw_magnitude(wanted - last) <= step) {
         return wanted;
     }

@@ -117,7 +117,7 @@ typedef struct {
 int fw_init(fw_core *core, const fw_board *board);
 
 /* Let the core load and render packages, with *render and capacity bytes of memory, both the caller's
- * and for nobody else; after fw_init. Without it LOAD messages are not answered. */
+ * and for nobody else; after fw_init. Without it LOAD messages are refused. */
 void fw_let_render(fw_core *core, fw_render *render, float *memory, uint32_t capacity);
 
 /* Take bytes from the host, in pieces of any size. */

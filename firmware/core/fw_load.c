@@ -93,3 +93,23 @@ int fw_render_load(fw_render *render, const uint8_t *payload, size_t size, int e
     }
     return 1;
 }
+
+int fw_refuse_load(const uint8_t *payload, size_t size, sc_load_echo *echo)
+{
+    sc_load_begin first;
+    sc_load_chunk piece;
+    sc_load_commit last;
+    memset(echo, 0, sizeof *echo);
+    echo->status = SC_LOAD_NOT_ANNOUNCED;
+    if (sc_unpack_load_begin(payload, size, &first)) {
+        echo->status = SC_LOAD_OTHER_FORMAT;
+        echo->nonce = first.nonce;
+    } else if (sc_unpack_load_chunk(payload, size, &piece)) {
+        echo->nonce = piece.nonce;
+    } else if (sc_unpack_load_commit(payload, size, &last)) {
+        echo->nonce = last.nonce;
+    } else {
+        return 0;
+    }
+    return 1;
+}

@@ -85,6 +85,9 @@ void fw_render_init(fw_render *render, float *memory, uint32_t capacity);
 int fw_render_load(fw_render *render, const uint8_t *payload, size_t size, int enabled,
                    sc_load_echo *echo);
 
+/* The same answer by a device that renders nothing: no format, no capacity. */
+int fw_refuse_load(const uint8_t *payload, size_t size, sc_load_echo *echo);
+
 /* Set RENDER; SC_CONFIG_OK, or SC_CONFIG_VALUE_REFUSED for another value than 0 and 1, and for 1
  * without an image in force. */
 uint8_t fw_render_set(fw_render *render, float value);

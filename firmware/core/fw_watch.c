@@ -88,7 +88,8 @@ uint8_t fw_present_cause(const fw_core *core, const fw_inputs *inputs)
     if (core->encoder_doubt > 0) {
         return SC_CAUSE_ENCODER;
     }
-    if (!(fw_magnitude(current(core, inputs)) <= board->current_limit)) {
+    if (!(fw_magnitude(current(core, inputs)) <= board->current_limit) ||
+        !(core->heat <= board->i2t_limit)) {
         return SC_CAUSE_CURRENT;
     }
     if (core->phase >= FW_ENABLED || core->phase == FW_HOMING) {
@@ -96,8 +97,7 @@ uint8_t fw_present_cause(const fw_core *core, const fw_inputs *inputs)
             return SC_CAUSE_SPEED;
         }
     }
-    if (!(core->heat <= board->i2t_limit) ||
-        (board->temperature_max > 0.0f && !(inputs->temperature <= board->temperature_max))) {
+    if (board->temperature_max > 0.0f && !(inputs->temperature <= board->temperature_max)) {
         return SC_CAUSE_HEAT;
     }
     return core->lost ? SC_CAUSE_WATCHDOG : SC_CAUSE_NONE;

@@ -7,19 +7,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 FIRMWARE = ROOT / "firmware"
 WIRE = ROOT / "src" / "scissorcal" / "kernel" / "c"
-SHARED = tuple(
-    [
-        "wire",
-        "messages",
-        "model",
-        "release",
-        "fracture",
-        "edge",
-        "table",
-        "turn",
-        "motion",
-        "near_rest",
-    ]
+SHARED = (
+    *("wire", "messages", "model", "release", "fracture"),
+    *("edge", "table", "turn", "motion", "near_rest"),
 )
 """What the core takes of the host's own sources."""
 ZIG = (sys.executable, "-m", "ziglang", "cc")

@@ -62,9 +62,66 @@ static void random_inputs(fw_inputs *in)
     in->flags = one_in(500) ? word() : (one_in(100) ? FW_IN_AT_HOME : 0u);
 }
 
+enum { IMAGE_MOST = 600 };
+
+/* A straight edge and response, level friction; at times with one bit wrong. */
+static uint32_t image_of_paper(uint8_t *image)
+{
+    static const uint32_t whole[] = {FW_IMAGE_MAGIC, FW_IMAGE_FORMAT, 4u * (FW_IMAGE_WORDS + 32u)};
+    static const uint32_t knots[] = {2, 2, 2, 2, 2, 1, SC_CLOSURE_WORK, 1, 1};
+    static const float numbers[] = {5e-5f, 0.6f, 0.8f, 0.1f, 0.01f, 0.06f, 0.075f, 0.0f, 1.0f,
+                                    0.0f, 0.1f, /* the drive */ 0.4f, 50.0f, 9.0f, 900.0f, 0.2f,
+                                    100.0f, 0.003f, 0.0f, 1e-4f, 1e-3f, 1e-6f, 0.02f, 1.0f};
+    static const float tables[] = {0.0f, 0.075f, -0.008f, -0.005f, 0.04f, 0.04f,
+                                   0.0f, 0.002f, 0.0f, 30.0f, 15000.0f, 15000.0f, 0.0f, 0.03f,
+                                   0.0f, 5.0f, 0.01f, 0.01f, 0.0f, 0.0f,
+                                   0.0f, 5.0f, 0.01f, 0.01f, 0.0f, 0.0f,
+                                   0.0f, 1.0f, 1.0f, 1.0f, 0.0f, 0.0f};
+    const float one = 1.0f;
+    memcpy(image, whole, sizeof whole);
+    memcpy(image + 12, &one, 4);
+    memcpy(image + 16, knots, sizeof knots);
+    memcpy(image + 52, numbers, sizeof numbers);
+    memcpy(image + 148, tables, sizeof tables);
+    if (one_in(3)) {
+        image[word() % whole[2]] ^= (uint8_t)(1u << word() % 8u);
+    }
+    return whole[2];
+}
+
+/* The next part of an upload, in order but at times. */
+static void upload(rig *r)
+{
+    static uint8_t image[IMAGE_MOST];
+    static uint32_t size, offset;
+    uint8_t payload[SC_PAYLOAD_MAX];
+    size_t filled;
+    if (size == 0u || one_in(40)) {
+        size = image_of_paper(image);
+        offset = 0;
+        const sc_load_begin begin = {(uint16_t)(one_in(20) ? word() : FW_IMAGE_FORMAT), word(),
+                                     one_in(20) ? word() : size, fw_crc32(0, image, size)};
+        filled = sc_pack_load_begin(&begin, payload);
+    } else if (offset < size) {
+        sc_load_chunk chunk = {0, word(), one_in(20) ? word() : offset, {0}};
+        const uint32_t left = size - offset < 192u ? size - offset : 192u;
+        chunk.count = (uint8_t)(one_in(20) ? word() % 256u : left);
+        memcpy(chunk.bytes, image + offset, left);
+        offset += left;
+        filled = sc_pack_load_chunk(&chunk, payload);
+    } else {
+        const sc_load_commit commit = {word()};
+        filled = sc_pack_load_commit(&commit, payload);
+        size = one_in(2) ? 0u : size;
+    }
+    r->in.received_size =
+        (uint32_t)sc_encode_frame(payload, filled, r->in.received, sizeof r->in.received);
+}
+
 static void random_bytes(rig *r)
 {
-    switch (word() % 12) {
+    switch (word() % 13) {
+    case 5: upload(r); break;
     case 0:
         r->in.received_size = word() % 40u;
         for (uint32_t i = 0; i < r->in.received_size; i++) {
@@ -136,7 +193,7 @@ int main(int count, char **words)
 {
     random_state = count > 1 ? strtoull(words[1], 0, 10) : 1u;
     long left = count > 2 ? strtol(words[2], 0, 10) : 200000;
-    long phases[5] = {0}, sent = 0;
+    long phases[5] = {0}, sent = 0, rendered = 0;
     while (left > 0) {
         static rig r;
         sc_decoder decoder;
@@ -148,6 +205,11 @@ int main(int count, char **words)
             numbers[word() % 26u] = any_bits();
         }
         start(&r, &board);
+        static fw_render render;
+        static float memory[IMAGE_MOST / 4];
+        if (r.core.problem == FW_BOARD_POSSIBLE && !one_in(4)) {
+            fw_let_render(&r.core, &render, memory, sizeof memory);
+        }
         sc_decoder_init(&decoder);
         memset(&asked, 0, sizeof asked);
         for (long i = 0; i < 2000 && left > 0; i++, left--) {
@@ -157,6 +219,7 @@ int main(int count, char **words)
             follow(&decoder, &r, &asked);
             tick(&r);
             phases[r.out.phase]++;
+            rendered += r.core.rendering && render.step.torque != 0.0f;
             sent += (long)r.out.sent_size;
             if (r.core.problem == FW_BOARD_POSSIBLE) {
                 check(&r, &asked, torque, force);
@@ -169,6 +232,8 @@ int main(int count, char **words)
         PROMISED(phases[phase] > 0);
         printf("%ld ticks in phase %d\n", phases[phase], phase);
     }
+    PROMISED(rendered > 0);
+    printf("%ld ticks rendered a torque\n", rendered);
     printf("fuzz: %ld bytes sent\n", sent);
     return 0;
 }

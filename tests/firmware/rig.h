@@ -15,6 +15,7 @@ typedef struct {
     sc_state state; /* the last one */
     sc_identity identity;
     sc_config_echo echo;
+    sc_load_echo load;
     int states;     /* frames decoded, of each kind */
     int identities;
     int echoes;
@@ -132,6 +133,7 @@ static inline void read_frames(rig *r, const uint8_t *data, size_t size)
         r->states += sc_unpack_state(payload, (size_t)got, &r->state);
         r->identities += sc_unpack_identity(payload, (size_t)got, &r->identity);
         r->echoes += sc_unpack_config_echo(payload, (size_t)got, &r->echo);
+        sc_unpack_load_echo(payload, (size_t)got, &r->load);
     }
     r->garbled = (int)r->decoder.garbled;
 }

@@ -1,6 +1,6 @@
 """The strange device and the firmware's core answer alike to the same bytes, tick by tick.
 
-Both were written from docs/protocol.md by themselves. Each script is what a host sends in each tick;
+Both were written from docs/protocol.md by themselves. A script is what a host sends in each tick;
 compared are the replies and, of each STATE, sequence, cause and flags.
 """
 

@@ -262,11 +262,12 @@ static void check_heat(void)
     rig r;
     const fw_board board = sound_board();
     start_streaming(&r, &board);
+    commanded_ticks(&r, 3000, ENABLE, 0.0f); /* a motor at rest gets no colder than it is */
     r.in.inputs.current = 4.0f; /* 16 - 4 = 12 A^2: 10 A^2 s last 833 ms */
     commanded_ticks(&r, 820, ENABLE, 0.4f);
     CHECK(r.state.cause == SC_CAUSE_NONE, "not yet");
     commanded_ticks(&r, 30, ENABLE, 0.4f);
-    CHECK(r.state.cause == SC_CAUSE_HEAT, "too hot");
+    CHECK(r.state.cause == SC_CAUSE_CURRENT, "current squared over time");
     r.in.inputs.current = 0.0f;
     commanded_ticks(&r, 200, ENABLE | CLEAR, 0.0f);
     CHECK(r.state.cause == SC_CAUSE_NONE, "cool again");
@@ -275,7 +276,7 @@ static void check_heat(void)
     start_streaming(&r, &blind);
     r.in.inputs.current = 99.0f;
     commanded_ticks(&r, 860, ENABLE, 0.4f);
-    CHECK(r.state.cause == SC_CAUSE_HEAT, "from the torque, where no current is measured");
+    CHECK(r.state.cause == SC_CAUSE_CURRENT, "from the torque, where no current is measured");
     CHECK(r.state.motor_torque == 0.0f, "a blind device sends what it gives: 0 while it brakes");
 }
 
@@ -439,6 +440,31 @@ static void check_line(void)
     CHECK(r.identities == 6 && r.garbled == 0, "whole replies as far as there is room");
 }
 
+/* A core without memory for an image, as most boards are. */
+static void check_no_rendering(void)
+{
+    rig r;
+    uint8_t payload[SC_SIZE_LOAD_CHUNK];
+    const fw_board board = sound_board();
+    const sc_load_begin begin = {1, 11, 100, 12};
+    const sc_load_chunk chunk = {4, 12, 0, {0}};
+    const sc_load_commit commit = {13};
+    CHECK(start(&r, &board), "possible");
+    put(&r, payload, sc_pack_load_begin(&begin, payload));
+    tick(&r);
+    CHECK(r.load.status == SC_LOAD_OTHER_FORMAT && r.load.nonce == 11, "begin");
+    put(&r, payload, sc_pack_load_chunk(&chunk, payload));
+    tick(&r);
+    CHECK(r.load.status == SC_LOAD_NOT_ANNOUNCED && r.load.nonce == 12, "chunk");
+    put(&r, payload, sc_pack_load_commit(&commit, payload));
+    tick(&r);
+    CHECK(r.load.status == SC_LOAD_NOT_ANNOUNCED && r.load.nonce == 13, "commit");
+    CHECK(r.load.capacity == 0 && r.load.received == 0 && r.load.crc32 == 0, "holds nothing");
+    set(&r, SC_KEY_RENDER, 1.0f);
+    tick(&r);
+    CHECK(r.echo.status == SC_CONFIG_UNKNOWN_KEY, "no such key");
+}
+
 static void check_timer(void)
 {
     CHECK(fw_extend_us(0, 65535, 16) == 65535u, "first");
@@ -519,6 +545,7 @@ int main(void)
     check_homing();
     check_homing_that_fails();
     check_line();
+    check_no_rendering();
     check_timer();
     check_boards();
     return checks_done("core");

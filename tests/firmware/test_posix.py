@@ -1,25 +1,28 @@
-"""The firmware as a process on a pseudo-terminal, in real time: a probe and a capture with its fit."""
+"""The firmware as a process on a pseudo-terminal, in real time: probe, capture and fit."""
 
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from scissorcal.workday import Workspace
-from scissorcal.workday.engine import Engine
-from scissorcal.workday.runs.fit import load_result
-from tests.cli.conftest import Cli
-from tests.cli.conftest import cli as cli
+from scissorcal.device import Operator
+from scissorcal.verdicts import failed
+from scissorcal.workday.options import RigOptions
+from scissorcal.workday.runs.capture import capture_into
+from scissorcal.workday.runs.fit import fit_workspace
+from scissorcal.workday.runs.probe import probe_device
+from scissorcal.workday.workspace import create_workspace
 
 from .test_c_tests import BUILD, make
 
-pytestmark = [pytest.mark.realtime, pytest.mark.probes]
+pytestmark = pytest.mark.realtime
 
-INERTIA, COULOMB, VISCOUS = 3e-4, 0.012, 2e-3
+TRUTH = {"inertia": 3e-4, "coulomb_pos": 0.012, "viscous_pos": 2e-3}
 """Of the blades in firmware/boards/posix.c, SI."""
-CAPTURE = """
-[capture.friction]
+MOST_SDS = 3.0
+CAPTURE = """[capture.friction]
 speeds_rad_per_s = [0.2, 0.6, 1.5]
 repeats = 2
 excitation_s = 8.0
@@ -27,33 +30,55 @@ excitation_s = 8.0
 
 
 @pytest.fixture
-def port() -> Iterator[str]:
+def board() -> Iterator[subprocess.Popen[str]]:
     make("all")
     with subprocess.Popen(
         [BUILD / "posix"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as board:
-        assert board.stdout is not None
-        yield board.stdout.readline().strip()
+        yield board
         assert board.poll() is None
         board.communicate()  # it ends with its stdin
     assert board.returncode == 0
 
 
+class Person:
+    """A confirm callback: its hand moves the blades as a sentence asks, and then lets go."""
+
+    def __init__(self, board: subprocess.Popen[str]) -> None:
+        self._board = board
+
+    def __call__(self, request: str) -> None:
+        if "close the blades by hand" in request:
+            self._hand("c")
+        elif "open the blades by hand" in request:
+            self._hand("o")
+        elif "half open" in request:
+            self._hand("h")
+            self._hand("l")
+
+    def _hand(self, letter: str) -> None:
+        assert self._board.stdin is not None
+        self._board.stdin.write(letter)
+        self._board.stdin.flush()
+        time.sleep(1.0)
+
+
 def test_probe_friction_and_fit_through_the_process(
-    cli: Cli, port: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    board: subprocess.Popen[str], tmp_path: Path
 ) -> None:
-    workspace = Workspace(tmp_path / "paper")
-    assert cli("init", workspace.root, "--recipe", "paper-80gsm").code == 0
+    assert board.stdout is not None
+    rig, operator = RigOptions(board.stdout.readline().strip()), Operator(Person(board))
+    workspace = create_workspace(tmp_path / "paper", "paper-80gsm")
     text = workspace.recipe_path.read_text(encoding="utf-8")
-    workspace.recipe_path.write_text(text + CAPTURE, encoding="utf-8")
-    monkeypatch.chdir(workspace.root)
-    for words in (
-        ("device", "probe", "--device", port, "--yes"),
-        ("capture", "friction", "--device", port, "--yes"),
-        ("fit", "friction"),
-    ):
-        said = cli(*words)
-        assert said.code == 0, (words, said.out, said.err)
-    fit = load_result(Engine.of(workspace), "friction")
-    found = {row.name: row for row in fit.parameters}
-    assert found["inertia"].q50 == pytest.approx(INERTIA, rel=0.05)
+    before, _, after = text.partition("[capture.friction]")
+    text = before + CAPTURE + "[capture.cut]" + after.partition("[capture.cut]")[2]
+    workspace.recipe_path.write_text(text, encoding="utf-8")
+    found = probe_device(workspace.recipe(), rig, operator, workspace=workspace)
+    assert not failed(found.verdicts)
+    capture_into(workspace, "friction", rig, operator=operator)
+    (outcome,) = fit_workspace(workspace, ("friction",))
+    assert not failed(outcome.result.verdicts)
+    for name, truth in TRUTH.items():
+        (row,) = (row for row in outcome.result.parameters if row.name == name)
+        sd = (row.q95 - row.q05) / 3.29
+        assert abs(row.q50 - truth) <= MOST_SDS * sd, (name, row.q50, sd)

@@ -1,7 +1,7 @@
 """``scissorcal device``"""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -18,6 +18,7 @@ _COMMANDS = {
     "probe": ("scissorcal.cli.device:probe", "Check a rig before its motors run."),
     "home": ("scissorcal.cli.device_home:home", "Have a device find the zero of its encoders."),
     "simulate": ("scissorcal.cli.device:simulate", "Serve a virtual rig on a pseudo-terminal."),
+    "bridge": ("scissorcal.cli.device:bridge", "Serve a motor controller on a pseudo-terminal."),
 }
 
 
@@ -138,6 +139,46 @@ def simulate(
         "stalls": ended.stalls,
         "unplugged": ended.unplugged,
     }
+    return Answer(result, text)
+
+
+@command
+def bridge(
+    controller: Annotated[
+        Literal["moteus"], typer.Argument(help="The controller: moteus, by its maker's client.")
+    ],
+    board: Annotated[
+        Path,
+        typer.Option("--board", dir_okay=False, help="A TOML file with the rig's constants."),
+    ],
+) -> Answer:
+    """Serve a motor controller as a device of scissorcal, until interrupted.
+
+    The firmware's core runs in this process: limits, watchdog, faults and stops are its own, and
+    each tick makes one exchange with the controller. The port's path is the first line on stdout
+    (on stderr with --json, where stdout has one object at the end). docs/bridge.md has the
+    constants, and how to write the class for another controller. Not yet run on hardware.
+
+    \b
+    Example:
+      $ scissorcal device bridge moteus --board board.toml
+      /dev/pts/0
+    """
+    from scissorcal.device.bridge import read_board, serve_bridge
+    from scissorcal.device.moteus import open_moteus
+
+    constants, options = read_board(board)
+    opened = open_moteus(constants.torque_limit, options)
+    announced: list[str] = []
+
+    def announce(path: str) -> None:
+        announced.append(path)
+        echo(path, err=stdout_is_for_json())
+        note(f"Serving {controller} {constants.serial}; interrupt (Ctrl-C) to end it.")
+
+    ended = serve_bridge(constants, opened, announce)
+    text = f"ended after {ended.ticks} ticks; the machine held it up {ended.stalls} times"
+    result = {"port": announced[0], "ticks": ended.ticks, "stalls": ended.stalls}
     return Answer(result, text)
 
 

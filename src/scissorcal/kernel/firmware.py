@@ -157,6 +157,11 @@ class FirmwareCore:
         """Frames from the host that were discarded."""
         return int(self._core.decoder.garbled)
 
+    @property
+    def brake_after_ms(self) -> float:
+        """BRAKE_AFTER_MS in force."""
+        return float(self._core.brake_after_ms)
+
     def tick(self, inputs: FirmwareInputs, received: bytes = b"") -> FirmwareOutputs:
         """Pass one tick; bytes beyond a record's room are taken before it."""
         room = int(lib.FW_RECORD_RECEIVED)

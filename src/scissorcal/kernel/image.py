@@ -15,12 +15,15 @@ from scissorcal.kernel.tables import TABLE_NAMES, ModelTables, model_struct
 IMAGE_FORMAT = 1
 _MAGIC = int.from_bytes(b"SCMI", "little")
 _WHOLE = ("moving_blades", "closure", "render_friction", "release_falls")
-_REAL = ("upper_face", "fracture_energy", "kappa", "rate_damping", "friction_rate_eps")
-_REAL += ("handle_radius", "tip_station")
-_REAL += ("opening_min", "opening_max", "contact_min", "contact_max")
+_REAL = (
+    *("upper_face", "fracture_energy", "kappa", "rate_damping", "friction_rate_eps"),
+    *("handle_radius", "tip_station", "opening_min", "opening_max", "contact_min", "contact_max"),
+)
 _LIMITS = ("torque_limit", "torque_slew", "force_limit", "force_slew", "ramp_s", "rate_cutoff_Hz")
-_OBSERVED = ("friction_width", "is_measured", "rig_damping", "rig_coulomb", "margin_J")
-_OBSERVED += ("most_damping",)
+_OBSERVED = (
+    *("friction_width", "is_measured", "rig_damping", "rig_coulomb"),
+    *("margin_J", "most_damping"),
+)
 
 
 def model_image(tables: ModelTables, config: ServoConfig) -> bytes:

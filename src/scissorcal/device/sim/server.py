@@ -22,7 +22,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from types import FrameType
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -35,6 +35,23 @@ from scissorcal.errors import ScissorcalError, needs_unix
 CATCH_UP_TICKS = 5
 WAITING_FRAMES = 256
 READ_BYTES = 4096
+
+
+class Side(Protocol):
+    """What of a device is served: see `scissorcal.device.lockstep.DeviceSide`."""
+
+    @property
+    def unplugged(self) -> bool:
+        """Whether its cable has been pulled."""
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the host."""
+
+    def tick(self) -> None:
+        """Advance one tick."""
+
+    def take(self) -> list[bytes]:
+        """Frames that are due for the host."""
 
 
 class ServeReport(NamedTuple):
@@ -60,25 +77,35 @@ def serve(
     """
     rig_rng, line_rng = np.random.default_rng(seed).spawn(2)
     protocol = RigProtocol(VirtualRig(specimen, rig_rng), line_rng, faults)
+    return serve_side(protocol, TICK_S, announce, should_stop)
+
+
+def serve_side(
+    side: Side,
+    tick_s: float,
+    announce: Callable[[str], None],
+    should_stop: Callable[[], bool] = lambda: False,
+) -> ServeReport:
+    """Serve any device side on a new pseudo-terminal, a tick each ``tick_s``; as `serve`."""
     stopping = _StopSignals()
     with _Port() as port, stopping:
         announce(port.path)
         parent = _ParentPipe()
         ticks = stalls = 0
-        due = time.monotonic() + TICK_S
-        while not (stopping.caught or parent.closed or protocol.unplugged or should_stop()):
+        due = time.monotonic() + tick_s
+        while not (stopping.caught or parent.closed or side.unplugged or should_stop()):
             parent.wait(due - time.monotonic())
-            late = int((time.monotonic() - due) / TICK_S)
+            late = int((time.monotonic() - due) / tick_s)
             if late >= CATCH_UP_TICKS:
-                due += (late - CATCH_UP_TICKS + 1) * TICK_S
+                due += (late - CATCH_UP_TICKS + 1) * tick_s
                 stalls += 1
-            while due <= time.monotonic() and not protocol.unplugged:
-                protocol.receive(port.read())
-                protocol.tick()
-                port.write(protocol.take())
-                due += TICK_S
+            while due <= time.monotonic() and not side.unplugged:
+                side.receive(port.read())
+                side.tick()
+                port.write(side.take())
+                due += tick_s
                 ticks += 1
-    return ServeReport(ticks, stalls, protocol.unplugged)
+    return ServeReport(ticks, stalls, side.unplugged)
 
 
 def main(arguments: list[str] | None = None) -> int:
