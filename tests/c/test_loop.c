@@ -117,7 +117,7 @@ static void run_once(int hang_up)
     if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0) {
         exit(2);
     }
-    device rig = {ends[1], block, 0, 0, 0.0f, {0, 0, 0.0f, 0.0f}, hang_up, 0};
+    device rig = {ends[1], block, 0, 0, 0.0f, {0, 0, 0, 0.0f, 0.0f}, hang_up, 0};
     sc_block_order(block, SC_MODE_DAMP);
     pthread_create(&thread, NULL, play_device, &rig);
     const uint32_t reason = sc_loop_run(ends[0], block);
@@ -171,7 +171,7 @@ static void run_latched(int clears)
         exit(2);
     }
     block->config.fault_clearings = 1;
-    device rig = {ends[1], block, 0, 0, 0.0f, {0, 0, 0.0f, 0.0f}, 0, clears};
+    device rig = {ends[1], block, 0, 0, 0.0f, {0, 0, 0, 0.0f, 0.0f}, 0, clears};
     sc_block_order(block, SC_MODE_DAMP);
     pthread_create(&thread, NULL, play_latched, &rig);
     const uint32_t reason = sc_loop_run(ends[0], block);

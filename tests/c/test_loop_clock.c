@@ -32,6 +32,7 @@ static struct {
     int commands;
     sc_decoder decoder;  /* of the commands */
     float largest;       /* torque of a command */
+    int64_t held_up_ns;  /* as the loop noted it */
 } world;
 
 static int made_up_clock(clockid_t clock, struct timespec *now)
@@ -146,6 +147,8 @@ static uint32_t run_in(uint32_t mode, float damping, int64_t pause_ns, int falls
     const int line = open("/dev/null", O_RDWR);
     const uint32_t reason = run_by_the_made_up_clock(line, block);
     close(line);
+    world.held_up_ns = block->held_up_ns;
+    CHECK(block->recent_held_up_ns == block->held_up_ns, "the longest of the last seconds");
     CHECK(block->servo.frames == world.sequence, "every state is taken");
     free(block);
     return reason;
@@ -161,11 +164,14 @@ int main(void)
     const int64_t ms = 1000000;
     CHECK(run(0, 0, 1) == SC_STOP_ASKED, "nothing happens");
     CHECK(world.commands == BEFORE + AFTER + FAREWELLS, "each state is answered");
+    CHECK(world.held_up_ns == 0, "the loop ran all the time");
 
     CHECK(run(1300 * ms, 0, 1) == SC_STOP_ASKED, "a pause of this computer is no silence");
+    NEAR((double)world.held_up_ns / 1e6, 1300.0, 2.0 * POLL_MS, "ms", "and is noted as such");
 
     CHECK(run(0, 1, 1) == SC_STOP_SILENCE, "a device that falls silent ends the loop");
     NEAR((double)(world.now_ns - world.sent_ns) / 1e6, LIMIT_MS, 2.0 * POLL_MS, "after", "silence");
+    CHECK(world.held_up_ns == 0, "the device was silent, and this computer ran");
 
     CHECK(run(0, 0, 0) == SC_STOP_SUPERVISOR_LOST, "a supervisor that falls silent ends the loop");
     NEAR(world.sequence - BEFORE, 5 * SUPERVISOR_MS, 2, "after", "supervisor");

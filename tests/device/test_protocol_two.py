@@ -1,12 +1,18 @@
 """What version 2 of the protocol adds: causes of faults, homing; version 1 is served as before."""
 
+import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from scissorcal.device import Faults, LockstepLink, SimProcess, open_link, open_motion
-from scissorcal.device.faults import fault_sentence
+from scissorcal.device.faults import fault_sentence, stop_sentence
+from scissorcal.device.motion import loop_verdicts
+from scissorcal.device.probe.idle import idle
+from scissorcal.device.probe.judge import judge_idle
+from scissorcal.device.probe.talk import Bounds, Talk
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     EARLIER_SCHEMAS,
@@ -24,6 +30,7 @@ from scissorcal.kernel import (
     ServoConfig,
     State,
     StateFlag,
+    StopReason,
     decode,
     encode,
 )
@@ -110,6 +117,55 @@ def test_a_device_of_version_1_states_no_cause() -> None:
     message = str(stops_with(FaultCause.HEAT, protocol_version=1))
     assert message.startswith("The device latched a fault that did not clear")
     assert "HEAT" not in message
+
+
+def test_a_loop_that_did_not_run_is_named_first() -> None:
+    for reason in (StopReason.SILENCE, StopReason.TRACKING_LOST, StopReason.DEVICE_FAULT):
+        sentence = stop_sentence(reason, FaultCause.WATCHDOG, 1.0)
+        assert sentence.startswith("This computer did not run the servo loop for 1000 ms")
+        assert stop_sentence(reason, 0, 0.0) == reason.sentence
+    heat = stop_sentence(StopReason.DEVICE_FAULT, FaultCause.HEAT, 1.0)
+    assert heat.startswith("Motor or driver is too hot")
+    unplugged = stop_sentence(StopReason.RESTARTED, 0, 1.0)
+    assert unplugged == StopReason.RESTARTED.sentence
+
+
+@pytest.mark.parametrize("cause", [FaultCause.HEAT, FaultCause.NONE])
+def test_the_verdict_on_faults_names_the_last_cause(cause: FaultCause) -> None:
+    with rig() as link, open_motion(link, limits()) as motion:
+        report = motion.report()
+    counters = replace(report.counters, faults=9)
+    report = replace(report, counters=counters, fault_cause=int(cause))
+    (why,) = (v.why for v in loop_verdicts("render", report, None, 1000) if "faults" in v.check)
+    assert ("too hot" in why) is (cause is FaultCause.HEAT)
+    assert ("device doctor" in why) is (cause is FaultCause.NONE)
+
+
+@pytest.mark.parametrize("noticed", [True, False])
+def test_what_this_computer_missed_is_no_loss_of_the_line(noticed: bool) -> None:
+    """A host that is away for 300 ticks of the idle second; it knows of it, or not."""
+    link = VirtualPort(StrangeDevice(version=2))
+    with Talk(link, Bounds(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)) as talk:
+        exchange, passed = link.exchange, itertools.count()
+
+        def away(frame: bytes | None) -> list[bytes]:
+            if next(passed) == 400:
+                for _ in range(300):
+                    exchange(None)
+                if noticed:
+                    talk._held_up.append((talk.mark(), 0.3))
+            return exchange(frame)
+
+        link.exchange = away  # type: ignore[method-assign]
+        found = idle(talk)
+    (verdict,) = (v for v in judge_idle(found, link.identity, 60.0) if "lost" in v.check)
+    if noticed:
+        assert (found.lost_share, found.held_up_s) == (0.0, 0.3)
+        assert "did not listen for up to 300 ms" in verdict.why
+        assert verdict.status == "pass"
+    else:
+        assert found.lost_share > 0.1
+        assert verdict.status == "fail"
 
 
 def test_every_cause_has_one_sentence_of_its_own_with_a_remedy() -> None:

@@ -162,7 +162,7 @@ def test_any_payload_survives_and_noise_before_it_costs_one_frame(
     assert decoder.garbled <= noise.count(b"\0") + 1
 
 
-@given(st.builds(State, u16, u32, u32, f32, f32, f32, f32))
+@given(st.builds(State, u16, u32, u32, f32, f32, f32, f32, st.integers(0, 255)))
 def test_states_survive_bit_for_bit(state: State) -> None:
     frame = encode(state)
     (payload,) = FrameDecoder().feed(frame)

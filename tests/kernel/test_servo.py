@@ -196,7 +196,7 @@ def test_the_stop_latches() -> None:
     for _ in range(150):
         assert servo.step(next(states)).flags == ENABLE
     servo.stop()
-    assert servo.step(next(states))[2:] == (0.0, 0.0)
+    assert servo.step(next(states))[2:4] == (0.0, 0.0)
     servo.engage(Mode.RENDER)
     for _ in range(50):
         command = servo.step(next(states))
@@ -335,7 +335,7 @@ def test_faults_are_cleared_a_limited_number_of_times_and_forces_ramp_up_again()
         command = servo.step(next(states)._replace(flags=int(StateFlag.FAULT_LATCHED)))
         if fault < 2:
             assert command[0] == ENABLE | CLEAR_FAULT
-            assert command[2:] == (0.0, 0.0)
+            assert command[2:4] == (0.0, 0.0)
             assert abs(servo.step(next(states)).force) < 0.02
     assert servo.stop_reason is StopReason.DEVICE_FAULT
     assert command.flags == 0

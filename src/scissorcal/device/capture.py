@@ -305,8 +305,8 @@ class _KeepingRecorder(Recorder):
         super().__init__(writer, coverage)
         self._blocks: list[NDArray[np.void]] = []
 
-    def take(self, samples: NDArray[np.void], garbled: int = 0) -> None:
-        super().take(samples, garbled)
+    def take(self, samples: NDArray[np.void], garbled: int = 0, cause: int = 0) -> None:
+        super().take(samples, garbled, cause)
         if len(samples):
             self._blocks.append(samples.copy())
 

@@ -77,7 +77,7 @@ class Drive:
             self._take(samples, doing)
 
     def _take(self, samples: Samples, sentence: str) -> None:
-        self._recorder.take(samples, self._motion.garbled)
+        self._recorder.take(samples, self._motion.garbled, self._motion.fault_cause)
         for stroke in self._load.take(samples) if self._load and len(samples) else ():
             self._recorder.unloaded(stroke)
             self._tell(self._done / self._total, unloaded_sentence(stroke), self._recorder)

@@ -111,7 +111,7 @@ class _Watch:
                 return False
 
     def _take(self, samples: Samples, stride: int) -> None:
-        self._recorder.take(samples, self._motion.garbled)
+        self._recorder.take(samples, self._motion.garbled, self._motion.fault_cause)
         self._time.append(samples["device_time_us"][::stride] * 1e-6)
         self._opening.append(samples["opening"][::stride])
 
@@ -134,7 +134,7 @@ def _bring_back(motion: Motion, recipe: Recipe, recorder: Recorder, loader: Load
     recorder.writer.mark_sheet(-1)
     start = cut_plan(recipe, motion.identity).segments[0].reference.head()
     for samples in motion.track(start):
-        recorder.take(samples, motion.garbled)
+        recorder.take(samples, motion.garbled, motion.fault_cause)
 
 
 def _rest_s(time: NDArray[np.float64], opening: NDArray[np.float64], within: float) -> float:

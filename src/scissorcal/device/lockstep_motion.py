@@ -118,6 +118,7 @@ class LockstepMotion(Motion):
             lag=FeltLag.of(self._servo.lag, self.tick_s, self._round_trip_s),
             rights=None,
             watched=self._servo.watched,
+            fault_cause=self.fault_cause,
         )
 
     def close(self) -> None:

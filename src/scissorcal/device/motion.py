@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.device.faults import stop_sentence
+from scissorcal.device.faults import fault_sentence, stop_sentence
 from scissorcal.device.paths import Reference
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
 from scissorcal.device.trajectory import approach, check_reference
@@ -60,7 +60,8 @@ class MotionReport:
     command) and ``interval`` (between frames) are in microseconds, None in virtual time. ``lag`` is
     what a hand feels of all delays; ``rights`` are what the system granted the loop, None in
     virtual time. ``watched`` is the largest value that each watch has seen, as a share of what
-    stops. ``held_up_s`` is the longest time in which this computer did not run the loop.
+    stops. ``held_up_s`` is the longest time in which this computer did not run the loop,
+    ``fault_cause`` that of the device's last fault.
     """
 
     counters: ServoCounters
@@ -76,6 +77,7 @@ class MotionReport:
     rights: LoopRights | None
     watched: Mapping[str, float] = field(default_factory=dict)
     held_up_s: float = 0.0
+    fault_cause: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,13 +283,18 @@ class Motion(AbstractContextManager["Motion"], ABC):
         """The error where the link to the rig failed, None where the servo itself stopped."""
 
     @property
+    def fault_cause(self) -> int:
+        """`FaultCause` of the last fault, 0 without one or where the device states none."""
+        return self._servo.fault_cause
+
+    @property
     def held_up_s(self) -> float:
         """Longest time, lately, in which this computer did not run the loop."""
         return 0.0
 
     @property
     def _stop_sentence(self) -> str:
-        return stop_sentence(self.stop_reason, self._servo.fault_cause, self.held_up_s)
+        return stop_sentence(self.stop_reason, self.fault_cause, self.held_up_s)
 
     def refuse_not_homed(self) -> None:
         """Raise DeviceError, with the motors off, where the device does not know its zero."""
@@ -382,10 +389,9 @@ def _faultless(scope: str, report: MotionReport, tick_us: int) -> Verdict:
     allowed = 1.0 + MOST_FAULTS_PER_S * counters.frames * tick_us * 1e-6
     why = f"The device latched a fault {counters.faults} times ({allowed:.3g} allowed)."
     if counters.faults:
-        why += (
-            " After each the force was ramped up from zero. If nothing else caused them, commands "
-            "were too late: run 'scissorcal device doctor'."
-        )
+        late = "If nothing else caused them, commands were too late: 'scissorcal device doctor'."
+        why += " After each the force was ramped up from zero. "
+        why += fault_sentence(report.fault_cause) or late
     return FAULTS[scope].judge(counters.faults, why, threshold=allowed)
 
 

@@ -166,6 +166,7 @@ class PortMotion(Motion):
             rights=LoopRights(*block.rights),
             watched=block.watched,
             held_up_s=block.held_up_s,
+            fault_cause=block.fault_cause,
         )
 
     def close(self) -> None:

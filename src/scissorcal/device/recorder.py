@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.device.coverage import CoverageGrid, CoveredAxis
+from scissorcal.device.faults import fault_sentence
 from scissorcal.kernel import StateFlag
 from scissorcal.recording import RecordingWriter, Stroke
 from scissorcal.recording.recording import UNLOADED_MARK, missing_frames
@@ -62,13 +63,17 @@ class Recorder:
         self._count()
         return self._coverage
 
-    def take(self, samples: NDArray[np.void], garbled: int = 0) -> None:
-        """Record a block; ``garbled`` is the number of frames discarded since the start."""
+    def take(self, samples: NDArray[np.void], garbled: int = 0, cause: int = 0) -> None:
+        """Record a block.
+
+        ``garbled`` is the number of frames discarded since the start, ``cause`` that of the last
+        fault, where the device states it.
+        """
         if len(samples) == 0:
             self.writer.poll(time.time_ns())
         else:
             self._note_gaps(samples)
-            self._note_faults(samples)
+            self._note_faults(samples, cause)
             self.writer.append(samples)
             self._uncounted.append(samples)
             if len(self._uncounted) >= COUNTED_AT_ONCE:
@@ -120,7 +125,7 @@ class Recorder:
             at = f"frame {sequence[index]} ({self._sample_time(samples[index]):.3f} s)"
             self._note("gap", f"{_frames(missing)} missing before {at}.")
 
-    def _note_faults(self, samples: NDArray[np.void]) -> None:
+    def _note_faults(self, samples: NDArray[np.void], cause: int) -> None:
         """Note each time a fault latches after the motors were first enabled."""
         faulty = (samples["flags"] & int(StateFlag.FAULT_LATCHED)) != 0
         enabled = (samples["flags"] & int(StateFlag.MOTOR_ENABLED)) != 0
@@ -131,12 +136,10 @@ class Recorder:
             flags = StateFlag(int(samples["flags"][index]) & 0xFFFF)
             names = ", ".join(flag.name or "" for flag in flags)
             at = f"{self._sample_time(samples[index]):.3f} s"
-            late = (
-                " Close programs that load this computer."
-                if StateFlag.COMMANDS_LOST in flags
-                else ""
-            )
-            self._note("fault", f"The device latched a fault at {at} ({names}).{late}")
+            late = StateFlag.COMMANDS_LOST in flags
+            why = "Close programs that load this computer." if late else ""
+            why = fault_sentence(cause) or why
+            self._note("fault", f"The device latched a fault at {at} ({names}). {why}".strip())
         self._faulty = bool(faulty[-1])
         self._enabled_once = bool(since[-1])
 

@@ -40,6 +40,28 @@ def test_a_heavy_device_that_clips_passes(late_s: float) -> None:
     assert device.largest_rate < RECIPE.rig.probe.largest_rate_rad_per_s
 
 
+class Holding(VirtualPort):
+    """Notes the hold_ticks of every COMMAND."""
+
+    def __init__(self, device: StrangeDevice) -> None:
+        self.holds: list[int] = []
+        super().__init__(device)
+
+    def exchange(self, command_frame: bytes | None) -> list[bytes]:
+        payload = wire.payload_of(command_frame[:-1]) if command_frame else None
+        if payload and payload[0] == wire.COMMAND:
+            self.holds.append(payload[1])
+        return super().exchange(command_frame)
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_device_of_version_2_is_told_to_strike_for_one_tick(version: int) -> None:
+    line = Holding(StrangeDevice(heavy(), seed=1, version=version))
+    assert clipping_of(line).status == "pass"
+    assert line.holds.count(1) == (version == 2)
+    assert set(line.holds) <= {0, 1}
+
+
 @pytest.mark.parametrize("late_s", LATE_S)
 def test_a_heavy_device_that_does_not_clip_fails(late_s: float) -> None:
     device = StrangeDevice(heavy(late_s, clips=False), seed=1)

@@ -4,7 +4,6 @@ A stage of the probe is a generator: it yields the command that answers a state 
 state back, so that it reads from top to bottom. Limits are kept here, whatever a stage asks for.
 """
 
-import math
 import select
 import time
 from collections.abc import Generator, Iterator
@@ -15,17 +14,16 @@ from typing import NamedTuple, TypeVar, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.device.faults import fault_sentence
 from scissorcal.device.link import Link, PortLink
 from scissorcal.device.lockstep_motion import Exchanging
-from scissorcal.device.motion import RELEASE_COMMANDS, SILENCE_S, STOP_MARGIN_RAD
+from scissorcal.device.motion import RELEASE_COMMANDS, SILENCE_S
+from scissorcal.device.probe.unsound import STAMPS, what_is_wrong
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     PROTOCOL_VERSION,
     Command,
     CommandFlag,
     ConfigKey,
-    FaultCause,
     State,
     StateFlag,
     StopReason,
@@ -33,7 +31,7 @@ from scissorcal.kernel import (
     encode,
 )
 from scissorcal.kernel.loop import STALL_TICKS
-from scissorcal.kernel.servo import LEAP_RATES, OPENING_RATE_LIMIT, STUCK_FRAMES
+from scissorcal.kernel.servo import STUCK_FRAMES
 
 LINE = "the line, before a motor runs"
 LISTEN_S = 5e-3
@@ -50,10 +48,6 @@ Done = TypeVar("Done")
 RATE_OVER_S = 4e-3
 """Rates are taken over four ticks of 1 kHz: a step of 2 pi / 20,000 then is 0.08 rad/s."""
 U32 = 2**32
-STAMPS, STAMPS_WRONG = 20, 8
-"""Wrong intervals of the last ones that stop a rig, as the core's watch counts them (sc_stamp.c has
-the false-alarm rate)."""
-
 MEASURED = tuple(name for name, kind in get_type_hints(State).items() if kind is float)
 """The numbers that a device measures, by their names in STATE."""
 HEARD = np.dtype(
@@ -343,7 +337,7 @@ class Talk(AbstractContextManager["Talk"]):
 
     def _check(self, state: State) -> None:
         """Raise where sensors or clock show what no motor may run with."""
-        wrong = self._what_is_wrong(state)
+        wrong = what_is_wrong(state, self.identity, self.heard(-1 - STAMPS), self._restarted)
         if wrong:
             self.release()
             raise RunawayError(f"{self.name}: {wrong} The motors are off.")
@@ -382,44 +376,6 @@ class Talk(AbstractContextManager["Talk"]):
                 "keys. The motors are off."
             )
 
-    def _what_is_wrong(self, state: State) -> str:
-        """What no motor may run with, as a sentence; empty where nothing is."""
-        numbers = (state.opening, state.advance, state.motor_torque)
-        if not all(math.isfinite(number) for number in numbers):
-            return "it sent an opening, advance or torque that is no number; check its sensors."
-        if state.flags & StateFlag.NOT_HOMED:
-            return f"it no longer knows its zero. {StopReason.NOT_HOMED.sentence}"
-        if state.flags & StateFlag.ENCODER_FAULT:
-            return "it reports a fault of its encoder; check the encoder and its cable."
-        if state.cause not in (FaultCause.NONE, FaultCause.WATCHDOG):
-            return fault_sentence(state.cause)
-        low, high = self.identity.opening_min, self.identity.opening_max
-        if not low - STOP_MARGIN_RAD <= state.opening <= high + STOP_MARGIN_RAD:
-            return (
-                f"its opening is {state.opening:.3g} rad, beyond the stops that it states "
-                f"({low:.3g} to {high:.3g}); home the encoder, or correct its scale."
-            )
-        recent = self._rows[-1 - STAMPS_WRONG :]
-        if len(recent) > STAMPS_WRONG and recent[0][1] == recent[-1][1]:
-            return f"its clock (device_us) stood still for {STAMPS_WRONG} frames; restart it."
-        if self._restarted:
-            return "its sequence began again: it restarted. Check its supply."
-        wrong = contradictions(self.heard(-1 - STAMPS), self.identity.tick_us)
-        if wrong >= STAMPS_WRONG:
-            return (
-                f"its clock (device_us) contradicted its sequence numbers in {wrong} of the last "
-                f"{STAMPS} states, so one of them leaps; correct it in the firmware."
-            )
-        if len(recent) > 1:
-            leap = abs(recent[-1][3] - recent[-2][3])
-            passed_s = (recent[-1][0] - recent[-2][0]) * self.tick_s
-            if leap > LEAP_RATES * OPENING_RATE_LIMIT * passed_s:
-                return (
-                    f"the opening leapt by {leap:.2g} rad within a frame; check the encoder and "
-                    "its cable."
-                )
-        return ""
-
     def _rates(self) -> tuple[float, float]:
         """Magnitudes of the rates (rad/s, m/s) over the last few ticks."""
         now = self._rows[-1]
@@ -429,13 +385,6 @@ class Talk(AbstractContextManager["Talk"]):
         if time_s <= 0.0:
             return 0.0, 0.0
         return abs(now[3] - then[3]) / time_s, abs(now[4] - then[4]) / time_s
-
-
-def contradictions(heard: NDArray[np.void], tick_us: float) -> int:
-    """In how many intervals clock and sequence differ by more than a factor of two (sc_stamp.c)."""
-    by_ticks = tick_us * np.diff(heard["sequence"])
-    stated = np.diff(heard["device_us"])
-    return int(np.count_nonzero((2 * stated < by_ticks) | (stated > 2 * by_ticks)))
 
 
 def _clipped(value: float, limit: float) -> float:
