@@ -1,4 +1,4 @@
-"""The flashed binary as the device of a day: probe, friction capture and fit, in lockstep."""
+"""The flashed binary as the device of a day: probe, captures and fits, in lockstep."""
 
 import time
 from functools import partial
@@ -7,12 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device import Faults, LockstepLink, VirtualRig, lockstep
-from scissorcal.device.sim.specimen import load_specimen
-from scissorcal.workday import Workspace
-from scissorcal.workday.demo.day import judge
-from scissorcal.workday.engine import Engine
-from scissorcal.workday.runs.fit import load_result
+from scissorcal.device import Faults, LockstepLink, VirtualRig, load_specimen, lockstep
+from scissorcal.workday import Engine, Workspace
+from scissorcal.workday.demo import day
+from scissorcal.workday.runs import fit as fits
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli
 
@@ -46,7 +44,7 @@ class EmulatedSide(FirmwareSide):
 
 @pytest.mark.slow
 @pytest.mark.probes
-def test_a_probe_and_a_friction_fit_through_the_flashed_binary(
+def test_a_day_through_the_flashed_binary(
     stm32f405: Image, cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     through = partial(LockstepLink, device=partial(EmulatedSide, stm32f405))
@@ -57,15 +55,17 @@ def test_a_probe_and_a_friction_fit_through_the_flashed_binary(
     for words in (
         ("device", "probe", "--device", "sim"),
         ("capture", "friction", "--device", "sim"),
-        ("fit", "friction"),
+        ("capture", "cut", "--device", "sim"),
+        ("fit",),
     ):
         said = cli(*words)
         assert said.code == 0, (words, said.out, said.err)
     assert EmulatedSide.ticks > 10_000
     print(f"{EmulatedSide.ticks} ticks, {EmulatedSide.ticks / EmulatedSide.spent_s:.0f} a second")
-    fit = load_result(Engine.of(workspace), "friction")
-    for row in judge(fit, load_specimen(SPECIMEN)):
-        if row.truth is not None:
-            sd = (row.high - row.low) / 3.29
-            print(f"{row.name}: {(row.estimate - row.truth) / sd:+.2f} sd")
-            assert abs(row.estimate - row.truth) <= MOST_SDS * sd, row
+    specimen = load_specimen(SPECIMEN)
+    for what in ("friction", "cut"):
+        for row in day.judge(fits.load_result(Engine.of(workspace), what), specimen):
+            if row.truth is not None:
+                sd = (row.high - row.low) / 3.29
+                print(f"{row.name}: {(row.estimate - row.truth) / sd:+.2f} sd")
+                assert abs(row.estimate - row.truth) <= MOST_SDS * sd, row

@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from scissorcal.device.upload import CHUNK_BYTES
 from scissorcal.kernel import (
     IMAGE_FORMAT,
     Command,
@@ -37,6 +36,8 @@ model = pytest.importorskip(
 
 STACK_BYTES = 1024
 HOME_TICKS = 4000
+CHUNK_BYTES = 192
+"""Most that a LOAD_CHUNK holds."""
 TORQUE_N_m = 0.12
 
 
