@@ -113,7 +113,8 @@ NAMED_AS_THEIR_MODULE = {
 }
 """Functions that a room cannot hand out, since a module of the room has the same name."""
 
-PATCHED = {"scissorcal.kernel._kernel", "scissorcal.workday.runs", "scissorcal.workday.demo"}
+PATCHED = {"scissorcal.kernel._kernel", "scissorcal.kernel._firmware", "scissorcal.workday.runs"}
+PATCHED |= {"scissorcal.workday.demo"}
 PATCHED |= {"scissorcal.workday.tracking", "scissorcal.bench.trade", "scissorcal.bench.extremes"}
 PATCHED |= {"scissorcal.device.sim", "scissorcal.package.simplest"}
 """Packages whose modules, not names, tests of other rooms take: to replace a part of them."""

@@ -4,7 +4,6 @@ import zlib
 from dataclasses import replace
 from typing import Any
 
-from scissorcal.device.upload import CHUNK_BYTES
 from scissorcal.kernel import (
     IMAGE_FORMAT,
     Capability,
@@ -12,6 +11,10 @@ from scissorcal.kernel import (
     CommandFlag,
     Config,
     ConfigEcho,
+    FirmwareBoard,
+    FirmwareCore,
+    FirmwareInputs,
+    FirmwareOutputs,
     FrameDecoder,
     LoadBegin,
     LoadChunk,
@@ -24,18 +27,13 @@ from scissorcal.kernel import (
     decode,
     encode,
 )
-from scissorcal.kernel.firmware import (
-    FirmwareBoard,
-    FirmwareCore,
-    FirmwareInputs,
-    FirmwareOutputs,
-)
 
 ENABLE = Command(
     flags=int(CommandFlag.ENABLE), echo_sequence=0, torque=0.0, force=0.0, hold_ticks=0
 )
 CLEAR = ENABLE._replace(flags=int(CommandFlag.ENABLE | CommandFlag.CLEAR_FAULT))
 IMAGE_BYTES = 20 * 1024
+CHUNK_BYTES = 192
 BOARD = FirmwareBoard(
     "bench", "1", tick_us=1000, capabilities=int(Capability.ADVANCE_MOTOR), torque_limit=2.0,
     opening_min=-0.2, opening_max=1.6, opening_resolution=1e-4, handle_radius=0.06,

@@ -8,8 +8,7 @@ import math
 
 import numpy as np
 
-from scissorcal.device import Faults, VirtualRig
-from scissorcal.device.sim.specimen import Specimen
+from scissorcal.device import Faults, Specimen, VirtualRig
 from scissorcal.kernel import (
     Capability,
     Config,

@@ -19,13 +19,14 @@ from scissorcal.kernel import (
     LoadBegin,
     LoadChunk,
     LoadCommit,
+    LoadEcho,
     LoadStatus,
     PassivityConfig,
     ServoConfig,
     model_image,
 )
+from scissorcal.kernel import tables as layout
 from scissorcal.kernel._firmware import ffi, lib
-from scissorcal.kernel.tables import TABLE_NAMES, model_struct
 from tests.firmware.bench import ENABLE, Bench
 from tests.kernel.golden import model_cases
 from tests.kernel.zoo import make_tables
@@ -53,11 +54,11 @@ def test_the_image_holds_the_model_of_the_kernel(name: str) -> None:
     tables = CASES[name][0]
     status, view, _memory = opened(model_image(tables, DRIVE))
     assert status == LoadStatus.OK
-    mine, (own, _keep) = view.model, model_struct(tables)
+    mine, (own, _keep) = view.model, layout.model_struct(tables)
     for field, _ in ffi.typeof("sc_model").fields:
-        if field not in TABLE_NAMES:
+        if field not in layout.TABLE_NAMES:
             assert getattr(mine, field) == getattr(own, field), field
-    for table in TABLE_NAMES:
+    for table in layout.TABLE_NAMES:
         size = getattr(own, table).size
         assert getattr(mine, table).size == size
         for row in ("x", "y", "slope", *(("area",) if table == "response" else ())):
@@ -107,9 +108,10 @@ def test_an_image_is_put_in_force_and_named_by_its_checksum() -> None:
     assert identity.capabilities & Capability.RENDERS
 
 
-def test_a_core_without_memory_answers_no_upload() -> None:
+def test_a_core_without_memory_refuses_an_upload() -> None:
     bench = Bench(image_bytes=0)
-    assert bench.tick(LoadCommit(0))[0] == []
+    (echo,) = bench.tick(LoadCommit(0))[0]
+    assert echo == LoadEcho(LoadStatus.NOT_ANNOUNCED, 0, received=0, capacity=0, crc32=0)
     assert bench.configure(ConfigKey.RENDER, 1.0).status == ConfigStatus.UNKNOWN_KEY
     (identity,) = (r for r in bench.tick(Hello(1))[0] if isinstance(r, Identity))
     assert not identity.capabilities & Capability.RENDERS

@@ -6,14 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.device import LockstepLink, RigSession, VirtualRig, lockstep
+from scissorcal.device import LockstepLink, RigSession, VirtualRig, load_specimen, lockstep
 from scissorcal.device.probe.probe import probe
-from scissorcal.device.sim.specimen import load_specimen
 from scissorcal.recipe import builtin_recipe
-from scissorcal.workday import Workspace
-from scissorcal.workday.demo.day import judge
-from scissorcal.workday.engine import Engine
-from scissorcal.workday.runs.fit import load_result
+from scissorcal.workday import Engine, Workspace
+from scissorcal.workday.demo import day
+from scissorcal.workday.runs import fit as fits
 from tests.cli.conftest import Cli
 from tests.cli.conftest import cli as cli
 
@@ -60,8 +58,8 @@ def test_a_day_with_the_firmware(cli: Cli, tmp_path: Path, monkeypatch: pytest.M
         assert said.code == 0, (words, said.out, said.err)
     specimen = load_specimen(SPECIMEN)
     for what in ("friction", "cut"):
-        fit = load_result(Engine.of(workspace), what)
-        for row in judge(fit, specimen):
+        fit = fits.load_result(Engine.of(workspace), what)
+        for row in day.judge(fit, specimen):
             if row.truth is not None:
                 sd = (row.high - row.low) / 3.29
                 print(f"{row.name}: {(row.estimate - row.truth) / sd:+.2f} sd")

@@ -3,17 +3,16 @@
 import subprocess
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from scissorcal.device import Operator
+from scissorcal.device import Operator, RigSession, open_link, open_writer
+from scissorcal.device.capture import capture
 from scissorcal.verdicts import failed
-from scissorcal.workday.options import RigOptions
-from scissorcal.workday.runs.capture import capture_into
-from scissorcal.workday.runs.fit import fit_workspace
-from scissorcal.workday.runs.probe import probe_device
-from scissorcal.workday.workspace import create_workspace
+from scissorcal.workday import create_workspace, fit_workspace
+from scissorcal.workday.runs import probe
 
 from .test_c_tests import BUILD, make
 
@@ -67,15 +66,20 @@ def test_probe_friction_and_fit_through_the_process(
     board: subprocess.Popen[str], tmp_path: Path
 ) -> None:
     assert board.stdout is not None
-    rig, operator = RigOptions(board.stdout.readline().strip()), Operator(Person(board))
+    port = board.stdout.readline().strip()
     workspace = create_workspace(tmp_path / "paper", "paper-80gsm")
     text = workspace.recipe_path.read_text(encoding="utf-8")
     before, _, after = text.partition("[capture.friction]")
     text = before + CAPTURE + "[capture.cut]" + after.partition("[capture.cut]")[2]
     workspace.recipe_path.write_text(text, encoding="utf-8")
-    found = probe_device(workspace.recipe(), rig, operator, workspace=workspace)
-    assert not failed(found.verdicts)
-    capture_into(workspace, "friction", rig, operator=operator)
+    with open_link(port) as link:
+        session = RigSession(link, workspace.recipe(), Operator(Person(board)), recipe_toml=text)
+        session = replace(session, probe=probe.probe_into(workspace, session))
+        assert session.probe is not None
+        assert not failed(session.probe.verdicts)
+        path = workspace.new_recording("friction")
+        with open_writer(session, "friction", path) as writer:
+            capture(session, "friction", writer)
     (outcome,) = fit_workspace(workspace, ("friction",))
     assert not failed(outcome.result.verdicts)
     for name, truth in TRUTH.items():

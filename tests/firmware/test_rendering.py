@@ -12,7 +12,9 @@ from scissorcal.kernel import (
     Command,
     ConfigKey,
     ConfigStatus,
+    Drive,
     FaultCause,
+    InputFlag,
     Kernel,
     LoadCommit,
     Mode,
@@ -24,7 +26,6 @@ from scissorcal.kernel import (
     estimated_rates,
     model_image,
 )
-from scissorcal.kernel.firmware import Drive, InputFlag
 from tests.firmware.bench import CLEAR, ENABLE, Bench, rendering
 from tests.kernel.zoo import make_tables
 

@@ -1,4 +1,4 @@
-"""A bridge: a device for scissorcal in front of a motor controller with a protocol of its own.
+"""A bridge: a device for scissorcal in front of a motor controller with another protocol.
 
 The firmware's core runs in this process. Each tick makes one exchange with the controller: what the
 last tick decided goes there, what it measures comes back. A lab writes the class for its own
