@@ -1,6 +1,8 @@
-"""Write the figures of docs/build: python -m tests.builds"""
+"""Write the figures of docs/build, all or those of some marks: python -m tests.builds [MARK ...]"""
+
+import sys
 
 from .page import write
 
 if __name__ == "__main__":
-    write()
+    write(sys.argv[1:])

@@ -1,9 +1,10 @@
 """The figures of docs/build, written between their marks in its pages."""
 
 import math
+from collections.abc import Callable, Collection
 from pathlib import Path
 
-from .faults import FIRST, faults_of
+from .faults import FIRST, PLAYS, faults_of, loose
 from .parts import BUILDS, GIMBAL, NOT_WORKING, Build
 from .rig import Said, Wrong, probe_of
 
@@ -11,6 +12,7 @@ PAGES = Path(__file__).parents[2] / "docs" / "build"
 SEEDS = (101, 102, 103, 104, 105)
 """Of the probes in the pages: each draws another inertia and friction."""
 FAULT_SEED = 101
+PLAY_SEEDS = SEEDS[:3]
 LINES = ("encoder jitter", "torque noise", "lag", "watchdog", "blades direction", "encoder step",
          "measured torque", "inertia", "clipping")  # fmt: skip
 """Of the probe's sentences, those that a build's page shows."""
@@ -117,13 +119,34 @@ def tried() -> str:
     return _table(("build", "noise, mN m", "what the probe says"), rows)
 
 
-def blocks(build: Build, *, probes: bool) -> dict[str, str]:
-    """The blocks of a build's page by their marks; those that need no probe, or all."""
-    arithmetic = {"FIGURES": figures(build)}
-    if not probes:
-        return arithmetic
-    faults = said_of(build, faults_of(build))
-    return {**arithmetic, "PROBE": probed(build), "FIRST": said_of(build, FIRST), "FAULTS": faults}
+def played(build: Build) -> str:
+    """What the probe says of the build with play, of some rigs."""
+    rows = []
+    for play in PLAYS:
+        found = [probe_of(build, seed, loose(play)) for seed in PLAY_SEEDS]
+        passed = [said for said in found if not said.refusal]
+        shares = sorted(_mean(said, "inertia_kg_m2") / said.rig.inertia for said in passed)
+        inertia = f"{shares[0]:.2f} to {shares[-1]:.2f}" if shares else "-"
+        rate = max(said.largest_rate for said in found)
+        accepted = f"{len(passed)} of {len(found)}"
+        rows.append((f"{1e3 * play:.0f} mrad", accepted, inertia, f"{rate:.1f} rad/s"))
+    return _table(("play", "accepted", "their inertia over the true one", "largest rate"), rows)
+
+
+Blocks = dict[str, Callable[[], str]]
+
+
+def blocks(build: Build) -> Blocks:
+    """How each block of a build's page is made, by its mark."""
+    made: Blocks = {
+        "FIGURES": lambda: figures(build),
+        "PROBE": lambda: probed(build),
+        "FAULTS": lambda: said_of(build, faults_of(build)),
+        "PLAY": lambda: played(build),
+    }
+    if build is not GIMBAL:
+        made["FIRST"] = lambda: said_of(build, FIRST)
+    return made
 
 
 def block_of(page: Path, mark: str) -> str:
@@ -132,19 +155,18 @@ def block_of(page: Path, mark: str) -> str:
     return text.partition(f"<!-- {mark} -->\n")[2].partition(f"\n<!-- end of {mark} -->")[0]
 
 
-def write() -> None:
-    """Write every block into the pages."""
-    _replace(PAGES / "index.md", {"COMPARED": compared()})
-    gimbal = {"FIGURES": figures(GIMBAL), "PROBE": probed(GIMBAL)}
-    gimbal |= {"FAULTS": said_of(GIMBAL, faults_of(GIMBAL))}
-    _replace(PAGES / "not-working.md", {**gimbal, "TRIED": tried()})
+def write(marks: Collection[str] = ()) -> None:
+    """Write the blocks with these marks, or all, into the pages."""
+    _replace(PAGES / "index.md", {"COMPARED": compared}, marks)
     for build in BUILDS.values():
-        _replace(PAGES / f"{build.name}.md", blocks(build, probes=True))
+        _replace(PAGES / f"{build.name}.md", blocks(build), marks)
+    _replace(PAGES / "not-working.md", {**blocks(GIMBAL), "TRIED": tried}, marks)
 
 
-def _replace(page: Path, made: dict[str, str]) -> None:
+def _replace(page: Path, made: Blocks, marks: Collection[str]) -> None:
+    asked = {mark: make() for mark, make in made.items() if not marks or mark in marks}
     text = page.read_text(encoding="utf-8")
-    for mark, block in made.items():
+    for mark, block in asked.items():
         before, begin, rest = text.partition(f"<!-- {mark} -->\n")
         _, end, after = rest.partition(f"<!-- end of {mark} -->")
         assert all((begin, end)), (page, mark)

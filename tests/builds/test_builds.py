@@ -5,19 +5,27 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from benchmarks.drawings import build_wiring
 
-from scissorcal.kernel import Capability
-from scissorcal.kernel.firmware import FirmwareBoard, FirmwareCore
+from scissorcal.kernel import Capability, Config, ConfigKey, encode
+from scissorcal.kernel.firmware import (
+    FirmwareBoard,
+    FirmwareCore,
+    FirmwareInputs,
+    FirmwarePhase,
+    HomeResult,
+)
 
 from .faults import FIRST, faults_of
-from .page import FAULT_SEED, PAGES, block_of, blocks, compared, probed_values
-from .parts import BEST, BUILDS, COURSE, GIMBAL, LAB, Build
+from .page import FAULT_SEED, PAGES, block_of, compared, figures, probed_values
+from .parts import BUILDS, COURSE, GIMBAL, LAB, Build
 from .rig import probe_of
 
 FIRMWARE = PAGES.parents[1] / "firmware" / "boards"
 PAGE_OF = {**{name: f"{name}.md" for name in BUILDS}, GIMBAL.name: "not-working.md"}
+BOARDS = {"course": "stm32f405", "lab": "b_g431b_esc1", "best": "teensy41"}
 MOST_EUR = 200
 TOLERANCE = 0.05
 """Of a figure in a page, for other versions of numpy and other processors."""
@@ -41,8 +49,7 @@ def words_of(sentence: str) -> str:
 
 @pytest.mark.parametrize("build", [*BUILDS.values(), GIMBAL], ids=lambda build: build.name)
 def test_figures_follow_from_the_parts(build: Build) -> None:
-    for mark, block in blocks(build, probes=False).items():
-        assert block_of(page_of(build), mark) == block
+    assert block_of(page_of(build), "FIGURES") == figures(build)
 
 
 def test_the_comparison_is_of_the_parts() -> None:
@@ -68,48 +75,66 @@ def test_the_course_costs_no_more_than_it_may() -> None:
     assert sum(prices) == int(total) <= MOST_EUR
 
 
-@pytest.mark.parametrize(
-    ("build", "board"), [(COURSE, "stm32f405"), (LAB, "b_g431b_esc1"), (BEST, "teensy41")]
-)
-def test_the_table_of_a_page_is_a_possible_board(build: Build, board: str) -> None:
-    """Its fields in place of the example's; the torque limit is within the peak current's."""
-    head = (FIRMWARE / f"{board}_table.h").read_text(encoding="utf-8")
+def board_of(build: Build) -> FirmwareBoard:
+    """The example's table of the build's board, with the fields that its page states."""
+    head = (FIRMWARE / f"{BOARDS[build.name]}_table.h").read_text(encoding="utf-8")
     fields = dict(re.findall(r"\.(\w+) = ([-\d.e]+)f?,", head))
     text = page_of(build).read_text(encoding="utf-8").partition("| field | value |")[2]
     for names, values in re.findall(r"^\| (`.*?`) \| ([^|]*) \|", text, re.MULTILINE):
-        found = re.findall(r"`(\w+)`", names)
-        stated = values.split(", ") if len(values.split(", ")) == len(found) else [values] * 2
-        fields |= {
-            name: value for name, value in zip(found, stated, strict=False) if name in fields
-        }
-    numbers = {name: float(value) for name, value in fields.items()}
+        stated = re.findall(r"`(\w+)`", names)
+        cells = values.split(", ")
+        cells = cells if len(cells) == len(stated) else cells * len(stated)
+        fields |= {name: cell for name, cell in zip(stated, cells, strict=True) if name in fields}
+    known = {field.name for field in dataclasses.fields(FirmwareBoard)} - {"name", "serial"}
     whole = ("tick_us", "home_at_stop", "firmware_version")
-    known = {f.name for f in dataclasses.fields(FirmwareBoard)} - {"name", "serial"}
-    given = {name: int(v) if name in whole else v for name, v in numbers.items() if name in known}
-    homes = int(Capability.HOMES | Capability.TORQUE_MEASURED)
-    FirmwareCore(FirmwareBoard("page", "1", **{"capabilities": homes, **given}))
-    assert given["torque_limit"] <= build.torque_limit
-    assert given["torque_limit"] > 0.98 * build.torque_limit
-    assert given["opening_resolution"] == pytest.approx(
-        2.0 * math.pi / build.blades_counts, rel=1e-6
-    )
-    assert given["tick_us"] == build.tick_us
-    assert given["torque_per_A"] == pytest.approx(build.blades_torque_per_ampere, rel=1e-3)
-    ticks_s = 4e-6 * build.tick_us
-    assert given["home_torque"] / given["home_speed"] < 0.8 * build.inertia / ticks_s
-    assert build.peak_A < given["current_limit"] <= build.sensor_range_A
+    given = {
+        name: int(cell) if name in whole else float(cell)
+        for name, cell in fields.items()
+        if name in known
+    }
+    capabilities = int(Capability.HOMES | Capability.TORQUE_MEASURED)
+    return FirmwareBoard("page", "1", capabilities=capabilities, **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("build", BUILDS.values(), ids=BUILDS)
+def test_the_table_of_a_page_is_a_possible_board_of_its_parts(build: Build) -> None:
+    board = board_of(build)
+    FirmwareCore(board)
+    step = 2.0 * math.pi / build.blades_counts
+    assert 0.98 * build.torque_limit < board.torque_limit <= build.torque_limit
+    assert board.opening_resolution == pytest.approx(step, rel=1e-6)
+    assert board.tick_us == build.tick_us
+    assert board.torque_per_A == pytest.approx(build.blades_torque_per_ampere, rel=1e-3)
+    assert build.peak_A < board.current_limit <= build.sensor_range_A
+    lightest = 0.8 * build.inertia
+    assert board.home_torque / board.home_speed < lightest / (4e-6 * build.tick_us)
+
+
+def test_a_hand_finds_the_zero_where_the_motor_is_unplugged() -> None:
+    """At rest for half a second, then by hand to the open stop: step 3 of the first power-on."""
+    board = board_of(COURSE)
+    core = FirmwareCore(board)
+    way = board.opening_max - 0.5
+    readings = [0.0] * 500 + [way * share for share in np.linspace(0.0, 1.0, 1500)] + [way] * 400
+    received = encode(Config(int(ConfigKey.HOME), 1, 1.0))
+    for tick, reading in enumerate(readings):
+        inputs = FirmwareInputs(device_us=1000 * (tick + 1), opening=reading, supply=12.0)
+        ended = core.tick(inputs, received)
+        received = b""
+    assert ended.home_result is HomeResult.FOUND
+    assert ended.phase is FirmwarePhase.READY
 
 
 @pytest.mark.parametrize(
     ("drawn", "board"),
     [
-        (build_wiring.COURSE, "stm32f405.c"),
-        (build_wiring.LAB, "b_g431b_esc1.c"),
-        (build_wiring.BEST, "teensy41.c"),
+        (build_wiring.COURSE, BOARDS["course"]),
+        (build_wiring.LAB, BOARDS["lab"]),
+        (build_wiring.BEST, BOARDS["best"]),
     ],
 )
 def test_pins_in_the_wiring_are_those_of_the_board(drawn: build_wiring.Wiring, board: str) -> None:
-    head = (FIRMWARE / board).read_text(encoding="utf-8").partition("*/")[0]
+    head = (FIRMWARE / f"{board}.c").read_text(encoding="utf-8").partition("*/")[0]
     lines = (drawn.to_driver, drawn.from_current, drawn.from_encoder, drawn.from_stop)
     pins = re.findall(r"\bP[A-C]\d+\b|\bA\d\b", " ".join((*lines, drawn.from_force)))
     assert pins
