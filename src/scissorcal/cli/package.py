@@ -7,10 +7,11 @@ import typer
 
 from scissorcal.cli.lazy import group
 from scissorcal.cli.opening import open_workspace, writes_in
-from scissorcal.cli.options import Folder, Seed, TrustedKey
+from scissorcal.cli.options import Folder, Seed, TrustedKey, options_of
 from scissorcal.cli.output import Answer, command
 from scissorcal.cli.report import SigningKey, signer_of
 from scissorcal.errors import InputError
+from scissorcal.workday.options import ExportOptions
 
 if TYPE_CHECKING:
     from scissorcal.package import Manifest
@@ -126,35 +127,23 @@ def check(
     )
 
 
+_EXPORT = {
+    "html": typer.Option(metavar="FILE", dir_okay=False, help="The page to write (.html)."),
+    "c": typer.Option(
+        "--c", metavar="DIR", file_okay=False, help="The folder of C sources to write."
+    ),
+    "header": typer.Option(
+        metavar="FILE", dir_okay=False, help="The C header of tables to write (.h)."
+    ),
+    "fmu": typer.Option(metavar="FILE", dir_okay=False, help="The FMU to write (.fmu)."),
+    "package": typer.Option(help="The package to export; the workspace's if not given."),
+    "overwrite": typer.Option("--overwrite", help="Replace what exists."),
+}
+
+
 @command
-def export(
-    html: Annotated[
-        Path | None,
-        typer.Option("--html", metavar="FILE", dir_okay=False, help="The page to write (.html)."),
-    ] = None,
-    c: Annotated[
-        Path | None,
-        typer.Option(
-            "--c", metavar="DIR", file_okay=False, help="The folder of C sources to write."
-        ),
-    ] = None,
-    header: Annotated[
-        Path | None,
-        typer.Option(
-            "--header", metavar="FILE", dir_okay=False, help="The C header of tables to write (.h)."
-        ),
-    ] = None,
-    fmu: Annotated[
-        Path | None,
-        typer.Option("--fmu", metavar="FILE", dir_okay=False, help="The FMU to write (.fmu)."),
-    ] = None,
-    package_path: Annotated[
-        Path | None,
-        typer.Option("--package", help="The package to export; the workspace's if not given."),
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what exists.")] = False,
-    folder: Folder = None,
-) -> Answer:
+@options_of(_EXPORT)
+def export(options: ExportOptions, folder: Folder = None) -> Answer:
     """Write the package as a page, C sources, a header or an FMU, which need no Python.
 
     \b
@@ -174,19 +163,22 @@ def export(
       paper.fmu: 112 kB, binaries for x86_64-linux; 200 draws, error bound 6.8e-05 N m, not signed
     """
     answers = []
+    html = options.html
     if html is not None:
         from scissorcal.workday.runs.prototype import export_page
 
-        size = export_page(open_workspace(folder), html, package_path, overwrite=overwrite)
+        size = export_page(
+            open_workspace(folder), html, options.package, overwrite=options.overwrite
+        )
         text = (
             f"{html}: {size / 1e6:.2g} MB; open it in a browser, it needs no server and no network"
         )
         answers.append(Answer({"page": html, "bytes": size}, text, files=[html]))
-    if c or header or fmu:
+    if options.c or options.header or options.fmu:
         from scissorcal.workday.runs.package import built_package
 
-        path = package_path or built_package(open_workspace(folder), "export")
-        answers.append(_export_step(path, c=c, header=header, fmu=fmu, overwrite=overwrite))
+        path = options.package or built_package(open_workspace(folder), "export")
+        answers.append(_export_step(path, options))
     if not answers:
         raise InputError(
             "Nothing to export: give --html FILE, --c DIR, --header FILE or --fmu FILE."
@@ -198,14 +190,13 @@ def export(
     )
 
 
-def _export_step(
-    package_path: Path, *, c: Path | None, header: Path | None, fmu: Path | None, overwrite: bool
-) -> Answer:
+def _export_step(package_path: Path, options: ExportOptions) -> Answer:
     """The model's step in C and as an FMU."""
     from scissorcal.package import open_package
     from scissorcal.package.export import export_facts, write_c, write_fmu, write_header
 
     package = open_package(package_path, warn=False)
+    c, header, fmu, overwrite = options.c, options.header, options.fmu, options.overwrite
     facts = export_facts(package)
     result: dict[str, object] = {"package": facts.result}
     lines, files, notes = [], [], list(facts.warnings)

@@ -145,6 +145,18 @@ class PredictOptions:
 
 
 @dataclass(frozen=True)
+class ExportOptions:
+    """What a package is written as; ``package`` is its file, the workspace's if not given."""
+
+    html: Path | None = None
+    c: Path | None = None
+    header: Path | None = None
+    fmu: Path | None = None
+    package: Path | None = None
+    overwrite: bool = False
+
+
+@dataclass(frozen=True)
 class VerifySettings:
     """What is checked: how many simulated ``fits``, drawn from which prior (see `make_study`)."""
 
