@@ -43,6 +43,8 @@ def make(folder: Path, *targets: str, optimise: str = "-Os") -> None:
         capture_output=True,
         text=True,
         check=False,
+        # not as a part of a make that runs the tests: it would warn of the jobs
+        env={name: value for name, value in os.environ.items() if not name.startswith("MAKE")},
     )
     if ran.returncode or ran.stderr:
         raise RuntimeError(ran.stderr[-3000:])
