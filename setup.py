@@ -2,7 +2,7 @@
 
 ``recipes/`` and ``data_schemas/`` stand at the top of the repository, where people look for them.
 Building copies them into the package, as ``scissorcal/recipes`` and ``scissorcal/data_schemas``; an
-editable install builds no copy, and ``scissorcal.recipe.library`` then reads the originals.
+editable install builds no copy, and ``scissorcal.recipe.load`` then reads the originals.
 
 What a browser needs is built before (`build_backend/browser_files.py`), the C core on all cores.
 """

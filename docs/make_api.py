@@ -133,7 +133,10 @@ def _documented(module: ModuleType) -> list[str]:
 
 def _class(name: str, thing: type) -> list[str]:
     parts = _fields(name, thing) + _text(thing)
-    for member, value in vars(thing).items():
+    # with what a base of the same file gives: that base is on no page
+    bases = [base for base in thing.__mro__[::-1] if base.__module__ == thing.__module__]
+    members = {member: value for base in bases for member, value in vars(base).items()}
+    for member, value in members.items():
         if member.startswith("_"):
             continue
         if isinstance(value, property):

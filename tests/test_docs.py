@@ -24,6 +24,8 @@ PROSE = [
     ROOT / "CONTRIBUTING.md",
 ]
 EMPS = ROOT.parent / "shared" / "data" / "emps" / "DATA_EMPS.mat"
+SOURCES = ("src", "tests", "benchmarks", "docs", "build_backend")
+SOURCE_FILE = re.compile(r"`([\w/]+\.(?:py|c|h|mjs))`")
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 
@@ -121,6 +123,21 @@ def test_the_table_of_rooms_is_that_of_the_import_rules():
     assert stated == rooms
 
 
+def test_source_files_that_pages_name_are_there():
+    files = [path for place in SOURCES for path in (ROOT / place).rglob("*") if path.is_file()]
+    known = {"/setup.py", *(f"/{path.relative_to(ROOT).as_posix()}" for path in files)}
+    named = [
+        (page, name)
+        for page in PAGES
+        if page.name != "CHANGELOG.md"
+        for name in SOURCE_FILE.findall(page.read_text(encoding="utf-8"))
+    ]
+    assert len(named) > 50
+    ends = {path[at:] for path in known for at, sign in enumerate(path) if sign == "/"}
+    wrong = [f"{page}: {name}" for page, name in named if f"/{name}" not in ends]
+    assert not wrong, "\n".join(wrong)
+
+
 # --------------------------------------------------------------------------- generated pages
 
 
@@ -140,6 +157,12 @@ def test_a_stale_api_page_is_reported(tmp_path):
     )
     assert done.returncode == 1
     assert "scissorcal.errors.md is not up to date: run 'make api'." in done.stderr
+
+
+def test_what_a_class_inherits_stands_on_its_api_page():
+    page = (GENERATED / "scissorcal.recording.md").read_text(encoding="utf-8")
+    for member in ("append", "note", "mark", "attach", "poll", "close"):
+        assert f"### RecordingWriter.{member}\n" in page, member
 
 
 def test_drawings_are_those_of_the_script(tmp_path):

@@ -23,8 +23,21 @@ def test_the_old_key_of_a_recipe_is_read_with_a_note(cli: Cli, workspace: Path) 
     note = "fit.friction.rung is now called fit.friction.law. Version 0.2 reads fit.friction.law"
     assert said.err.count(note) == 1
     assert "fit.friction_advance.rung is now called fit.friction_advance.law" in said.err
+    line = (text + OLD).splitlines().index('rung = "stribeck"') + 1
+    assert f'law = "stribeck"  # recipe, line {line}\n' in cli("recipe", "show").out
     recipe.write_text(text + OLD.replace("rung", "law"), encoding="utf-8")
     assert "is now called" not in cli("recipe", "show").err
+
+
+def test_a_note_stands_once_where_the_next_command_is_worked_out_too(
+    cli: Cli, workspace: Path
+) -> None:
+    with (workspace / "recipe.toml").open("a", encoding="utf-8") as recipe:
+        recipe.write(OLD)
+    said = cli("recording", "list")
+    assert "next: scissorcal capture friction" in said.out
+    assert said.err.count("fit.friction.rung is now called") == 1
+    assert "OldWordWarning" not in said.err
 
 
 def test_stances_are_positions(cli: Cli, workspace: Path, tmp_path: Path) -> None:

@@ -74,8 +74,7 @@ class _Running:
     def watched(self) -> Iterator[None]:
         """Run a command's function: afterwards its exit code and answer stand, of an error too."""
         try:
-            with _old_words_noted():
-                yield
+            yield
         except (typer.Abort, typer.Exit, typer.TyperException):
             raise
         except KeyboardInterrupt:
@@ -99,14 +98,17 @@ class _Running:
 
 @contextmanager
 def _old_words_noted() -> Iterator[None]:
-    """Print warnings of old words as notes, each once."""
+    """Print warnings of old words as notes, each once, however often a file is read."""
     with warnings.catch_warnings():
-        warnings.simplefilter("default", OldWordWarning)
+        warnings.simplefilter("always", OldWordWarning)
         others = warnings.showwarning
+        noted: set[str] = set()
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
             if issubclass(category, OldWordWarning):
-                note(f"note: {message}")
+                if str(message) not in noted:
+                    noted.add(str(message))
+                    note(f"note: {message}")
             else:
                 others(message, category, *place, **more)
 
@@ -132,8 +134,11 @@ def command(function: Callable[..., Answer]) -> Callable[..., None]:
     ) -> None:
         if context.invoked_subcommand is not None:
             return
+        with _old_words_noted():
+            _run(context, _Running(as_json, verbose, show_traceback), options)
+
+    def _run(context: typer.Context, running: _Running, options: dict[str, Any]) -> None:
         began = time.perf_counter()
-        running = _Running(as_json, verbose, show_traceback)
         token = _running.set(running)
         try:
             with running.watched():
@@ -147,7 +152,7 @@ def command(function: Callable[..., Answer]) -> Callable[..., None]:
             error = str(answer.result.get("error", "")) if code else ""
             log_command(running.workspace.root, words, code, seconds, error, running.trace)
         _say(answer, running)
-        if as_json:
+        if running.as_json:
             print_envelope(context.command_path.partition(" ")[2], answer, code, seconds)
         raise typer.Exit(code)
 

@@ -1,4 +1,4 @@
-"""Gains of the capture's controller, from what it moves and how late it is answered. Pure."""
+"""Gains of the capture's controller, from what it moves, delay and how friction falls. Pure."""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Run the segments of a capture on a motion, record them, and say what is going on."""
+"""Run the segments of a capture on a motion, record them, and see strokes without material."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The servo loop in a separate process: started, monitored and ended."""
+"""The servo loop in a separate process: started, monitored, ended; its supervisor's heartbeat."""
 
 import math
 import subprocess

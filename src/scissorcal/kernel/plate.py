@@ -1,4 +1,8 @@
-"""A plate whose pose is estimated: its section with the rig's plane, and the model's step there."""
+"""Plates other than one whole sheet at a known place, and the model's step on them.
+
+Either the pose is estimated, and the servo takes the section of plate and rig's plane; or the plate
+is drawn, and consists of pieces with gaps between them. A plate is not both at once.
+"""
 
 import math
 from collections.abc import Sequence

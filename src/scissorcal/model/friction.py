@@ -1,4 +1,7 @@
-"""Friction against opening, rate and load, as a sum over the rows of the table of terms."""
+"""Friction against opening, rate and load, as a sum over the rows of the table of terms.
+
+`AxisLaw` adds inertia and offset: what the drive of one axis must give.
+"""
 
 import math
 from collections.abc import Mapping

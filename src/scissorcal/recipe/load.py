@@ -43,14 +43,30 @@ def parse_recipe(text: str, source: str = "recipe", *, judged: bool = True) -> R
     judged where a person wrote them, and what was captured by them stays readable.
     """
     document = _parse(text, source)
+    old_keys = _old_keys(document, source)
     unlikely = unlikely_numbers(document) if judged else []
     recipe = _checked(document, unlikely, text, Recipe, source)
     if judged:
-        for table in ("friction", "friction_advance"):
-            if OLD_LAW_KEY in document.get("fit", {}).get(table, {}):
-                key = f"fit.{table}"
-                warn_of_old_word(f"{key}.{OLD_LAW_KEY}", f"{key}.law", source)
+        for table in old_keys:
+            warn_of_old_word(f"{table}.{OLD_LAW_KEY}", f"{table}.law", source)
     return recipe
+
+
+def _old_keys(document: dict[str, Any], source: str) -> list[str]:
+    """Tables that name their law by its old key; InputError where one has both."""
+    fits = document.get("fit")
+    tables = fits if isinstance(fits, dict) else {}
+    named = []
+    for name in ("friction", "friction_advance"):
+        table = tables.get(name)
+        if isinstance(table, dict) and OLD_LAW_KEY in table:
+            if "law" in table:
+                raise InputError(
+                    f"{source}: fit.{name} has both law and {OLD_LAW_KEY}, its old name: remove "
+                    f"{OLD_LAW_KEY}."
+                )
+            named.append(f"fit.{name}")
+    return named
 
 
 def load_toml(path: Path, model: type[Model], kind: Format = RECIPE) -> Model:
@@ -248,6 +264,11 @@ def recipe_settings(recipe: Recipe, text: str, *, defaults: bool = True) -> tupl
     """
     keys = list(_walk(recipe, ()))
     lines = key_lines(text, [(*table, name) for table, name, _, _, _ in keys])
+    former = key_lines(text, [(*table, OLD_LAW_KEY) for table, _, _, _, _ in keys])
+    lines = [
+        old if key[1] == "law" and line is None else line
+        for key, line, old in zip(keys, lines, former, strict=True)
+    ]
     settings = []
     for (table, name, value, given, why), line in zip(keys, lines, strict=True):
         if given:

@@ -39,7 +39,7 @@ class SampleFile:
     """An MCAP file being written: the encoding only, not names, locks or renaming.
 
     The metadata goes first and, at ``finish``, once more: MCAP has no checksum for it. Of several
-    copies the last sound one counts, so that :meth:`_describe` may add to it.
+    copies the last sound one counts, so that strokes may be stated anew.
     """
 
     def __init__(self, stream: IO[bytes], metadata: RecordingMetadata) -> None:

@@ -1,4 +1,4 @@
-"""The result of a rendering: latency, losses, energy, and verdicts."""
+"""What a rendering did: watched while it runs; latency, losses, energy, and verdicts."""
 
 import math
 import time

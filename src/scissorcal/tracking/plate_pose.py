@@ -1,4 +1,4 @@
-"""Where the plate stands, as its estimator tells the outer loop."""
+"""Rotations, and the plate's pose as a source gives it at a time: fixed, level, with play."""
 
 import math
 from collections.abc import Callable

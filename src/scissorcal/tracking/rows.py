@@ -1,6 +1,7 @@
 """What the filter is told: a picture's pose, a contact, the direction of a contact's force.
 
 Each row is a residual (measured minus predicted), its slopes by the state's error, and its noise.
+`TipContacts` finds the contacts in a rig's samples.
 """
 
 import math

@@ -154,6 +154,21 @@ def test_a_stopped_run_goes_on_and_a_larger_one_takes_what_is_there(
     assert len(set(indices)) == len(indices)
 
 
+def test_a_check_that_comes_out_the_same_leaves_its_file(
+    cleared: Workspace, whole: VerifyResult
+) -> None:
+    """A signature covers the file: one of an earlier version stays as it was signed."""
+    verify_workspace(cleared, ("friction",), FEW, processes=Processes(1))
+    path = cleared.root / "fits" / "friction.verify.json"
+    earlier = path.read_bytes().replace(b'"candidate"', b'"rung"')
+    assert b'"rung"' in earlier
+    path.write_bytes(earlier)
+    verify_workspace(cleared, ("friction",), FEW, processes=Processes(1))
+    assert path.read_bytes() == earlier
+    verify_workspace(cleared, ("friction",), replace(FEW, fits=3), processes=Processes(1))
+    assert b'"rung"' not in path.read_bytes()
+
+
 def test_records_of_another_seed_are_put_aside_with_a_word(cleared: Workspace) -> None:
     one = VerifySettings(fits=1, checks=("sbc",))
     verify_workspace(cleared, ("friction",), one, processes=Processes(1))

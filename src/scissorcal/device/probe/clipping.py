@@ -1,4 +1,7 @@
-"""Does the device clip a torque above its stated limit? Only tried where one tick is harmless."""
+"""Does the device clip a torque above its stated limit, and does its measured torque follow?
+
+A torque above the limit is only tried where one tick of it is harmless.
+"""
 
 import math
 from contextlib import suppress

@@ -1,4 +1,4 @@
-"""Do the motors answer, how late, and do commands get lost? At zero torque."""
+"""Do the motors answer, how late, do commands get lost, does silence brake? At zero torque."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Dry friction: it holds at rest, and slides with a level that depends on speed.
+"""A joint with dry friction: it holds at rest, and slides with a level that depends on speed.
 
 No smoothing stands in for stiction. One step of time solves for the friction impulse: the body
 first moves freely, and friction then takes off at most what brings it to rest (the time-stepping

@@ -1,4 +1,4 @@
-"""What the rig measures: encoder steps, limits, and autocorrelated noise."""
+"""What the rig measures, encoder steps and autocorrelated noise, and the faults it can be given."""
 
 import math
 from collections.abc import Iterable, Iterator

@@ -15,6 +15,7 @@ from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError
 from scissorcal.identity import VERSION, digest
 from scissorcal.kernel import Capability
+from scissorcal.recipe.friction import as_first_named
 from scissorcal.recording import Recording
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.envelope import plain
@@ -127,7 +128,7 @@ def inputs_hash(engine: Engine, case: Case) -> str:
         return plain(replace(one, paths=())), [engine.index.digest(path) for path in one.paths]
 
     by_content = {
-        "recipe": case.recipe.model_dump(mode="json"),
+        "recipe": as_first_named(case.recipe.model_dump(mode="json")),
         "friction": [one.content_hash for one in case.friction],
         "cut": [one.content_hash for one in case.cut],
         **{

@@ -9,6 +9,7 @@ from scissorcal.files import replacing
 from scissorcal.foreign import read_foreign, reading
 from scissorcal.foreign.formats import STATE
 from scissorcal.identity import digest
+from scissorcal.recipe.friction import as_first_named
 from scissorcal.recipe.requirements import DesignedKind
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.recordings import used_recordings
@@ -176,7 +177,8 @@ def stored_design(engine: Engine) -> CaptureDesign | None:
 def _inputs_of(engine: Engine) -> str:
     """Identity of what a design is made from: the recipe, and the fits that are there."""
     fits = {what: engine.state(f"fit {what}").content for what in ("friction", "cut")}
-    return digest({"format": FORMAT, "recipe": engine.recipe.model_dump(), "fits": fits})
+    recipe = as_first_named(engine.recipe.model_dump())
+    return digest({"format": FORMAT, "recipe": recipe, "fits": fits})
 
 
 def _chosen(known: "TorqueKnowledge", stock: "Stock") -> tuple["CaptureList", str]:

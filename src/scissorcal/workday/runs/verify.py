@@ -13,12 +13,12 @@ from scissorcal.calibration.cut.fit import cut_experiment
 from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.friction.advance import actuation_of, sliding_joints
 from scissorcal.calibration.friction.fit import friction_experiment
-from scissorcal.calibration.store import save
+from scissorcal.calibration.store import load, save
 from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.calibration.verify.simulator import Simulator, cut_simulator, friction_simulator
 from scissorcal.calibration.verify.study import Study, Task, run
-from scissorcal.errors import MissingError
+from scissorcal.errors import InputError, MissingError
 from scissorcal.identity import digest
 from scissorcal.recording import Recording
 from scissorcal.workday.engine import Engine
@@ -89,11 +89,20 @@ def verify_workspace(
                 result = assess(study, fit, settings.checks, records)
                 result = replace(result, fit_content=engine.identity(f"verify {kind}"))
                 path = engine.file(f"verify {kind}")
-                save(result, path)
+                if not _holds(path, result):
+                    save(result, path)
                 engine.refresh()
             notes = (file.note,) if file.note else ()
             outcomes.append(VerifyOutcome(kind, result, path, fitted, notes))
     return tuple(outcomes)
+
+
+def _holds(path: Path, result: VerifyResult) -> bool:
+    """Whether the file holds this result: then it stays, an earlier version's too, as signed."""
+    try:
+        return load(path, VerifyResult) == result
+    except InputError:  # missing or damaged
+        return False
 
 
 def _kinds(engine: Engine, wanted: Sequence[FitKind]) -> list[FitKind]:
