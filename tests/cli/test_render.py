@@ -150,3 +150,14 @@ def test_the_file_beside_the_package_states_that_a_person_accepted(
     stated = json.loads(beside.read_text())
     assert stated["accepted_derated"] is True
     assert stated["felt_share"] > stated["tolerance"] == 1e-4
+
+
+def test_a_rig_that_does_not_render_by_itself_is_refused_before_it_is_probed(
+    workspace: Path, tmp_path: Path, cli: Cli
+) -> None:
+    path = package(tmp_path, rig=SIM)
+    ran = cli(*BRIEF, "--package", path, "--on-device")
+    assert ran.code == 4
+    assert "does not render by itself" in ran.err
+    assert "leave --on-device out" in ran.err
+    assert not Workspace(workspace).recordings("probe")

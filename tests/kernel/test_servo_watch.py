@@ -342,6 +342,53 @@ def test_a_torque_at_its_limit_for_too_long_stops() -> None:
     assert ends_gently(joint.commands)
 
 
+def watching() -> Servo:
+    """A servo beside a device that renders by itself."""
+    servo = Servo(None, CONFIG)
+    servo.engage(Mode.WATCH)
+    return servo
+
+
+def stated(tick: int, torque: float) -> State:
+    """A state of blades that jitter, of a device that states this torque."""
+    return State(
+        int(StateFlag.MOTOR_ENABLED), tick, 1000 * tick, 0.6 - 1e-5 * (tick % 2), -0.02, torque, 0.0
+    )
+
+
+def test_a_servo_that_watches_enables_the_motors_and_asks_for_nothing() -> None:
+    servo = watching()
+    commands = [servo.step(stated(tick, 0.2)) for tick in range(1000)]
+    assert {(c.flags, c.torque, c.force) for c in commands} == {(1, 0.0, 0.0)}
+    assert servo.stop_reason is StopReason.NONE
+
+
+def test_a_servo_that_watches_takes_the_stated_torque_for_the_command() -> None:
+    """A device that holds its limit for half a second is released at once, without a fall."""
+    servo = watching()
+    ticks = 0
+    while servo.stop_reason is StopReason.NONE:
+        command = servo.step(stated(ticks, 0.5))
+        ticks += 1
+        assert ticks < 600
+    assert servo.stop_reason is StopReason.TORQUE_HELD
+    assert ticks >= 500
+    assert (command.flags, command.torque) == (0, 0.0)
+
+
+def test_without_a_heartbeat_a_servo_that_watches_adds_no_damping_and_ends() -> None:
+    servo = watching()
+    ticks, torques = 0, set()
+    while servo.stop_reason is StopReason.NONE:
+        torques.add(servo.step(stated(ticks, 0.1), heartbeat=ticks < 10).torque)
+        ticks += 1
+        assert ticks < 1100
+    assert servo.stop_reason is StopReason.SUPERVISOR_LOST
+    assert torques == {0.0}
+    assert servo.counters.fallback_frames == 0
+    assert ticks >= 1000
+
+
 def test_an_end_cannot_be_ordered_away() -> None:
     joint, servo = Joint(measured=lambda torque: -torque), tracking()
     joint.run(servo, 4000)
