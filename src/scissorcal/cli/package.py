@@ -170,7 +170,7 @@ def export(
       $ scissorcal package export --html paper.html
       paper.html: 0.9 MB; open it in a browser, it needs no server and no network
       $ scissorcal package export --c paper-c --fmu paper.fmu
-      paper-c: 21 files, 69.8 kB; tables 340 bytes, error bound 6.8e-05 N m, not signed
+      paper-c: 21 files, 70 kB; tables 340 bytes, error bound 6.8e-05 N m, not signed
       paper.fmu: 112 kB, binaries for x86_64-linux; 200 draws, error bound 6.8e-05 N m, not signed
     """
     answers = []
