@@ -171,7 +171,7 @@ def export(
       paper.html: 0.9 MB; open it in a browser, it needs no server and no network
       $ scissorcal package export --c paper-c --fmu paper.fmu
       paper-c: 21 files, 70 kB; tables 340 bytes, error bound 6.8e-05 N m, not signed
-      paper.fmu: 112 kB, binaries for x86_64-linux; 200 draws, error bound 6.8e-05 N m, not signed
+      paper.fmu: 172 kB, binaries for x86_64-linux; 200 draws, error bound 6.8e-05 N m, not signed
     """
     answers = []
     if html is not None:
