@@ -159,8 +159,8 @@ def export(options: ExportOptions, folder: Folder = None) -> Answer:
       $ scissorcal package export --html paper.html
       paper.html: 0.9 MB; open it in a browser, it needs no server and no network
       $ scissorcal package export --c paper-c --fmu paper.fmu
-      paper-c: 21 files, 69.8 kB; tables 340 bytes, error bound 6.8e-05 N m, not signed
-      paper.fmu: 112 kB, binaries for x86_64-linux; 200 draws, error bound 6.8e-05 N m, not signed
+      paper-c: 21 files, 70 kB; tables 340 bytes, error bound 6.8e-05 N m, not signed
+      paper.fmu: 172 kB, binaries for x86_64-linux; 200 draws, error bound 6.8e-05 N m, not signed
     """
     answers = []
     html = options.html
