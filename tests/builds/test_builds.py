@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 from benchmarks.drawings import build_wiring
 
-from scissorcal.kernel import Capability, Config, ConfigKey, encode
-from scissorcal.kernel.firmware import (
+from scissorcal.kernel import (
+    Capability,
+    Config,
+    ConfigKey,
     FirmwareBoard,
     FirmwareCore,
     FirmwareInputs,
     FirmwarePhase,
     HomeResult,
+    encode,
 )
 
 from .faults import FIRST, faults_of
