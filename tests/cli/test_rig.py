@@ -11,6 +11,8 @@ import pytest
 from scissorcal.device import Examination, Faults, LockstepLink, PortLink, SimProcess, diagnose
 from tests.device.in_step import in_step, patient
 from tests.device.test_doctor import SOUND
+from tests.strange_device import Faults as StrangeFaults
+from tests.strange_device import StrangeDevice, serve_on_pty
 
 from .conftest import Cli, Said
 
@@ -124,6 +126,40 @@ def test_the_doctor_examines_the_virtual_rig(cli: Cli) -> None:
     assert said.code in (0, 3)
     assert said.envelope["result"]["identity"]["name"] == "scissorcal-sim"
     assert said.envelope["verdicts"]
+
+
+def test_a_rig_is_homed_by_command(cli: Cli) -> None:
+    said = cli("device", "home", "--device", "sim", "--json")
+    assert said.code == 0, said.err
+    result = said.envelope["result"]
+    assert result["homed"] is True
+    assert result["seconds"] > 1.0
+
+
+@pytest.mark.parametrize("words", [("device", "probe"), ("capture", "friction")])
+def test_a_rig_that_is_not_homed_is_refused_with_the_command_that_homes(
+    words: tuple[str, ...], quick: Path, cli: Cli, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class NotHomed(LockstepLink):
+        def __init__(self, specimen: str, rng: np.random.Generator) -> None:
+            super().__init__(specimen, rng, Faults(not_homed=True))
+
+    monkeypatch.setattr("scissorcal.device.lockstep.LockstepLink", NotHomed)
+    said = cli(*words, "--device", "sim")
+    assert said.code == 4
+    assert "scissorcal device home" in said.err
+    assert cli("device", "home", "--device", "sim").code == 0
+
+
+def test_homing_of_a_real_rig_asks_first(cli: Cli) -> None:
+    device = StrangeDevice(StrangeFaults(not_homed=True), version=2)
+    with serve_on_pty(device) as port:
+        said = cli("device", "home", "--device", port)
+        assert said.code == 2
+        assert "Clear the space between the blades" in said.err
+        assert not device._homed
+        assert cli("device", "home", "--device", port, "--yes").code == 0
+        assert device._homed
 
 
 def test_ports_are_listed(cli: Cli) -> None:

@@ -7,11 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scissorcal.device import Faults, LockstepLink, SimProcess, open_link, open_motion
+from scissorcal.device import (
+    Faults,
+    LockstepLink,
+    Operator,
+    RigSession,
+    SimProcess,
+    open_link,
+    open_motion,
+)
 from scissorcal.device.faults import fault_sentence, stop_sentence
 from scissorcal.device.motion import loop_verdicts
 from scissorcal.device.probe.idle import idle
 from scissorcal.device.probe.judge import judge_idle
+from scissorcal.device.probe.probe import probe
 from scissorcal.device.probe.talk import Bounds, Talk
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
@@ -34,8 +43,10 @@ from scissorcal.kernel import (
     decode,
     encode,
 )
+from scissorcal.recipe import builtin_recipe
+from scissorcal.verdicts import failed
 from tests.strange_device import Faults as StrangeFaults
-from tests.strange_device import StrangeDevice, VirtualPort
+from tests.strange_device import Person, StrangeDevice, VirtualPort
 
 LATCHED = list(FaultCause)[FaultCause.STOP_BUTTON :]
 """What is latched by what happens in the device alone, the encoder aside."""
@@ -274,6 +285,18 @@ def test_a_motion_refuses_a_device_that_is_not_homed(what: str) -> None:
     assert caught.value.stop == "NOT_HOMED"
     if isinstance(link, VirtualPort):
         assert link.device.largest_torque == 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_probe_finds_the_same_on_a_device_of_either_version(version: int) -> None:
+    device = StrangeDevice(seed=1, version=version)
+    recipe = builtin_recipe("paper-80gsm")
+    result = probe(RigSession(VirtualPort(device), recipe, Operator(Person(device))))
+    assert failed(result.verdicts) == ()
+    assert result.inertia_kg_m2 is not None
+    low, high = result.inertia_kg_m2.interval
+    assert low < device.faults.inertia < high
 
 
 def test_a_device_that_is_not_homed_follows_no_command() -> None:
