@@ -25,7 +25,7 @@ PROSE = [
     ROOT / "CONTRIBUTING.md",
 ]
 EMPS = ROOT.parent / "shared" / "data" / "emps" / "DATA_EMPS.mat"
-SOURCES = ("src", "tests", "benchmarks", "docs", "build_backend")
+SOURCES = ("src", "tests", "benchmarks", "docs", "build_backend", "firmware")
 SOURCE_FILE = re.compile(r"`([\w/]+\.(?:py|c|h|mjs))`")
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)

@@ -1,5 +1,6 @@
 """The core and the images of the boards, as several compilers and options build them."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -29,12 +30,21 @@ def make(folder: Path, *targets: str, optimise: str = "-Os") -> None:
     """Run firmware/arm's Makefile; RuntimeError with what it printed if it fails or warns."""
     ran = subprocess.run(
         [
-            *("make", "--silent", "-C", str(FIRMWARE / "arm"), f"BUILD={folder}"),
+            *(
+                "make",
+                "--silent",
+                f"--jobs={os.cpu_count()}",
+                "-C",
+                str(FIRMWARE / "arm"),
+                f"BUILD={folder}",
+            ),
             *(f"PYTHON={sys.executable}", f"OPTIMISE={optimise}", *targets),
         ],
         capture_output=True,
         text=True,
         check=False,
+        # not as a part of a make that runs the tests: it would warn of the jobs
+        env={name: value for name, value in os.environ.items() if not name.startswith("MAKE")},
     )
     if ran.returncode or ran.stderr:
         raise RuntimeError(ran.stderr[-3000:])

@@ -1,9 +1,9 @@
 """Load the image of a package into a device that renders by itself, and check what it holds."""
 
 import zlib
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
-from scissorcal.device.link import LoadMessage
+from scissorcal.device.link import Link, LoadMessage
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     IMAGE_FORMAT,
@@ -20,6 +20,7 @@ CHUNK_BYTES = 192
 FROM_HOST = "leave --on-device out to render from this computer"
 
 
+@runtime_checkable
 class Loading(Protocol):
     """A link to a device that may take an image."""
 
@@ -44,7 +45,7 @@ def refuse_without_rendering(identity: Identity) -> None:
         )
 
 
-def load_image(link: Loading, image: bytes, tell: ShowShare) -> int:
+def load_image(link: Link, image: bytes, tell: ShowShare) -> int:
     """Have the device hold an image in force, and return the checksum that both have of it.
 
     A device that holds it already is sent nothing. ``tell`` is called after each piece. Raises
@@ -52,6 +53,8 @@ def load_image(link: Loading, image: bytes, tell: ShowShare) -> int:
     afterwards; its motors must be off.
     """
     refuse_without_rendering(link.identity)
+    if not isinstance(link, Loading):
+        raise TypeError(f"A {type(link).__name__} loads nothing.")
     wanted = zlib.crc32(image)
     if in_force(link) != wanted:
         _send(link, image, wanted, tell)
