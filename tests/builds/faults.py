@@ -15,16 +15,16 @@ ALL: dict[str, Wrong] = {
     "homed to the wrong place by 0.3 rad": Wrong(rig=(("encoder_zero", 0.3),)),
     "current sensor saturates at 6 mN m": Wrong(saturates_at=6e-3),
 }
-SLIPS: dict[str, Wrong] = {"capstan slips above 0.3 rad/s": Wrong(slips_above=0.3)}
-PLAYS = (0.01, 0.05)
-"""rad, between the encoder and the blades: of a loose magnet or a loose cable."""
+CAPSTAN: dict[str, Wrong] = {
+    "capstan slips above 0.3 rad/s": Wrong(slips_above=0.3),
+    "cable loose by 10 mrad": Wrong(rig=(("backlash", 0.01),)),
+}
+MAGNET: dict[str, Wrong] = {
+    "magnet loose by 50 mrad": Wrong(rig=(("backlash", 0.05),)),
+    "magnet loose by 10 mrad": Wrong(rig=(("backlash", 0.01),)),
+}
 
 
 def faults_of(build: Build) -> dict[str, Wrong]:
     """The faults that this build can have."""
-    return ALL if build.ratio == 1.0 else {**ALL, **SLIPS}
-
-
-def loose(play: float) -> Wrong:
-    """Play between the encoder and the blades."""
-    return Wrong(rig=(("backlash", play),))
+    return {**ALL, **(MAGNET if build.ratio == 1.0 else CAPSTAN)}

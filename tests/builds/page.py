@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from .faults import FIRST, PLAYS, faults_of, loose
+from .faults import FIRST, faults_of
 from .parts import BUILDS, GIMBAL, NOT_WORKING, Build
 from .rig import Said, Wrong, probe_of
 
@@ -12,7 +12,6 @@ PAGES = Path(__file__).parents[2] / "docs" / "build"
 SEEDS = (101, 102, 103, 104, 105)
 """Of the probes in the pages: each draws another inertia and friction."""
 FAULT_SEED = 101
-PLAY_SEEDS = SEEDS[:3]
 LINES = ("encoder jitter", "torque noise", "lag", "watchdog", "blades direction", "encoder step",
          "measured torque", "inertia", "clipping")  # fmt: skip
 """Of the probe's sentences, those that a build's page shows."""
@@ -119,20 +118,6 @@ def tried() -> str:
     return _table(("build", "noise, mN m", "what the probe says"), rows)
 
 
-def played(build: Build) -> str:
-    """What the probe says of the build with play, of some rigs."""
-    rows = []
-    for play in PLAYS:
-        found = [probe_of(build, seed, loose(play)) for seed in PLAY_SEEDS]
-        passed = [said for said in found if not said.refusal]
-        shares = sorted(_mean(said, "inertia_kg_m2") / said.rig.inertia for said in passed)
-        inertia = f"{shares[0]:.2f} to {shares[-1]:.2f}" if shares else "-"
-        rate = max(said.largest_rate for said in found)
-        accepted = f"{len(passed)} of {len(found)}"
-        rows.append((f"{1e3 * play:.0f} mrad", accepted, inertia, f"{rate:.1f} rad/s"))
-    return _table(("play", "accepted", "their inertia over the true one", "largest rate"), rows)
-
-
 Blocks = dict[str, Callable[[], str]]
 
 
@@ -142,7 +127,6 @@ def blocks(build: Build) -> Blocks:
         "FIGURES": lambda: figures(build),
         "PROBE": lambda: probed(build),
         "FAULTS": lambda: said_of(build, faults_of(build)),
-        "PLAY": lambda: played(build),
     }
     if build is not GIMBAL:
         made["FIRST"] = lambda: said_of(build, FIRST)

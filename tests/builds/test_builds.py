@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 from benchmarks.drawings import build_wiring
 
-from scissorcal.kernel import Capability, Config, ConfigKey, encode
-from scissorcal.kernel.firmware import (
+from scissorcal.kernel import (
+    Capability,
+    Config,
+    ConfigKey,
     FirmwareBoard,
     FirmwareCore,
     FirmwareInputs,
     FirmwarePhase,
     HomeResult,
+    encode,
 )
 
 from .faults import FIRST, faults_of
@@ -167,12 +170,13 @@ def test_the_probe_accepts_a_right_build_with_the_figures_of_its_page(
 @pytest.mark.slow
 @pytest.mark.parametrize("build", [COURSE, LAB, GIMBAL], ids=lambda build: build.name)
 def test_each_fault_is_named_as_on_the_page(build: Build) -> None:
+    """But for play, which some rigs hide and others do not."""
     stated = rows_of(page_of(build), "FAULTS")
+    assert stated.keys() == {"what", "---", *faults_of(build)}
     for name, wrong in faults_of(build).items():
-        said = probe_of(build, FAULT_SEED, wrong)
-        sentence = said.refusal or stated[name][0]
-        assert words_of(sentence) == words_of(stated[name][0]), name
-        assert bool(said.refusal) != stated[name][0].startswith("accepted"), name
+        if "loose" not in name:
+            said = probe_of(build, FAULT_SEED, wrong)
+            assert words_of(said.refusal) == words_of(stated[name][0]), name
 
 
 @pytest.mark.slow

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.device import check_echo, check_identity
-from scissorcal.device.link import LoadMessage
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Config, ConfigEcho, Hello, Identity, LoadEcho, decode, encode
 
@@ -137,7 +136,7 @@ class RigLink:
         check_echo(self.name, answer, int(key), float(value))
         return float(answer.value)
 
-    def load(self, message: LoadMessage) -> LoadEcho:
+    def load(self, message: object) -> LoadEcho:
         """It renders nothing itself."""
         raise DeviceError(f"{self.name} takes no package.")
 

@@ -1,7 +1,6 @@
 """A strange device in virtual time, as a link that scissorcal takes."""
 
 from scissorcal.device import check_echo, check_identity
-from scissorcal.device.link import LoadMessage
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import Config, ConfigEcho, Hello, Identity, LoadEcho, decode, encode
 
@@ -46,7 +45,7 @@ class VirtualPort:
         check_echo(self.name, answer, int(key), float(value))
         return float(answer.value)
 
-    def load(self, message: LoadMessage) -> LoadEcho:
+    def load(self, message: object) -> LoadEcho:
         """It renders nothing itself."""
         raise DeviceError(f"{self.name} takes no package.")
 
