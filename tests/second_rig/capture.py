@@ -56,7 +56,9 @@ def identity_of(rig: Rig) -> Identity:
         nonce_echo=0,
         name="second-rig",
         serial=rig.material.name[:16],
-        capabilities=int(Capability.HANDLE_FORCE_SENSOR | Capability.ADVANCE_MOTOR),
+        capabilities=int(
+            Capability.HANDLE_FORCE_SENSOR | Capability.ADVANCE_MOTOR | Capability.TORQUE_MEASURED
+        ),
         firmware_version=1,
         tick_us=round(1e6 * rig.tick_s),
         torque_limit=rig.motor.torque_limit_Nm,
