@@ -206,6 +206,13 @@ def test_a_controller_that_does_not_answer_is_a_fault_of_the_driver() -> None:
     assert state.cause == FaultCause.NONE
 
 
+def test_a_controller_that_never_answered_is_not_blamed_on_the_supply() -> None:
+    bridge = MockBridge(link_of()[0].rig)
+    bridge.client.answers = False
+    *_, state = states_of(bridge, STREAM, PUSH)
+    assert state.cause == FaultCause.DRIVER
+
+
 def test_a_fault_of_the_controller_is_ended_by_a_stop() -> None:
     _, bridge = link_of()
     states_of(bridge, STREAM, PUSH, b"")

@@ -57,7 +57,7 @@ class Bridge:
         self._clock = clock
         self._torque = self._force = 0.0
         self._drive = Drive.RELEASE
-        self._last = FirmwareInputs(0, 0.0)
+        self._last = FirmwareInputs(0, 0.0, supply=board.supply_min)  # silence is no lack of supply
         self._received = b""
         self._sent: list[bytes] = []
 
