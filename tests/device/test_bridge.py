@@ -282,6 +282,30 @@ def test_a_boards_file_is_read_and_what_is_wrong_with_it_named(tmp_path: Path) -
         open_moteus(1.0, {"identifier": 3})
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('name = "bridge"', 'name = "a bridge of some length"', "at most 16 ASCII"),
+        ('serial = "1"', 'serial = "\u00fc"', "at most 16 ASCII"),
+        ("\n[controller]\nid = 3\n", "controller = 3\n", "controller is a table"),
+    ],
+)
+def test_a_boards_file_of_the_wrong_form_is_named(
+    old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    assert old in BOARD_TOML
+    path = tmp_path / "board.toml"
+    path.write_text(BOARD_TOML.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        read_board(path)
+
+
+@pytest.mark.parametrize("options", [{"sign": "x"}, {"id": 1.5}, {"reply_s": True}])
+def test_an_option_that_is_no_number_is_named(options: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="is a number"):
+        open_moteus(1.0, options)
+
+
 def test_the_makers_client_takes_what_is_sent() -> None:
     moteus = pytest.importorskip("moteus")
     sent: list[Any] = []

@@ -94,6 +94,10 @@ def open_moteus(torque_limit: float, options: Mapping[str, Any]) -> MoteusContro
         raise InputError(
             f"{wrong[0]} is no option of a moteus: the table controller takes {', '.join(OPTIONS)}."
         )
+    for name, value in options.items():
+        is_number = isinstance(value, int) or (name != "id" and isinstance(value, float))
+        if isinstance(value, bool) or not is_number:
+            raise InputError(f"The option {name} of a moteus is a number, not {value!r}.")
     known = {name: float(value) for name, value in options.items() if name != "id"}
     if abs(known.get("sign", 1.0)) != 1.0:
         raise InputError("The option sign of a moteus is 1 or -1.")
