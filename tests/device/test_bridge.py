@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import sys
 from collections import deque
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ from scissorcal.device.moteus import (
     open_moteus,
 )
 from scissorcal.device.probe.probe import probe
-from scissorcal.errors import InputError
+from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import (
     Capability,
     Command,
@@ -304,6 +305,31 @@ def test_a_boards_file_of_the_wrong_form_is_named(
 def test_an_option_that_is_no_number_is_named(options: dict[str, object]) -> None:
     with pytest.raises(InputError, match="is a number"):
         open_moteus(1.0, options)
+
+
+def test_an_adapter_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none_found() -> None:
+        raise RuntimeError("No fdcanusb detected")
+
+    maker = SimpleNamespace(
+        QueryResolution=SimpleNamespace, F32=None, get_singleton_transport=none_found
+    )
+    monkeypatch.setitem(sys.modules, "moteus", maker)
+    with pytest.raises(DeviceError, match="No adapter to the bus"):
+        open_moteus(1.0, {})
+
+
+def test_an_adapter_that_is_pulled_is_a_fault_of_the_driver(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def gone(command: dict[str, Any]) -> None:
+        raise OSError("Input/output error")
+
+    _, bridge = link_of()
+    states_of(bridge, STREAM, PUSH, b"")
+    monkeypatch.setattr(bridge.client, "execute", gone)
+    (state,) = states_of(bridge, PUSH)
+    assert state.cause == FaultCause.DRIVER
 
 
 def test_the_makers_client_takes_what_is_sent() -> None:
