@@ -20,7 +20,7 @@ static volatile uint16_t readings[PERIODS * CHANNELS];
 /* 144 MHz: HSI16 / 4 * 72 / 2; half of it for a moment, so that the supply follows (RM0440, 7.2.7). */
 static void start_clock(void)
 {
-    REG(FLASH_ACR) = 7u << 8 | 4u; /* caches, prefetch, 4 wait states */
+    REG(FLASH_ACR) = 1u << 18 | 7u << 8 | 4u; /* debugger, caches, prefetch, 4 wait states */
     while ((REG(FLASH_ACR) & 15u) != 4u) {
     }
     REG(RCC + 0x0Cu) = 1u << 24 | 72u << 8 | 3u << 4 | 2u;

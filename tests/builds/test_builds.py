@@ -113,6 +113,20 @@ def test_the_table_of_a_page_is_a_possible_board_of_its_parts(build: Build) -> N
     assert board.home_torque / board.home_speed < lightest / (4e-6 * build.tick_us)
 
 
+@pytest.mark.parametrize("build", BUILDS.values(), ids=BUILDS)
+def test_the_table_of_the_first_power_on_is_a_possible_board(build: Build) -> None:
+    board = board_of(build)
+    tenths = {
+        name: 0.1 * getattr(board, name)
+        for name in ("torque_limit", "current_limit", "current_continuous")
+    }
+    text = (PAGES / "index.md").read_text(encoding="utf-8")
+    (step,) = re.findall(r"^\| 5 \| .*$", text, re.MULTILINE)
+    assert all(f"`{name}`" in step for name in tenths)
+    home_torque = min(board.home_torque, tenths["torque_limit"])
+    FirmwareCore(dataclasses.replace(board, **tenths, home_torque=home_torque))
+
+
 def test_a_hand_finds_the_zero_where_the_motor_is_unplugged() -> None:
     """At rest for half a second, then by hand to the open stop: step 3 of the first power-on."""
     board = board_of(COURSE)

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import sys
 from collections import deque
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ from scissorcal.device.moteus import (
     open_moteus,
 )
 from scissorcal.device.probe.probe import probe
-from scissorcal.errors import InputError
+from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import (
     Capability,
     Command,
@@ -206,6 +207,13 @@ def test_a_controller_that_does_not_answer_is_a_fault_of_the_driver() -> None:
     assert state.cause == FaultCause.NONE
 
 
+def test_a_controller_that_never_answered_is_not_blamed_on_the_supply() -> None:
+    bridge = MockBridge(link_of()[0].rig)
+    bridge.client.answers = False
+    *_, state = states_of(bridge, STREAM, PUSH)
+    assert state.cause == FaultCause.DRIVER
+
+
 def test_a_fault_of_the_controller_is_ended_by_a_stop() -> None:
     _, bridge = link_of()
     states_of(bridge, STREAM, PUSH, b"")
@@ -273,6 +281,55 @@ def test_a_boards_file_is_read_and_what_is_wrong_with_it_named(tmp_path: Path) -
             read_board(path)
     with pytest.raises(InputError, match="no option of a moteus"):
         open_moteus(1.0, {"identifier": 3})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('name = "bridge"', 'name = "a bridge of some length"', "at most 16 ASCII"),
+        ('serial = "1"', 'serial = "\u00fc"', "at most 16 ASCII"),
+        ("\n[controller]\nid = 3\n", "controller = 3\n", "controller is a table"),
+    ],
+)
+def test_a_boards_file_of_the_wrong_form_is_named(
+    old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    assert old in BOARD_TOML
+    path = tmp_path / "board.toml"
+    path.write_text(BOARD_TOML.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError, match=said):
+        read_board(path)
+
+
+@pytest.mark.parametrize("options", [{"sign": "x"}, {"id": 1.5}, {"reply_s": True}])
+def test_an_option_that_is_no_number_is_named(options: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="is a number"):
+        open_moteus(1.0, options)
+
+
+def test_an_adapter_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none_found() -> None:
+        raise RuntimeError("No fdcanusb detected")
+
+    maker = SimpleNamespace(
+        QueryResolution=SimpleNamespace, F32=None, get_singleton_transport=none_found
+    )
+    monkeypatch.setitem(sys.modules, "moteus", maker)
+    with pytest.raises(DeviceError, match="No adapter to the bus"):
+        open_moteus(1.0, {})
+
+
+def test_an_adapter_that_is_pulled_is_a_fault_of_the_driver(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def gone(command: dict[str, Any]) -> None:
+        raise OSError("Input/output error")
+
+    _, bridge = link_of()
+    states_of(bridge, STREAM, PUSH, b"")
+    monkeypatch.setattr(bridge.client, "execute", gone)
+    (state,) = states_of(bridge, PUSH)
+    assert state.cause == FaultCause.DRIVER
 
 
 def test_the_makers_client_takes_what_is_sent() -> None:

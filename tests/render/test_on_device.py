@@ -16,6 +16,7 @@ from scissorcal.device import (
     VirtualRig,
     in_force,
     load_image,
+    open_motion,
 )
 from scissorcal.errors import DeviceError, InputError
 from scissorcal.kernel import (
@@ -264,6 +265,19 @@ def test_a_loss_of_power_while_rendering_ends_it_and_is_named(
         render(session, paper, Rendering(20.0, TWO, on_device=True))
     assert side.drawn.torque[-1] == 0.0
     assert in_force(link) == 0
+
+
+def test_a_rendering_that_was_cut_off_adds_nothing_to_what_runs_next(
+    silent_paper: ModelPackage,
+) -> None:
+    link, _ = device()
+    load_image(link, image_of(silent_paper, PLAIN), lambda *_: None)
+    link.configure(ConfigKey.RENDER, 1.0)
+    with open_motion(link, PLAIN) as motion:
+        samples = np.concatenate(list(motion.watch(0.1)))
+    driven = (samples["flags"] & int(StateFlag.MOTOR_ENABLED)) != 0
+    assert driven.any()
+    assert not (samples["flags"] & int(StateFlag.RENDERING)).any()
 
 
 def test_packages_that_no_device_renders_are_refused_by_name(upper_paper: ModelPackage) -> None:

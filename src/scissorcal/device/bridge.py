@@ -18,6 +18,8 @@ from scissorcal.kernel import Drive, FirmwareBoard, FirmwareCore, FirmwareInputs
 
 CONTROLLER = "controller"
 """Table of a board's file that holds what the controller's class takes."""
+TEXT_BYTES = 16
+"""Of name and serial in an IDENTITY."""
 
 
 class Controller(Protocol):
@@ -57,7 +59,7 @@ class Bridge:
         self._clock = clock
         self._torque = self._force = 0.0
         self._drive = Drive.RELEASE
-        self._last = FirmwareInputs(0, 0.0)
+        self._last = FirmwareInputs(0, 0.0, supply=board.supply_min)  # silence is no lack of supply
         self._received = b""
         self._sent: list[bytes] = []
 
@@ -118,6 +120,8 @@ def read_board(path: Path) -> tuple[FirmwareBoard, dict[str, Any]]:
     except (OSError, ValueError) as error:
         raise InputError(f"The board's file {path} cannot be read: {error}.") from error
     options = table.pop(CONTROLLER, {})
+    if not isinstance(options, dict):
+        raise InputError(f"{path}: {CONTROLLER} is a table: see docs/bridge.md.")
     kinds = {field.name: field.type for field in fields(FirmwareBoard)}
     if unknown := sorted(set(table) - set(kinds)):
         raise InputError(f"{path}: {unknown[0]} is no constant of a board: see docs/bridge.md.")
@@ -126,6 +130,11 @@ def read_board(path: Path) -> tuple[FirmwareBoard, dict[str, Any]]:
         if isinstance(value, bool) or not isinstance(value, wanted):  # type: ignore[arg-type]
             raise InputError(
                 f"{path}: {name} = {value!r} is of the wrong kind: see docs/bridge.md."
+            )
+        if isinstance(value, str) and not (value.isascii() and len(value) <= TEXT_BYTES):
+            raise InputError(
+                f"{path}: {name} = {value!r} does not fit an identity: it has at most {TEXT_BYTES} "
+                "ASCII characters."
             )
     try:
         board = FirmwareBoard(**table)

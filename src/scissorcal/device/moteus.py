@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from scissorcal.errors import InputError, needs_extra
+from scissorcal.errors import DeviceError, InputError, needs_extra
 from scissorcal.kernel import Drive, FirmwareInputs, InputFlag
 
 MODE, POSITION, TORQUE, Q_CURRENT, VOLTAGE, TEMPERATURE, FAULT = 0x0, 0x1, 0x3, 0x4, 0xD, 0xE, 0xF
@@ -66,7 +66,7 @@ class MoteusController:
             reply = self._loop.run_until_complete(
                 asyncio.wait_for(self.client.execute(command), self.reply_s)
             )
-        except TimeoutError:
+        except OSError:  # a timeout is one, too, and so is an adapter that was pulled
             return None
         if reply is None:
             return None
@@ -88,12 +88,17 @@ def open_moteus(torque_limit: float, options: Mapping[str, Any]) -> MoteusContro
     """Open the controller by whatever adapter the vendor's client finds.
 
     ``options`` may have ``id`` (of the bus, by default 1), ``sign`` (1 or -1), ``zero_rad`` and
-    ``reply_s`` of `MoteusController`. Raises InputError for others, and without the extra "moteus".
+    ``reply_s`` of `MoteusController`. Raises InputError for others, and without the extra
+    "moteus"; DeviceError where no adapter is found.
     """
     if wrong := sorted(set(options) - set(OPTIONS)):
         raise InputError(
             f"{wrong[0]} is no option of a moteus: the table controller takes {', '.join(OPTIONS)}."
         )
+    for name, value in options.items():
+        is_number = isinstance(value, int) or (name != "id" and isinstance(value, float))
+        if isinstance(value, bool) or not is_number:
+            raise InputError(f"The option {name} of a moteus is a number, not {value!r}.")
     known = {name: float(value) for name, value in options.items() if name != "id"}
     if abs(known.get("sign", 1.0)) != 1.0:
         raise InputError("The option sign of a moteus is 1 or -1.")
@@ -103,5 +108,14 @@ def open_moteus(torque_limit: float, options: Mapping[str, Any]) -> MoteusContro
         raise needs_extra("device bridge moteus", "moteus", "moteus") from error
     resolution = moteus.QueryResolution()
     resolution.q_current = resolution.voltage = resolution.temperature = moteus.F32
-    client = moteus.Controller(id=int(options.get("id", 1)), query_resolution=resolution)
+    try:
+        transport = moteus.get_singleton_transport()
+    except RuntimeError as error:
+        raise DeviceError(
+            "No adapter to the bus of a moteus was found: plug it in, and allow this "
+            "user to open it (docs/protocol.md has the rule for Linux)."
+        ) from error
+    client = moteus.Controller(
+        id=int(options.get("id", 1)), query_resolution=resolution, transport=transport
+    )
     return MoteusController(client, torque_limit=torque_limit, **known)

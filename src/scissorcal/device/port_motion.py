@@ -10,6 +10,7 @@ from scissorcal.device.lockstep_motion import Exchanging, LockstepMotion
 from scissorcal.device.motion import BLOCK_S, IDLE, LoopTask, Motion, MotionReport, Samples, Stages
 from scissorcal.device.servo_process import ServoProcess
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles
+from scissorcal.device.upload import end_rendering
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     Command,
@@ -28,8 +29,8 @@ def open_motion(
     """Start the servo on a link: in a separate process on a port, in this process in virtual time.
 
     Samples come in blocks of about ``every_s``. It starts idle, with the rig's position known. A
-    fault that the device has latched is cleared. Raises DeviceError, before a motor runs, where the
-    device does not know the zero of its encoders.
+    fault that the device has latched is cleared, and RENDER is 0. Raises DeviceError, before a
+    motor runs, where the device does not know the zero of its encoders.
 
     >>> import numpy as np
     >>> from scissorcal.device.lockstep import LockstepLink
@@ -40,6 +41,7 @@ def open_motion(
     >>> len(samples), bool(samples["torque_command"].any())
     (200, False)
     """
+    end_rendering(link)
     motion: Motion
     if isinstance(link, Exchanging):
         motion = LockstepMotion(link, config, task, every_s)

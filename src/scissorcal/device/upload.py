@@ -8,6 +8,7 @@ from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     IMAGE_FORMAT,
     Capability,
+    ConfigKey,
     Identity,
     LoadBegin,
     LoadChunk,
@@ -65,6 +66,16 @@ def load_image(link: Link, image: bytes, tell: ShowShare) -> int:
             f"{held:08x}, sent {wanted:08x}): restart the device, and start again."
         )
     return wanted
+
+
+def end_rendering(link: Link) -> None:
+    """Set RENDER = 0 where a device renders by itself.
+
+    A rendering that was cut off leaves RENDER at 1, and the package's torque would add to the
+    commands of what runs next.
+    """
+    if link.identity.capabilities & Capability.RENDERS:
+        link.configure(ConfigKey.RENDER, 0.0)
 
 
 def in_force(link: Loading) -> int:

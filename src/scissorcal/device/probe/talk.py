@@ -18,6 +18,7 @@ from scissorcal.device.link import Link, PortLink
 from scissorcal.device.lockstep_motion import Exchanging
 from scissorcal.device.motion import RELEASE_COMMANDS, SILENCE_S
 from scissorcal.device.probe.unsound import STAMPS, what_is_wrong
+from scissorcal.device.upload import end_rendering
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     PROTOCOL_VERSION,
@@ -134,6 +135,7 @@ class Talk(AbstractContextManager["Talk"]):
         self._restarted = False
         self._held_up: list[tuple[int, float]] = []
         """Each time this computer did not listen: rows before it, and how long (s)."""
+        end_rendering(link)
         link.configure(ConfigKey.STREAM, 1.0)
 
     @property
