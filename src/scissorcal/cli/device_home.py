@@ -13,7 +13,7 @@ def home(device: Device, yes: Yes = False, seed: Seed = 0, baud: Baud = None) ->
     Needed after power-on where a device states NOT_HOMED: probes, captures and renderings refuse it
     until then, and never home it themselves. The blades move slowly until they meet their stop.
     Keep the space between them empty and let go of the handles. A device that finds no zero, or
-    latches a fault on the way, is told with the reason (exit code 4).
+    latches a fault on the way, is reported with the reason (exit code 4).
 
     \b
     Example:

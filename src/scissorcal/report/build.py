@@ -191,12 +191,12 @@ def read_twin(text: str | bytes) -> ReportDocument:
 
 
 def schema_text() -> str:
-    """The schema as it stands in ``data_schemas/report.schema.json``."""
+    """Text of ``data_schemas/report.schema.json``."""
     return _schema_text(ReportDocument, "scissorcal report")
 
 
 def comparison_schema_text() -> str:
-    """The schema as it stands in ``data_schemas/comparison.schema.json``."""
+    """Text of ``data_schemas/comparison.schema.json``."""
     from scissorcal.report.comparison import Comparison
 
     return _schema_text(Comparison, "scissorcal comparison of two reports")
