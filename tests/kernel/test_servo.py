@@ -9,6 +9,7 @@ import pytest
 
 from scissorcal.kernel import (
     Command,
+    FaultCause,
     Mode,
     SampleFlag,
     Servo,
@@ -339,6 +340,28 @@ def test_faults_are_cleared_a_limited_number_of_times_and_forces_ramp_up_again()
             assert abs(servo.step(next(states)).force) < 0.02
     assert servo.stop_reason is StopReason.DEVICE_FAULT
     assert command.flags == 0
+
+
+@pytest.mark.parametrize("cause", FaultCause)
+def test_motors_go_on_by_themselves_only_after_a_late_host(cause: FaultCause) -> None:
+    """A cause that is not told, as by a device of version 1, is taken for a late host."""
+    servo = rendering()
+    servo.step(state(1))
+    command = servo.step(state(2, flags=StateFlag.FAULT_LATCHED)._replace(cause=int(cause)))
+    if cause in (FaultCause.NONE, FaultCause.WATCHDOG):
+        assert command.flags == ENABLE | CLEAR_FAULT
+        assert servo.step(state(3)).flags == ENABLE
+    else:
+        assert command == Command(0, 2, 0.0, 0.0)
+        assert servo.stop_reason is StopReason.DEVICE_FAULT
+
+
+def test_a_fault_of_any_cause_from_before_the_start_is_cleared() -> None:
+    servo = rendering()
+    for tick in range(1, 10):
+        stopped = state(tick, flags=StateFlag.FAULT_LATCHED)._replace(cause=FaultCause.STOP_BUTTON)
+        assert servo.step(stopped).flags == ENABLE | CLEAR_FAULT
+    assert servo.step(state(10)).flags == ENABLE
 
 
 def test_a_fault_that_cannot_be_cleared_stops() -> None:

@@ -26,7 +26,9 @@ def stop_sentence(reason: StopReason, cause: int, held_up_s: float) -> str:
     """
     sentence = reason.sentence
     if reason is StopReason.DEVICE_FAULT and cause:
-        sentence = f"{fault_sentence(cause)} The fault did not clear, or came too often."
+        often = cause == FaultCause.WATCHDOG
+        why = "The fault did not clear, or came too often." if often else "Such a fault ends a run."
+        sentence = f"{fault_sentence(cause)} {why}"
     by_itself = reason is StopReason.DEVICE_FAULT and cause not in (0, FaultCause.WATCHDOG)
     if reason not in LATE_STOPS or by_itself or not held_up_s:
         return sentence

@@ -52,6 +52,14 @@ int sc_servo_config_is_sound(const sc_servo_config *config)
            sc_watch_config_is_sound(&config->watch);
 }
 
+/* Only what a late host brings about, or what a device of version 1 does not tell, may be cleared while
+ * motors run: a person who pressed the stop button, and a motor that was too hot or too fast, do not
+ * expect it to go on by itself. */
+static int clears(uint8_t cause)
+{
+    return cause == SC_CAUSE_NONE || cause == SC_CAUSE_WATCHDOG;
+}
+
 /* A latched fault is cleared at the start and then a bounded number of times; else the servo stops.
  * A fault that persists is counted by the clearings that were sent, not by the frames that report
  * it: after a stall of the host hundreds of those are queued, from before any clearing was sent.
@@ -77,6 +85,9 @@ static int handle_fault(const sc_servo_config *config, sc_servo *servo, const sc
         servo->faults += servo->enabled_once;
         servo->opening_integral = 0.0f;
         servo->advance_integral = 0.0f;
+        if (servo->enabled_once && !clears(state->cause)) {
+            sc_servo_stop(servo, SC_STOP_DEVICE_FAULT);
+        }
     }
     servo->engaged_s = 0.0f; /* the ramp begins when the fault ends */
     servo->engaged_at = servo->sequence - servo->track_index; /* the reference waits, too */
