@@ -209,7 +209,21 @@ class ModelPackage:
         record = self.manifest.provenance
         left_out = record.cut.left_out + (record.friction.left_out if record.friction else ())
         beyond = reach_sentences(self.manifest.reach, record.cut.structure.response)
-        return self.review_warnings + self.fit_warnings + left_out + beyond + self._step_warnings
+        fits = self.stated_warnings + self.fit_warnings
+        return self.review_warnings + fits + left_out + beyond + self._step_warnings
+
+    @property
+    def stated_warnings(self) -> tuple[str, ...]:
+        """A sentence where numbers were stated and not measured, else none."""
+        record = self.manifest.provenance
+        fits = {"cut": record.cut, "friction": record.friction}
+        names = [name for name, fit in fits.items() if fit is not None and fit.stated]
+        if not names:
+            return ()
+        return (
+            f"The numbers of {' and '.join(names)} in the package {self.manifest.name} were "
+            "stated, not measured: its band holds the stated standard deviations and nothing else.",
+        )
 
     @property
     def _step_warnings(self) -> tuple[str, ...]:

@@ -140,6 +140,10 @@ class Parameter(Section):
     q95: Finite
 
 
+STATED_SOURCE = "stated numbers, no recording"
+"""The only source of a record whose numbers a person stated (:mod:`scissorcal.stated`)."""
+
+
 class FitRecord(Section):
     """A fit that went into the package; its draws stand in ``draws/<what>.npy``.
 
@@ -154,6 +158,11 @@ class FitRecord(Section):
     parameters: Annotated[tuple[Parameter, ...], Field(min_length=1, max_length=128)]
     warnings: tuple[Text, ...]
     left_out: tuple[Text, ...] = ()
+
+    @property
+    def stated(self) -> bool:
+        """Whether its numbers were stated, not fitted."""
+        return self.sources == (STATED_SOURCE,)
 
 
 class CutRecord(FitRecord):

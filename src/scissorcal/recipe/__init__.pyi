@@ -8,6 +8,7 @@ from .friction import FitFriction as FitFriction
 from .friction import FitFrictionAdvance as FitFrictionAdvance
 from .friction import as_first_named as as_first_named
 from .load import builtin_recipe as builtin_recipe
+from .load import checked_recipe as checked_recipe
 from .load import load_recipe as load_recipe
 from .load import parse_recipe as parse_recipe
 from .load import read_text as read_text
@@ -36,4 +37,5 @@ from .requirements import refuse_long as refuse_long
 from .schema import Limits as Limits
 from .schema import Line as Line
 from .schema import Recipe as Recipe
+from .schema import Scene as Scene
 from .svg.elements import shown_shapes as shown_shapes

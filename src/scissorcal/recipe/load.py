@@ -52,6 +52,17 @@ def parse_recipe(text: str, source: str = "recipe", *, judged: bool = True) -> R
     return recipe
 
 
+def checked_recipe(document: dict[str, Any], source: str) -> Recipe:
+    """Check a recipe given as tables; ``source`` names them in messages. Raises InputError.
+
+    >>> checked_recipe({"format": "scissorcal-recipe/1"}, "my tables").name
+    Traceback (most recent call last):
+    ...
+    scissorcal.errors.InputError: ...
+    """
+    return _checked(document, unlikely_numbers(document), "", Recipe, source)
+
+
 def _old_keys(document: dict[str, Any], source: str) -> list[str]:
     """Tables that name their law by its old key; InputError where one has both."""
     fits = document.get("fit")
