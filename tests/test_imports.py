@@ -42,8 +42,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "bench": LOWEST | {"vision", "device", "calibration", "package", "render"},
     "workday": LOWEST | MIDDLE | {"bench", "prototype"},
     "cli": LOWEST | MIDDLE | {"workday", "bench", "prototype"},
+    "stated": {"model", "calibration", "package", "recipe"},
     "library": {"calibration", "package", "recipe", "recording", "workday"},
-    "<root>": {"library", "package"},
+    "<root>": {"library", "model", "package", "stated"},
     "__main__": {"cli"},
 }
 ROOMS = set(MAY_IMPORT) - {"<root>"}

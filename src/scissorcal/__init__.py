@@ -12,13 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scissorcal.library import open_fit, open_package, open_recording, open_workspace
+    from scissorcal.model import ResponseLaw
     from scissorcal.package import OutsideCoverageWarning
+    from scissorcal.stated import Blades, Friction, Material, build_package
 
     __version__: str
 
 __all__ = [
+    "Blades",
+    "Friction",
+    "Material",
     "OutsideCoverageWarning",
+    "ResponseLaw",
     "__version__",
+    "build_package",
     "open_fit",
     "open_package",
     "open_recording",
@@ -26,7 +33,12 @@ __all__ = [
 ]
 
 
-_HOMES = {"OutsideCoverageWarning": "scissorcal.package", "__version__": "scissorcal.identity"}
+_HOMES = {
+    "OutsideCoverageWarning": "scissorcal.package",
+    "ResponseLaw": "scissorcal.model",
+    "__version__": "scissorcal.identity",
+    **dict.fromkeys(("Blades", "Friction", "Material", "build_package"), "scissorcal.stated"),
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -12,7 +12,7 @@ from scissorcal.calibration.result import Effort
 from scissorcal.calibration.signals.filtering import Bins
 from scissorcal.calibration.signals.zeros import FELT
 from scissorcal.inference import Posterior, Stop
-from scissorcal.model import EdgeDistribution
+from scissorcal.model import EdgeDistribution, ResponseLaw
 from scissorcal.verdicts import Verdict
 
 
@@ -128,11 +128,13 @@ class FrictionRun(FitRun):
 class CutRun(FitRun):
     """How a fit of a cut is run, with the edge that photographs gave in the place of the recipe's.
 
-    Where one of ``edge_verdicts``, those on that edge, failed, the fit fails too.
+    Where one of ``edge_verdicts``, those on that edge, failed, the fit fails too. ``own_law`` is a
+    response law of one's own, in the place of the families that the recipe names.
     """
 
     edge: EdgeDistribution | None = None
     edge_verdicts: tuple[Verdict, ...] = ()
+    own_law: ResponseLaw | None = None
 
 
 class Named(Protocol):

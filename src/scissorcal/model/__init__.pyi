@@ -28,6 +28,13 @@ from .friction_terms import CANDIDATES as CANDIDATES
 from .friction_terms import TERMS as TERMS
 from .friction_terms import law_names as law_names
 from .friction_terms import terms_of as terms_of
+from .own_law import ResponseLaw as ResponseLaw
+from .own_law import as_pair as as_pair
+from .own_law import fit_knots as fit_knots
+from .own_law import law_parameters as law_parameters
+from .own_law import refuse_falling as refuse_falling
+from .own_law import response_of as response_of
+from .own_law import spline_of as spline_of
 from .plate_pieces import Layer as Layer
 from .plate_pieces import Outline as Outline
 from .plate_pieces import spans_on_line as spans_on_line
@@ -50,6 +57,7 @@ __all__ = [
     "EdgeView",
     "FrictionLaw",
     "Response",
+    "ResponseLaw",
     "cut_torque_along",
     "damped",
     "draw_edges",

@@ -28,6 +28,7 @@ from .model_package import FailedFitsWarning as FailedFitsWarning
 from .model_package import ModelPackage as ModelPackage
 from .model_package import OutsideCoverageWarning as OutsideCoverageWarning
 from .model_package import open_package as open_package
+from .reach import scene_depth as scene_depth
 from .records import STATED_SOURCE as STATED_SOURCE
 from .review import REPORT_PAGE as REPORT_PAGE
 from .review import REPORT_TWIN as REPORT_TWIN

@@ -26,19 +26,10 @@ def data_reach(recipe: Recipe, cut: FitResult) -> DataReach | None:
     The scene's are within the torque limit, and of the toughest and thickest layer of a drawn
     plate. A sheet that is only pressed counts up to its thickness.
     """
-    model = central_model(FitDraws.centre(cut), None)
-    known = _data_depth(model, cut)
+    known = _data_depth(central_model(FitDraws.centre(cut), None), cut)
     if known is None:
         return None
-    opening, contact = np.meshgrid(
-        np.linspace(*recipe.scene.opening_rad, OPENINGS),
-        np.linspace(*recipe.scene.contact_m, CONTACTS),
-    )
-    places = Points(opening.ravel(), np.zeros(opening.size), contact.ravel())
-    limit = recipe.limits.torque_Nm
-    if recipe.plate.layers:
-        model, limit = hardest_layer(model, recipe)
-    depth, crossed, through = _scene_depth(model, places, limit)
+    model, depth, crossed, through = _of_scene(recipe, cut)
     response = model.cutting.response
     return DataReach(
         data_depth_m=known,
@@ -49,6 +40,11 @@ def data_reach(recipe: Recipe, cut: FitResult) -> DataReach | None:
         through_share=through,
         tolerance=0.01 * recipe.scene.tolerance_percent,
     )
+
+
+def scene_depth(recipe: Recipe, cut: FitResult) -> float:
+    """How deep (m) a scene presses within its torque limit, by the central law of a fit."""
+    return _of_scene(recipe, cut)[1]
 
 
 def reach_sentences(reach: DataReach | None, law: str) -> tuple[str, ...]:
@@ -80,6 +76,20 @@ def reach_sentences(reach: DataReach | None, law: str) -> tuple[str, ...]:
             "scene.opening_deg and scene.contact_mm."
         )
     return tuple(said)
+
+
+def _of_scene(recipe: Recipe, cut: FitResult) -> tuple[ExactModel, float, float, float]:
+    """The law of the hardest layer, and what :func:`_scene_depth` says of it."""
+    model = central_model(FitDraws.centre(cut), None)
+    opening, contact = np.meshgrid(
+        np.linspace(*recipe.scene.opening_rad, OPENINGS),
+        np.linspace(*recipe.scene.contact_m, CONTACTS),
+    )
+    places = Points(opening.ravel(), np.zeros(opening.size), contact.ravel())
+    limit = recipe.limits.torque_Nm
+    if recipe.plate.layers:
+        model, limit = hardest_layer(model, recipe)
+    return model, *_scene_depth(model, places, limit)
 
 
 def _data_depth(model: ExactModel, cut: FitResult) -> float | None:

@@ -53,13 +53,7 @@ def parse_recipe(text: str, source: str = "recipe", *, judged: bool = True) -> R
 
 
 def checked_recipe(document: dict[str, Any], source: str) -> Recipe:
-    """Check a recipe given as tables; ``source`` names them in messages. Raises InputError.
-
-    >>> checked_recipe({"format": "scissorcal-recipe/1"}, "my tables").name
-    Traceback (most recent call last):
-    ...
-    scissorcal.errors.InputError: ...
-    """
+    """Check a recipe given as tables; ``source`` names them in messages. Raises InputError."""
     return _checked(document, unlikely_numbers(document), "", Recipe, source)
 
 

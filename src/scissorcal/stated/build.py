@@ -9,10 +9,11 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult, FitSeries, FittedParameter
-from scissorcal.package import STATED_SOURCE, ModelPackage, open_package
+from scissorcal.errors import InputError
+from scissorcal.model import spline_of
+from scissorcal.package import STATED_SOURCE, ModelPackage, open_package, scene_depth
 from scissorcal.package import build_package as build_from_fits
 from scissorcal.recipe import Recipe, Scene, checked_recipe, stated_curve
-from scissorcal.stated.law import spline_of
 from scissorcal.stated.numbers import Blades, Friction, Material, draw
 
 DRAWS = 200
@@ -48,20 +49,33 @@ def build_package(
     1 rad/s, with the material from 20 to 80 % of the blades' length. Each stated number is drawn
     from a log-normal of its mean and standard deviation, independently, by ``seed``.
 
-    Raises InputError for numbers that make no recipe, ModelError for a law that gives no number or
+    Raises InputError for numbers that make no recipe or a scene that presses deeper than a law
+    of one's own was asked for, ModelError for a law that gives no number or
     falls, and VerdictError where the tables are further from the model than the scene allows.
 
     >>> from scissorcal import Blades, Friction, Material, build_package
     >>> paper = Material(force_N=(2.0, 0.1), exponent=1.4, toughness_J_per_m2=4000.0, kappa=0.8)
     >>> package = build_package(paper, Blades(), Friction(coulomb_Nm=0.01), "stated.zip")
-    >>> package.torque(0.6, -0.3, 0.04)
+    >>> round(float(package.torque(0.3, -0.3, 0.03)), 3)
+    0.052
     """
     rng = np.random.default_rng(seed)
     recipe = _recipe(material, blades, friction, scene)
     cut = _cut(material, recipe, rng)
+    _refuse_deeper(material, scene_depth(recipe, cut))
     pivot = None if friction is None else _friction(friction, recipe, rng)
     build_from_fits(recipe, pivot, cut, Path(path), rng)
     return open_package(Path(path))
+
+
+def _refuse_deeper(material: Material, depth_m: float) -> None:
+    """A law of one's own is not continued beyond the indentations that it was asked for at."""
+    if material.law is None or 1e3 * depth_m <= material.depths_mm[1]:
+        return
+    raise InputError(
+        f"The scene presses down to {1e3 * depth_m:.3g} mm, and Material.depths_mm ends at "
+        f"{material.depths_mm[1]:.3g} mm: give depths_mm that reach that far, or a narrower scene."
+    )
 
 
 def _recipe(
@@ -69,13 +83,13 @@ def _recipe(
 ) -> Recipe:
     """The recipe that the numbers make; its priors are asked for, and nothing uses them."""
     cuts = material.toughness_J_per_m2 is not None
-    if scene is None:
-        scene = Scene(
-            opening_deg=(12.0, 50.0),
-            opening_rate_rad_per_s=(0.05, 1.0),
-            contact_mm=(0.2 * blades.length_mm, 0.8 * blades.length_mm),
-        )
-    stated = scene.model_dump() | {"cut": cuts, "render_friction": friction is not None}
+    stated: dict[str, Any] = {
+        "opening_deg": (12.0, 50.0),
+        "opening_rate_rad_per_s": (0.05, 1.0),
+        "contact_mm": (0.2 * blades.length_mm, 0.8 * blades.length_mm),
+    }
+    stated |= {} if scene is None else scene.model_dump()
+    stated |= {"cut": cuts, "render_friction": friction is not None}
     low, high = (float(depth) for depth in material.depths_mm)
     reference = (low * high) ** 0.5 if material.law else material.reference_mm
     fit: dict[str, Any] = {"reference_indentation_mm": float(reference)}
@@ -100,7 +114,7 @@ def _cut(material: Material, recipe: Recipe, rng: np.random.Generator) -> FitRes
     response = _law(material, recipe, rng) if material.law else _power(material, rng)
     columns = dict(response.columns)
     structure = geometry_of(recipe, stated_curve(recipe.rig.edge).edge)
-    structure |= {"rate_damping": False, "fracture": "none"} | response.structure
+    structure |= {"rate_damping": False, "fracture": "none", **response.structure}
     if material.toughness_J_per_m2 is not None:
         toughness = _drawn({"fracture_energy": _pair(material.toughness_J_per_m2)}, rng)
         columns["fracture_energy"] = toughness["fracture_energy"] * material.thickness_mm * 1e-3

@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.stated.law import ResponseLaw, as_pair, law_parameters
+from scissorcal.model import ResponseLaw, as_pair, law_parameters
 
 Number = float | tuple[float, float]
 """A number, or a number and its standard deviation."""
@@ -27,9 +27,9 @@ class Material:
     {'force_N': (2.0, 0.1), 'exponent': (1.4, 0.0)}
     """
 
-    force_N: Number | None = None  # noqa: N815
+    force_N: Number | None = None
     exponent: Number | None = None
-    toughness_J_per_m2: Number | None = None  # noqa: N815
+    toughness_J_per_m2: Number | None = None
     kappa: Number | None = None
     thickness_mm: float = 0.1
     reference_mm: float = 0.15
@@ -114,9 +114,9 @@ class Friction:
     {'coulomb': (0.02, 0.002)}
     """
 
-    coulomb_Nm: Number  # noqa: N815
-    viscous_Nm_s_per_rad: Number | None = None  # noqa: N815
-    stribeck_Nm: Number | None = None  # noqa: N815
+    coulomb_Nm: Number
+    viscous_Nm_s_per_rad: Number | None = None
+    stribeck_Nm: Number | None = None
     stribeck_rad_per_s: Number = 0.1
 
     def __post_init__(self) -> None:

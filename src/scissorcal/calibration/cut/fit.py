@@ -22,6 +22,7 @@ from scissorcal.calibration.cut.geometry import Geometry
 from scissorcal.calibration.cut.guess import CoarseEncoderError, NoUnloadingError
 from scissorcal.calibration.cut.known import CutBasis, KnownFriction
 from scissorcal.calibration.cut.model import CutExperiment
+from scissorcal.calibration.cut.own_law import as_spline_fit, refuse_unusable
 from scissorcal.calibration.cut.path_motion import PathMotion, path_motion
 from scissorcal.calibration.cut.scout import (
     MisfitError,
@@ -29,7 +30,13 @@ from scissorcal.calibration.cut.scout import (
     make_experiment,
     scout,
 )
-from scissorcal.calibration.cut.structure import NUISANCE, CutLaw, allowed_laws, usual_law
+from scissorcal.calibration.cut.structure import (
+    NUISANCE,
+    CutLaw,
+    allowed_laws,
+    own_laws,
+    usual_law,
+)
 from scissorcal.calibration.cut.unknowns import with_toughness, with_unknowns
 from scissorcal.calibration.cut.widening import (
     AveragedLaw,
@@ -139,6 +146,9 @@ def fit_cut(
     data = _Data.of(recordings, recipe, friction, run.edge, prior)
     _refuse_no_contact(data)
     allowed = allowed_laws(recipe)
+    if run.own_law is not None:
+        refuse_unusable(run.own_law, recipe.fit.cut.reference_indentation_mm * 1e-3)
+        allowed = own_laws(recipe, run.own_law)
     near = prior.laws if prior else ()
     laws = candidates_for(effort, allowed, usual_law, run.last_chosen, near)
     run.tell(0.05, "cut: finding where cracks rest and run")
@@ -181,7 +191,10 @@ def fit_cut(
         Particulars(verdicts, notes, diagnostics, recipe.fit.cut.critic and effort != "draft"),
         rng,
     )
-    return with_unknowns(with_toughness(fit, recipe, rng), recipe, friction, recordings)
+    fit = with_toughness(fit, recipe, rng)
+    if run.own_law is not None:
+        fit = as_spline_fit(fit, run.own_law)
+    return with_unknowns(fit, recipe, friction, recordings)
 
 
 def cut_experiment(

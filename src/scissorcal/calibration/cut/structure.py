@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,17 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import FitResult
-from scissorcal.model import Cutting, Edge, EdgeDistribution, Response
+from scissorcal.model import (
+    Cutting,
+    Edge,
+    EdgeDistribution,
+    Response,
+    ResponseLaw,
+    law_parameters,
+    response_of,
+)
 from scissorcal.model.checks import LARGEST, SMALLEST
-from scissorcal.model.terms import IDENTITY
+from scissorcal.model.terms import IDENTITY, LOG
 from scissorcal.recipe.edge import stated_curve
 from scissorcal.recipe.priors import AnyPrior
 from scissorcal.recipe.schema import Recipe
@@ -39,6 +47,11 @@ def cutting_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> C
 def response_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Response:
     """The response of a fit's structure, with parameters by name."""
     family, reference = structure["response"], structure["reference_indentation_m"]
+    if family == "own":
+        law = structure["response_law"]
+        stated = law_parameters(law)
+        named = {name: values.get(name, np.asarray(value)) for name, (value, _) in stated.items()}
+        return response_of(law, named, reference)
     # a trial far out may overflow; its torque is then no number, and the trial is rejected
     force, exponent = (
         np.clip(values[name], SMALLEST, LARGEST) for name in ("response_force", "response_exponent")
@@ -175,7 +188,9 @@ class CutLaw:
 
     ``response`` is the family of the force at the edge, ``damped`` says that it grows with the
     speed of sinking in, ``fracture`` is "none", "smooth" or "rippled", ``loaded`` says that
-    friction grows with the cut's torque. ``knots_m`` are a spline's.
+    friction grows with the cut's torque. ``knots_m`` are a spline's, ``own`` is a law of one's own,
+    whose ``response`` is "own" until the fit is done
+    (:func:`scissorcal.calibration.cut.own_law.as_spline_fit`).
     """
 
     response: str
@@ -183,6 +198,7 @@ class CutLaw:
     damped: bool = False
     loaded: bool = False
     knots_m: tuple[float, ...] = ()
+    own: ResponseLaw | None = None
 
     @classmethod
     def of(cls, structure: Mapping[str, Any]) -> "CutLaw":
@@ -206,6 +222,7 @@ class CutLaw:
             "fracture": self.fracture,
             "load_share": self.loaded,
             **({"response_knots_m": self.knots_m} if self.knots_m else {}),
+            **({"response_law": self.own} if self.own is not None else {}),
         }
 
     @property
@@ -214,7 +231,8 @@ class CutLaw:
         fracture = "no fracture" if self.fracture == "none" else f"{self.fracture} fracture"
         damped = ", damped" if self.damped else ""
         loaded = f", {LOADED}" if self.loaded else ""
-        return f"{self.response} response{damped}, {fracture}{loaded}"
+        response = type(self.own).__name__ if self.own is not None else self.response
+        return f"{response} response{damped}, {fracture}{loaded}"
 
 
 def allowed_laws(recipe: Recipe) -> list[CutLaw]:
@@ -233,6 +251,12 @@ def allowed_laws(recipe: Recipe) -> list[CutLaw]:
     dampings, loads = choices[settings.rate_damping], choices[settings.load_share]
     laws = itertools.product(loads, fractures, dampings, families)
     return [CutLaw(family, fracture, damped, loaded) for loaded, fracture, damped, family in laws]
+
+
+def own_laws(recipe: Recipe, own: ResponseLaw) -> list[CutLaw]:
+    """The laws that a recipe allows, with a response of one's own in the place of its families."""
+    laws = [replace(law, response="own", own=own) for law in allowed_laws(recipe)]
+    return list(dict.fromkeys(laws))
 
 
 def usual_law(laws: Sequence[CutLaw]) -> CutLaw:
@@ -287,6 +311,8 @@ def cut_layout(recipe: Recipe, law: CutLaw, offset_sd: tuple[float, float]) -> L
         _stated("response_force", "N", settings.response_force_N, depth),
         _stated("response_exponent", "1", settings.response_exponent, "how force stiffens"),
     ]
+    if law.own is not None:
+        rows = _own_rows(law.own)
     steps = "logarithm by which the exponent changes from one interval of the spline to the next"
     rows += [
         _stated(f"response_shape_{index}", "1", priors.response_shape, steps)
@@ -311,6 +337,19 @@ def cut_layout(recipe: Recipe, law: CutLaw, offset_sd: tuple[float, float]) -> L
         meaning = "share of the cut's torque that friction adds"
         rows.append(_stated("load_share", "1", priors.load_share, meaning))
     return (RippleLayout if law.fracture == "rippled" else Layout)(tuple(rows))
+
+
+def _own_rows(own: ResponseLaw) -> list[Parameter]:
+    """What a law of one's own leaves open: its numbers with a standard deviation, as priors."""
+    rows = []
+    for name, (value, sd) in law_parameters(own).items():
+        if sd > 0.0:
+            variance = float(np.log1p((sd / value) ** 2))
+            centre = float(np.log(value)) - 0.5 * variance
+            unit = name.rpartition("_")[2] if "_" in name else "1"
+            meaning = f"of {type(own).__name__}"
+            rows.append(Parameter(name, unit, LOG, centre, variance**0.5, meaning))
+    return rows
 
 
 def _fracture(recipe: Recipe, law: CutLaw) -> list[Parameter]:

@@ -1,5 +1,7 @@
 """A response law of one's own, as the spline that fits, proofs and tables work with."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from typing import Protocol, runtime_checkable
@@ -8,12 +10,20 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError, ModelError
-from scissorcal.model import Response
+from scissorcal.model.checks import LARGEST, SMALLEST
+from scissorcal.model.response import Response
 
 MOST_KNOTS = 16
 """What a manifest stores of a spline."""
 
 FEWEST_KNOTS = 4
+FIT_SPAN = (0.02, 20.0)
+"""Indentations of a law in a fit, in multiples of the reference: what lies below carries no force
+that is felt, and a cut does not reach beyond."""
+
+SLOPES = (1e-3, 1e2)
+"""Exponents that a trial of a search is held to; a law that falls is refused before."""
+
 PLACES = 20
 """Places between two knots at which the spline is compared with the law."""
 
@@ -56,15 +66,8 @@ def spline_of(
     worst, where = math.inf, low
     for count in range(FEWEST_KNOTS, MOST_KNOTS + 1):
         knots = np.geomspace(low, high, count)
-        forces = _forces(law, knots, draws)
-        slopes = np.diff(np.log(forces), axis=-1) / np.diff(np.log(knots))
-        shape = np.diff(np.log(slopes), axis=-1)
-        exponent = np.exp(np.mean(np.log(slopes), axis=-1))
-        unit = Response(
-            "spline", np.ones((len(forces), 1)), exponent[:, None], reference,
-            shape[:, None, :], tuple(knots.tolist()),
-        )  # fmt: skip
-        force = forces[:, 0] / unit.force_at(knots[:1])[:, 0]
+        force, exponent, shape = _through(_forces(law, knots, draws), knots, reference)
+        unit = _unit(exponent[:, None], shape[:, None, :], knots, reference)
         between = np.exp(_refined(np.log(knots)))
         wanted = _forces(law, between, draws)
         off = np.abs(force[:, None] * unit.force_at(between) / wanted - 1.0)
@@ -76,6 +79,56 @@ def spline_of(
         f"{worst:.1%} off at {1e3 * where:.3g} mm, and {allowed:.1%} is allowed. Give a law "
         "without a step, or a narrower range of indentations in Material.depths_mm."
     )
+
+
+def response_of(law: ResponseLaw, values: Mapping[str, Array], reference_m: float) -> Response:
+    """A law as the spline of 16 knots that a fit evaluates, from 0.02 to 20 times the reference.
+
+    ``values`` by name are scalars or arrays (k,). A trial of a search may be where the law gives no
+    number: it is held at the ends of what a response can have, and the search leaves it.
+    """
+    knots = fit_knots(reference_m)
+    columns = np.broadcast_arrays(
+        *(np.asarray(value, dtype=np.float64) for value in values.values())
+    )
+    rows = zip(*(column.ravel() for column in columns), strict=True)
+    with np.errstate(all="ignore"):
+        forces = np.array(
+            [law.force_N(knots, **dict(zip(values, map(float, row), strict=True))) for row in rows]
+        )
+    finite = np.where(np.isfinite(forces), forces, LARGEST)
+    force, exponent, shape = _through(np.clip(finite, SMALLEST, LARGEST), knots, reference_m)
+    given = columns[0].shape
+    return Response(
+        "spline",
+        force.reshape(given),
+        exponent.reshape(given),
+        reference_m,
+        shape.reshape((*given, -1)),
+        tuple(knots.tolist()),
+    )
+
+
+def fit_knots(reference_m: float) -> Array:
+    """Knots (m) of a law in a fit: what a cut and its teeth reach, about the reference."""
+    return np.geomspace(FIT_SPAN[0] * reference_m, FIT_SPAN[1] * reference_m, MOST_KNOTS)
+
+
+def _through(forces: Array, knots: Array, reference: float) -> tuple[Array, Array, Array]:
+    """Force at the reference, exponent and shape of splines through ``forces`` (rows, knots)."""
+    rises = np.diff(np.log(forces), axis=-1) / np.diff(np.log(knots))
+    slopes = np.clip(rises, *SLOPES)
+    shape = np.diff(np.log(slopes), axis=-1)
+    exponent = np.exp(np.mean(np.log(slopes), axis=-1))
+    unit = _unit(exponent[:, None], shape[:, None, :], knots, reference)
+    middle = knots[len(knots) // 2 : len(knots) // 2 + 1]
+    at_middle = forces[:, len(knots) // 2] / unit.force_at(middle)[:, 0]
+    return np.clip(at_middle, SMALLEST, LARGEST), exponent, shape
+
+
+def _unit(exponent: Array, shape: Array, knots: Array, reference: float) -> Response:
+    knots_m = tuple(knots.tolist())
+    return Response("spline", np.ones_like(exponent), exponent, reference, shape, knots_m)
 
 
 def law_parameters(law: ResponseLaw) -> dict[str, tuple[float, float]]:
@@ -111,13 +164,19 @@ def as_pair(name: str, value: float | tuple[float, float]) -> tuple[float, float
     return number, sd
 
 
+def refuse_falling(law: ResponseLaw, depths: Array, draws: Mapping[str, Array]) -> None:
+    """Raise ModelError, a sentence with the place, where a law gives no number or does not rise."""
+    _forces(law, depths, draws)
+
+
 def _forces(law: ResponseLaw, depths: Array, draws: Mapping[str, Array]) -> Array:
     """Forces (draws, depths) of a law, after checking that they are numbers that rise."""
     count = len(next(iter(draws.values())))
     rows = []
     for row in range(count):
         values = {name: float(column[row]) for name, column in draws.items()}
-        force = np.asarray(law.force_N(depths, **values), dtype=np.float64)
+        with np.errstate(all="ignore"):  # what is no number is refused with its place
+            force = np.asarray(law.force_N(depths, **values), dtype=np.float64)
         _refuse_unusable(law, depths, force, values)
         rows.append(force)
     return np.stack(rows)

@@ -1,0 +1,106 @@
+"""A cut's fit with a response law of one's own, as the fit of a spline that any room can read."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from scissorcal.aliases import Array
+from scissorcal.calibration.parameters import FittedParameter
+from scissorcal.calibration.result import FitResult
+from scissorcal.errors import InputError
+from scissorcal.model import ResponseLaw, fit_knots, law_parameters, refuse_falling, response_of
+
+CHECKED = 50
+"""Draws of a law's prior at which it must rise, beside its own numbers."""
+
+
+def refuse_unusable(law: ResponseLaw, reference_m: float) -> None:
+    """Refuse a law that leaves nothing open, gives no number or falls, before a long fit.
+
+    Raises InputError or ModelError, sentences.
+    """
+    stated = law_parameters(law)
+    if not any(sd > 0.0 for _, sd in stated.values()):
+        raise InputError(
+            f"The law {type(law).__name__} leaves nothing to fit: give a number and its standard "
+            "deviation, the prior, for what the data are to tell."
+        )
+    rng = np.random.default_rng(0)
+    columns = {}
+    for name, (value, sd) in stated.items():
+        spread = np.sqrt(np.log1p((sd / value) ** 2))
+        z = np.append(0.0, rng.standard_normal(CHECKED))
+        columns[name] = value * np.exp(spread * z)
+    refuse_falling(law, fit_knots(reference_m), columns)
+
+
+def as_spline_fit(fit: FitResult, law: ResponseLaw) -> FitResult:
+    """The fit with the law's response as a spline, and the law's own parameters as derived ones.
+
+    So packages, reports and files need not know the law: its code is in no file. Draw by draw the
+    spline has the law's force at its knots (:func:`scissorcal.model.response_of`).
+    """
+    stated = law_parameters(law)
+    names = [parameter.name for parameter in fit.parameters]
+    own = [index for index, name in enumerate(names) if name in stated]
+    kept = [index for index, name in enumerate(names) if name not in stated]
+    reference = float(fit.structure["reference_indentation_m"])
+
+    def columns(rows: Array) -> Array:
+        given = {n: np.full(len(rows), value) for n, (value, _) in stated.items()}
+        given |= {names[index]: rows[:, index] for index in own}
+        response = response_of(law, given, reference)
+        spline = [np.asarray(response.force), np.asarray(response.exponent)]
+        spline += list(np.asarray(response.shape).T)
+        return np.column_stack([*spline, rows[:, kept]])
+
+    draws, point = columns(fit.draws), columns(fit.map_point[None, :])[0]
+    prior = None if fit.prior_draws is None else columns(fit.prior_draws)
+    knots = tuple(float(knot) for knot in fit_knots(reference))
+    shapes = [f"response_shape_{index}" for index in range(1, len(knots) - 1)]
+    spline_names = ["response_force", "response_exponent", *shapes]
+    parameters = tuple(
+        FittedParameter(
+            name,
+            "N" if name == "response_force" else "1",
+            identifiability=_narrowed(draws[:, index], prior, index),
+            meaning=f"of the spline through {type(law).__name__}",
+            **FittedParameter.summary_of(draws[:, index]),
+        )
+        for index, name in enumerate(spline_names)
+    )
+    derived = tuple(fit.parameters[index] for index in own)
+    before = fit.derived_draws
+    derived_draws = fit.draws[:, own] if before is None else np.hstack([fit.draws[:, own], before])
+    return replace(
+        fit,
+        parameters=(*parameters, *(fit.parameters[index] for index in kept)),
+        draws=draws,
+        map_point=point,
+        prior_draws=prior,
+        structure=_as_spline(fit.structure, knots),
+        candidates=tuple(_as_spline(row, knots) for row in fit.candidates),
+        derived=(*derived, *fit.derived),
+        derived_draws=derived_draws,
+    )
+
+
+def _narrowed(draws: Array, prior: Array | None, index: int) -> float:
+    """The posterior's width over the prior's; 1 where either does not vary."""
+    width = 0.0 if prior is None else float(np.std(prior[:, index]))
+    return min(1.0, float(np.std(draws)) / width) if width > 0.0 else 1.0
+
+
+def _as_spline(choices: Mapping[str, Any], knots: tuple[float, ...]) -> dict[str, Any]:
+    """Choices of a law without the object; nested ones, too."""
+    plain: dict[str, Any] = {}
+    for name, value in choices.items():
+        if name == "response_law":
+            plain["response_knots_m"] = knots
+        elif name == "response" and value == "own":
+            plain[name] = "spline"
+        else:
+            plain[name] = _as_spline(value, knots) if isinstance(value, Mapping) else value
+    return plain
