@@ -1,0 +1,284 @@
+"""The page of an identified joint: parameters, friction curve, residuals, what is missing."""
+
+from collections.abc import Sequence
+from datetime import datetime
+
+import numpy as np
+
+from scissorcal.aliases import Array
+from scissorcal.calibration import friction_curve
+from scissorcal.calibration.friction.curve import partial_residuals
+from scissorcal.identify.gaps import identified
+from scissorcal.identify.joint import Held, Identified
+from scissorcal.identify.simple import simple_law
+from scissorcal.identify.words import plain
+from scissorcal.report.html import panels_page
+from scissorcal.report.panel import (
+    Axis,
+    Chart,
+    Panel,
+    Row,
+    Series,
+    Value,
+    band,
+    curve,
+    number,
+    percent_of,
+    points,
+    words,
+)
+
+PART = "identify"
+MOST_POINTS = 1500
+"""Points of a cloud that a page draws."""
+MOST_LAG = 200
+
+
+def page_of(joint: Identified, panels: Sequence[Panel], made: tuple[datetime, str]) -> str:
+    """The offline page of `panels_of`."""
+    logs = ", ".join(recording.source for recording in joint.recordings)
+    return panels_page("Joint", logs, panels, made=made, findings=(panels[0].sentence,))
+
+
+def panels_of(joint: Identified, held: Sequence[Held] = ()) -> list[Panel]:
+    """The panels in order: parameters, curve, residuals, other logs, gaps, simple laws, checks."""
+    found = [_parameters(joint), _gaps(joint), _curve(joint), _residuals(joint)]
+    if held:
+        found.append(_held(joint, held))
+    return [*found, _simple(joint), _checks(joint)]
+
+
+def _parameters(joint: Identified) -> Panel:
+    fit = joint.fit
+    rows = [
+        Row(
+            parameter.name,
+            (
+                number(
+                    "median", parameter.q50, parameter.unit, low=parameter.q05, high=parameter.q95
+                ),
+                words("identified", identified(fit, parameter.name)),
+            ),
+            parameter.meaning,
+        )
+        for parameter in fit.parameters
+    ]
+    sentence = (
+        f"{fit.candidate}: inertia {_of(joint, 'inertia')}; the law leaves {joint.rms:.3g} "
+        f"{fit.effort_unit} rms, {joint.relative_rms:.1%} of the effort."
+    )
+    how = (
+        "intervals by the posterior's curvature; --effort standard samples them"
+        if fit.effort == "draft"
+        else "intervals by sampling"
+    )
+    return Panel(
+        "parameters",
+        PART,
+        "Parameters",
+        sentence,
+        rows=tuple(rows),
+        notes=joint.notes,
+        caption=f"Medians with 90 % intervals, {how}, widened for autocorrelated residuals.",
+    )
+
+
+def _of(joint: Identified, name: str) -> str:
+    parameter = joint.fit.parameter(name)
+    value = number("", parameter.q50, low=parameter.q05, high=parameter.q95)
+    return f"{value} {parameter.unit}"
+
+
+def _curve(joint: Identified) -> Panel:
+    fit = joint.fit
+    factor, unit = _shown(fit.position_unit)
+    found = friction_curve(fit)
+    series: list[Series] = []
+    if found is not None:
+        rate = factor * found.rate
+        half = len(rate) // 2
+        for part, name in ((slice(0, half), ""), (slice(half, None), " ")):
+            shown = [each[part] for each in (rate, found.friction, found.low, found.high)]
+            series.append(band(f"90 %{name}", shown[0], shown[2], shown[3], "blue"))
+            series.append(curve(f"law{name}", shown[0], shown[1], "blue"))
+        measured = partial_residuals(fit)
+        kept = _thinned(len(measured))
+        places = factor * fit.series.opening_rate[kept]
+        series.insert(0, points("measured, less inertia", places, measured[kept], "muted"))
+    chart = Chart(
+        "friction-curve",
+        "Friction over speed",
+        Axis("speed", f"{unit}/s"),
+        Axis("friction", fit.effort_unit),
+        tuple(series),
+        caption="Line and band: the law in the middle of the travel. Points: what was measured, "
+        "less inertia and offset.",
+    )
+    return Panel("curve", PART, "Friction curve", charts=(chart,))
+
+
+def _residuals(joint: Identified) -> Panel:
+    fit = joint.fit
+    series = fit.series
+    factor, unit = _shown(fit.position_unit)
+    left = series.measured - series.predicted
+    kept = _thinned(len(left))
+    over = (
+        ("time", series.time_s, "s"),
+        ("speed", factor * series.opening_rate, f"{unit}/s"),
+        ("position", factor * series.opening, unit),
+    )
+    charts = [
+        Chart(
+            f"residuals-{name}",
+            f"Residuals over {name}",
+            Axis(name, shown),
+            Axis("residual", fit.effort_unit),
+            (points("measured - law", values[kept], left[kept], "blue"),),
+            small=True,
+        )
+        for name, values, shown in over
+    ]
+    ripple = _ripple(series.opening, left)
+    rows = []
+    if ripple is not None:
+        period, size, low, high = ripple
+        rows.append(
+            Row(
+                "strongest ripple over the position",
+                (
+                    number("amplitude", size, fit.effort_unit, low=low, high=high),
+                    number("period", factor * period, unit),
+                ),
+                "a sine over the position, the same in both directions; not in the law",
+            )
+        )
+    share = fit.diagnostics.get("independent_share")
+    if share is not None:
+        rows.append(
+            Row(
+                "residuals",
+                (
+                    number("rms", joint.rms, fit.effort_unit),
+                    percent_of("of the effort", joint.relative_rms),
+                    number("independent", float(share) * len(left)),
+                    Value("windows", len(left)),
+                ),
+            )
+        )
+    return Panel("residuals", PART, "Residuals", rows=tuple(rows), charts=tuple(charts))
+
+
+def _ripple(position: Array, left: Array) -> tuple[float, float, float, float] | None:
+    """Period and amplitude, with its 90 % interval, of the strongest sine over the position.
+
+    The periodogram of the residuals at whole fractions of the travel, down to 200 of them. The
+    interval takes the residuals of a quarter of a period's travel for one.
+    """
+    travel = float(np.ptp(position))
+    if travel <= 0.0 or len(left) < 10:
+        return None
+    orders = np.arange(1.0, MOST_LAG + 1)
+    steps = np.median(np.abs(np.diff(position)))
+    orders = orders[orders < travel / max(4.0 * float(steps), 1e-300)]
+    if not len(orders):
+        return None
+    waves = np.exp(-2j * np.pi * np.outer(orders, (position - position.min()) / travel))
+    sums = 2.0 * waves @ left / len(left)
+    best = int(np.argmax(np.abs(sums)))
+    size = float(np.abs(sums[best]))
+    passes = float(np.sum(np.abs(np.diff(position)))) / (travel / orders[best])
+    error = 1.645 * float(np.std(left)) * float(np.sqrt(2.0 / max(4.0 * passes, 1.0)))
+    return float(travel / orders[best]), size, max(size - error, 0.0), size + error
+
+
+def _held(joint: Identified, held: Sequence[Held]) -> Panel:
+    unit = joint.fit.effort_unit
+    rows, charts = [], []
+    for place, log in enumerate(held):
+        rows.append(
+            Row(
+                log.source,
+                (
+                    number("rms", log.rms, unit),
+                    percent_of("of the effort", log.relative_rms),
+                    percent_of("in the band", log.share_inside),
+                ),
+                log.band,
+            )
+        )
+        seen = log.prediction
+        kept = _thinned(len(seen.time_s))
+        time = seen.time_s[kept]
+        charts.append(
+            Chart(
+                f"predicted-{place}",
+                f"{log.source}: predicted from its motion alone",
+                Axis("time", "s"),
+                Axis("effort", unit),
+                (
+                    band("band", time, seen.low[kept], seen.high[kept], "blue"),
+                    curve("measured", time, seen.measured[kept], "ink"),
+                    curve("predicted", time, seen.predicted[kept], "vermillion"),
+                ),
+            )
+        )
+    return Panel(
+        "held-out",
+        PART,
+        "Logs that the fit did not see",
+        rows=tuple(rows),
+        charts=tuple(charts),
+    )
+
+
+def _gaps(joint: Identified) -> Panel:
+    rows = tuple(
+        Row(gap.what, (words("why", gap.why),), gap.motion) for gap in joint.gaps
+    )
+    return Panel(
+        "gaps",
+        PART,
+        "Not identified, and which motion would",
+        rows=rows,
+        caption="No: the 90 % interval spans a decade, or is as wide as the prior. Roughly: the "
+        "interval is wider than its middle.",
+    )
+
+
+def _simple(joint: Identified) -> Panel:
+    unit, rows = joint.fit.effort_unit, []
+    for name, constant in (("symmetric", False), ("symmetric, with a constant effort", True)):
+        law = simple_law(joint.fit, constant=constant)
+        values = [
+            number("Coulomb", law.coulomb, unit),
+            number("viscous", law.viscous, f"{unit} s/{joint.fit.position_unit}"),
+            number("constant", law.offset, unit),
+            number("off by (rms)", law.rms, unit),
+            number("99 %", law.worst, unit),
+        ]
+        rows.append(Row(name, tuple(values)))
+    return Panel(
+        "simple-laws",
+        PART,
+        "What a simulator's Coulomb and viscous friction leaves",
+        rows=tuple(rows),
+        caption="Off: the closest such law less the fitted one, over the motion of the log.",
+    )
+
+
+def _checks(joint: Identified) -> Panel:
+    rows = tuple(
+        Row(verdict.check, (words("result", verdict.status),), plain(verdict.why))
+        for verdict in joint.fit.verdicts
+    )
+    return Panel("checks", PART, "Checks", rows=rows)
+
+
+def _thinned(count: int) -> slice:
+    return slice(None, None, max(1, -(-count // MOST_POINTS)))
+
+
+def _shown(unit: str) -> tuple[float, str]:
+    """Factor and unit by which people read positions."""
+    return (float(np.degrees(1.0)), "deg") if unit == "rad" else (1e3, "mm")
