@@ -11,7 +11,8 @@ from .joint import compare as compare
 from .joint import identify as identify
 from .page import page_of as page_of
 from .page import panels_of as panels_of
-from .sensors import ESTIMATED as ESTIMATED
+from .ripple import Ripple as Ripple
+from .ripple import ripples_of as ripples_of
 from .sensors import Sensors as Sensors
 from .sensors import corrected as corrected
 from .sensors import estimate_delay as estimate_delay

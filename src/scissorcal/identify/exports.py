@@ -44,7 +44,8 @@ def _facts(joint: Identified, constant: bool) -> list[str]:
         f"Identified from {', '.join(recording.source for recording in joint.recordings)}: "
         f"{fit.candidate}.",
         f"Friction here is off the fitted law by {law.rms:.3g} {unit} rms (99 %: {law.worst:.3g} "
-        f"{unit}) over the motion of the log.",
+        f"{unit}) over the motion of the log, and leaves {law.measured_rms:.3g} {unit} rms of the "
+        f"measured effort, where the fitted law leaves {joint.rms:.3g}.",
         *([f"Not expressed: {', '.join(lacking)}."] if lacking else []),
     ]
 
@@ -247,6 +248,7 @@ def result_of(joint: Identified) -> dict[str, Any]:
             "symmetric": asdict(simple_law(fit, constant=False)),
             "with_constant": asdict(simple_law(fit, constant=True)),
         },
+        "ripple": [asdict(ripple) for ripple in joint.ripples],
         "notes": list(joint.notes),
     }
 

@@ -13,8 +13,6 @@ from scissorcal.model.terms import LOG
 
 DECADE = 10.0
 """Ratio of the ends of a 90 % interval from which not even the order of magnitude is known."""
-ONE_SPEED = 1.5
-"""Speeds of strokes within this factor are one speed: that of the check of strokes of a fit."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class Gap:
 def gaps_of(fit: FitResult) -> tuple[Gap, ...]:
     """What is not identified: parameters, choices between laws, and what no log tells."""
     rows = [gap for parameter in fit.parameters if (gap := _of_parameter(fit, parameter.name))]
-    return (*rows, *_undecided(fit), *_beyond(fit))
+    return (*_one_speed(fit), *rows, *_undecided(fit), *_beyond(fit))
 
 
 def identified(fit: FitResult, name: str) -> str:
@@ -108,20 +106,38 @@ def _motion(fit: FitResult, stem: str) -> str:
 
 def _undecided(fit: FitResult) -> list[Gap]:
     """Laws that the log does not tell from the chosen one, and how far apart they are."""
-    rows = []
-    for entry in fit.candidates:
-        if not entry["equivalent"] or entry["chosen"] or "values" not in entry:
-            continue
-        apart = _apart(fit, entry["values"])
-        rows.append(
-            Gap(
-                f'law "{entry["name"]}"',
-                f'hold-out strokes do not tell it from "{fit.candidate}"; over the measured speeds '
-                f"the two differ by at most {apart:.2g} {fit.effort_unit}.",
-                "More strokes, slower and faster ones among them, would decide.",
-            )
+    rivals = [
+        entry
+        for entry in fit.candidates
+        if entry["equivalent"] and not entry["chosen"] and "values" in entry
+    ]
+    if not rivals:
+        return []
+    apart = max(_apart(fit, entry["values"]) for entry in rivals)
+    names = ", ".join(f'"{entry["name"]}"' for entry in rivals)
+    return [
+        Gap(
+            "form of the law",
+            f'hold-out strokes do not tell "{fit.candidate}" from {names}; over the measured '
+            f"motion they differ by at most {apart:.2g} {fit.effort_unit}.",
+            "More strokes, slower and faster ones among them, would decide.",
         )
-    return rows
+    ]
+
+
+def _one_speed(fit: FitResult) -> list[Gap]:
+    """That friction at other speeds is not known, where the check of the strokes' speeds fails."""
+    failed = [v for v in fit.verdicts if v.check == "strokes" and v.status == "fail"]
+    if not failed:
+        return []
+    return [
+        Gap(
+            "friction at other speeds",
+            "all strokes have one speed, so that viscous, Coulomb and Stribeck friction differ in "
+            "the starts and stops alone.",
+            _motion(fit, "viscous"),
+        )
+    ]
 
 
 def _apart(fit: FitResult, values: dict[str, float]) -> float:

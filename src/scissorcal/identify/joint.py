@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from scissorcal.calibration.friction.predict import Prediction, effort_band, pre
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.errors import InputError
 from scissorcal.identify.gaps import Gap, gaps_of
+from scissorcal.identify.ripple import Ripple, ripples_of
 from scissorcal.identify.sensors import (
     Delay,
     Sensors,
@@ -55,6 +56,13 @@ class Identified:
     delay: Delay | None
     gaps: tuple[Gap, ...]
     notes: tuple[str, ...]
+
+    @cached_property
+    def ripples(self) -> tuple[Ripple, ...]:
+        """What repeats over the position in the residuals."""
+        series = self.fit.series
+        left = series.measured - series.predicted
+        return ripples_of(series.opening, np.sign(series.opening_rate), left)
 
     @property
     def rms(self) -> float:

@@ -31,7 +31,6 @@ from scissorcal.report.panel import (
 PART = "identify"
 MOST_POINTS = 1500
 """Points of a cloud that a page draws."""
-MOST_LAG = 200
 
 
 def page_of(joint: Identified, panels: Sequence[Panel], made: tuple[datetime, str]) -> str:
@@ -42,7 +41,7 @@ def page_of(joint: Identified, panels: Sequence[Panel], made: tuple[datetime, st
 
 def panels_of(joint: Identified, held: Sequence[Held] = ()) -> list[Panel]:
     """The panels in order: parameters, curve, residuals, other logs, gaps, simple laws, checks."""
-    found = [_parameters(joint), _gaps(joint), _curve(joint), _residuals(joint)]
+    found = [_parameters(joint), _gaps(joint), _curve(joint), _residuals(joint), _ripple(joint)]
     if held:
         found.append(_held(joint, held))
     return [*found, _simple(joint), _checks(joint)]
@@ -139,20 +138,7 @@ def _residuals(joint: Identified) -> Panel:
         )
         for name, values, shown in over
     ]
-    ripple = _ripple(series.opening, left)
     rows = []
-    if ripple is not None:
-        period, size, low, high = ripple
-        rows.append(
-            Row(
-                "strongest ripple over the position",
-                (
-                    number("amplitude", size, fit.effort_unit, low=low, high=high),
-                    number("period", factor * period, unit),
-                ),
-                "a sine over the position, the same in both directions; not in the law",
-            )
-        )
     share = fit.diagnostics.get("independent_share")
     if share is not None:
         rows.append(
@@ -169,27 +155,32 @@ def _residuals(joint: Identified) -> Panel:
     return Panel("residuals", PART, "Residuals", rows=tuple(rows), charts=tuple(charts))
 
 
-def _ripple(position: Array, left: Array) -> tuple[float, float, float, float] | None:
-    """Period and amplitude, with its 90 % interval, of the strongest sine over the position.
-
-    The periodogram of the residuals at whole fractions of the travel, down to 200 of them. The
-    interval takes the residuals of a quarter of a period's travel for one.
-    """
-    travel = float(np.ptp(position))
-    if travel <= 0.0 or len(left) < 10:
-        return None
-    orders = np.arange(1.0, MOST_LAG + 1)
-    steps = np.median(np.abs(np.diff(position)))
-    orders = orders[orders < travel / max(4.0 * float(steps), 1e-300)]
-    if not len(orders):
-        return None
-    waves = np.exp(-2j * np.pi * np.outer(orders, (position - position.min()) / travel))
-    sums = 2.0 * waves @ left / len(left)
-    best = int(np.argmax(np.abs(sums)))
-    size = float(np.abs(sums[best]))
-    passes = float(np.sum(np.abs(np.diff(position)))) / (travel / orders[best])
-    error = 1.645 * float(np.std(left)) * float(np.sqrt(2.0 / max(4.0 * passes, 1.0)))
-    return float(travel / orders[best]), size, max(size - error, 0.0), size + error
+def _ripple(joint: Identified) -> Panel:
+    factor, unit = _shown(joint.fit.position_unit)
+    rows = []
+    for ripple in joint.ripples:
+        size = number(
+            "amplitude", ripple.amplitude, joint.fit.effort_unit, low=ripple.low, high=ripple.high
+        )
+        kind = "friction, changes sign with the direction" if ripple.signed else "both ways alike"
+        rows.append(
+            Row(
+                f"{ripple.speed}, {kind}",
+                (
+                    size,
+                    number("period", factor * ripple.period, unit),
+                    words("shown", "yes" if ripple.shown else "no"),
+                ),
+            )
+        )
+    return Panel(
+        "ripple",
+        PART,
+        "Ripple over the position, beside the law",
+        rows=tuple(rows),
+        caption="The strongest sine of the residuals: slow has fewer than 6 periods in the travel. "
+        "Shown: noise alone has it in one log of 10,000 at most.",
+    )
 
 
 def _held(joint: Identified, held: Sequence[Held]) -> Panel:
@@ -255,7 +246,7 @@ def _simple(joint: Identified) -> Panel:
             number("viscous", law.viscous, f"{unit} s/{joint.fit.position_unit}"),
             number("constant", law.offset, unit),
             number("off by (rms)", law.rms, unit),
-            number("99 %", law.worst, unit),
+            number("leaves of the log", law.measured_rms, unit),
         ]
         rows.append(Row(name, tuple(values)))
     return Panel(

@@ -14,8 +14,6 @@ from scissorcal.errors import InputError
 from scissorcal.identify.columns import CHANNELS
 from scissorcal.recording import Recording
 
-ESTIMATED = "fit"
-"""Stands in the place of a number that is to be estimated."""
 SENSORS = ("position", "effort", "load")
 MOST_DELAY_S = 0.05
 """Longest delay that is searched: later readings are of another stroke's motion."""
@@ -86,48 +84,34 @@ def corrected(recording: Recording, sensors: Sensors) -> Recording:
     return replace(recording, samples=samples[kept])
 
 
-def estimate_delay(
-    squares: Callable[[float], float], independent: float, tick_s: float
-) -> Delay:
+def estimate_delay(squares: Callable[[float], float], independent: float, tick_s: float) -> Delay:
     """The delay that leaves the least squares, with its interval by the profile likelihood.
 
     ``squares`` gives the mean squared residual of a fit at a delay (s). Of n independent residuals
-    twice the log-likelihood falls by n log(S / S_least); a parabola through the three lowest points
-    gives where it falls by 2.71 (90 %). Raises InputError where the least lies at the end of the
-    search, or the interval is wider than the search: the log does not tell the delay.
+    twice the log-likelihood falls by n log(S / S_least); parabolas through three points, ever
+    closer, give its top and where it has fallen by 2.71 (90 %). Raises InputError where the top
+    lies beyond the search, or the interval is wider than it: the log does not tell the delay.
     """
-    known: dict[float, float] = {}
-
-    def at(delay_s: float) -> float:
-        if delay_s not in known:
-            known[delay_s] = squares(delay_s)
-        return known[delay_s]
-
-    step, middle = 4.0 * tick_s, 0.0
-    while step > 0.2 * tick_s:
-        while True:
-            left, here, right = at(middle - step), at(middle), at(middle + step)
-            if here <= min(left, right):
-                break
-            middle += -step if left < right else step
-            if abs(middle) > MOST_DELAY_S:
-                raise InputError(
-                    f"No delay of the effort up to {1e3 * MOST_DELAY_S:g} ms explains the log "
-                    "best. Check that the position and the effort are of one joint, or state the "
-                    "delay: --delay effort=SECONDS."
-                )
-        step *= 0.5
-    step *= 2.0
-    places = np.array([middle - step, middle, middle + step])
-    depth = independent * np.log(np.array([at(place) for place in places.tolist()]) / at(middle))
-    curvature = float(depth[0] + depth[2]) / step**2
-    slope = float(depth[2] - depth[0]) / (2.0 * step)
-    if curvature <= 0.0:
+    middle, reach = 0.0, 0.0
+    for ticks in (4.0, 4.0, 1.0, 0.5):
+        step = ticks * tick_s
+        left, here, right = (squares(middle + side * step) for side in (-1.0, 0.0, 1.0))
+        below, above = (independent * np.log(side / here) for side in (left, right))
+        curvature = (below + above) / step**2
+        if curvature <= 0.0:  # beyond the parabola's part: walk on
+            middle += -4.0 * step if left < right else 4.0 * step
+        else:
+            middle -= float(np.clip((above - below) / (2.0 * step * curvature), -0.01, 0.01))
+            reach = float(np.sqrt(2.71 / curvature))
+        if abs(middle) > MOST_DELAY_S:
+            raise InputError(
+                f"No delay of the effort up to {1e3 * MOST_DELAY_S:g} ms explains the log best. "
+                "Check that position and effort are of one joint, or state the delay: "
+                "--delay effort=SECONDS."
+            )
+    if not 0.0 < reach <= MOST_DELAY_S:
         raise InputError(_not_told())
-    value, reach = middle - slope / curvature, float(np.sqrt(2.71 / curvature))
-    if reach > MOST_DELAY_S:
-        raise InputError(_not_told())
-    return Delay(value, value - reach, value + reach)
+    return Delay(middle, middle - reach, middle + reach)
 
 
 def _not_told() -> str:

@@ -14,7 +14,8 @@ class SimpleLaw:
     """``coulomb`` sgn(w) + ``viscous`` w + ``offset``, closest to the fit over the log's motion.
 
     ``rms`` and ``worst`` are what it leaves of the fit's friction there (rms, and at 99 % of the
-    windows), in the effort's unit. ``offset`` is 0 where the target has no constant effort.
+    windows), ``measured_rms`` what it leaves of the measured effort, in the effort's unit.
+    ``offset`` is 0 where the target has no constant effort.
     """
 
     coulomb: float
@@ -22,6 +23,7 @@ class SimpleLaw:
     offset: float
     rms: float
     worst: float
+    measured_rms: float
 
 
 def full_friction(fit: FitResult) -> Array:
@@ -76,4 +78,5 @@ def simple_law(fit: FitResult, *, constant: bool) -> SimpleLaw:
         offset=levels[2],
         rms=float(np.sqrt(np.mean(left**2))),
         worst=float(np.quantile(np.abs(left), 0.99)),
+        measured_rms=float(np.sqrt(np.mean((left + fit.series.measured - fit.series.predicted) ** 2))),
     )

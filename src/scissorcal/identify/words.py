@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from scissorcal.errors import InputError
 
 _WORDS = (
+    (r"^Imported from", "Read from"),
     (r"'scissorcal import'", "'scissorcal identify'"),
     (r"handle_force needs the handle radius.*", "load needs a column."),
     (r"(\d+) closing and (\d+) opening strokes", r"\1 backward and \2 forward strokes"),
@@ -22,8 +23,10 @@ _WORDS = (
     (r"\bCapture sweeps\b", "Record strokes"),
     (r"fit\.friction\.cutoff_Hz", "--cutoff-hz"),
     (r"fit\.friction\.law", "the law"),
+    (r"\bsweep more slowly", "move more slowly"),
     (r"\bsweeps\b", "strokes"),
     (r"\bsweep\b", "stroke"),
+    (r"; --critic asks it", "; --effort standard asks it"),
     (r"\bswept\b", "recorded"),
     (r", and import them again", ", and read them again"),
     (
