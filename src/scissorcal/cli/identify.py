@@ -200,6 +200,7 @@ def identify(
             "rms": log.rms,
             "relative_rms": log.relative_rms,
             "share_inside": log.share_inside,
+            "beyond": log.beyond,
         }
         for log in held
     ]

@@ -1,6 +1,6 @@
 """Identify a joint from its logs, and predict another log."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -78,12 +78,17 @@ class Identified:
 
 @dataclass(frozen=True)
 class Held:
-    """A log that the fit did not see, predicted from its motion alone."""
+    """A log that the fit did not see, predicted from its motion alone.
+
+    ``beyond`` is the share of its motion that is faster than all of the fitted logs, or outside
+    their positions: the prediction there rests on the form of the law.
+    """
 
     source: str
     rms: float
     relative_rms: float
     share_inside: float
+    beyond: float
     band: str
     prediction: Prediction
 
@@ -154,16 +159,31 @@ def compare(joint: Identified, recording: Recording) -> Held:
         rms=found.rms_error,
         relative_rms=found.rms_error / float(np.sqrt(mean_square(measured))),
         share_inside=found.share_inside,
+        beyond=_beyond(joint.fit, found),
         band=plain(band.sentence),
         prediction=found,
     )
+
+
+def _beyond(fit: FitResult, found: Prediction) -> float:
+    """Share of a prediction's motion outside the speeds and positions of the fit."""
+    series, moving = fit.series, found.moving
+    place, speed = found.opening[moving], np.abs(found.rate[moving])
+    outside = (place < series.opening.min()) | (place > series.opening.max())
+    outside |= speed > np.abs(series.opening_rate).max()
+    return float(np.mean(outside))
 
 
 def _shifted(recording: Recording, delay_s: float) -> Recording:
     return corrected(recording, Sensors(delay_s={"effort": delay_s}))
 
 
-def _delay(recordings, draft, settings, fitted):  # type: ignore[no-untyped-def]
+def _delay(
+    recordings: tuple[Recording, ...],
+    draft: FitResult,
+    settings: FitFriction,
+    fitted: Callable[[tuple[Recording, ...], FitFriction], FitResult],
+) -> Delay:
     """Estimate the effort's delay by fits of the drafted law alone."""
     structure = draft.structure
     law = settings.model_copy(

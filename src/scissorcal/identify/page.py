@@ -29,6 +29,9 @@ from scissorcal.report.panel import (
 )
 
 PART = "identify"
+LEAST_BEYOND = 0.05
+"""Share of a log's motion beyond the fitted one from which its band is not promised: half of the
+tenth of the samples that the band leaves out."""
 MOST_POINTS = 1500
 """Points of a cloud that a page draws."""
 
@@ -194,8 +197,9 @@ def _held(joint: Identified, held: Sequence[Held]) -> Panel:
                     number("rms", log.rms, unit),
                     percent_of("of the effort", log.relative_rms),
                     percent_of("in the band", log.share_inside),
+                    percent_of("beyond the fitted motion", log.beyond),
                 ),
-                log.band,
+                _promise(log),
             )
         )
         seen = log.prediction
@@ -220,6 +224,17 @@ def _held(joint: Identified, held: Sequence[Held]) -> Panel:
         "Logs that the fit did not see",
         rows=tuple(rows),
         charts=tuple(charts),
+    )
+
+
+def _promise(log: Held) -> str:
+    """What the band promises, and what it does not where the log's motion is beyond the fit's."""
+    if log.beyond < LEAST_BEYOND:
+        return log.band
+    return (
+        f"{log.beyond:.0%} of its motion is faster than the fitted logs, or outside their "
+        "positions: the prediction there rests on the form of the law and on what is not "
+        "identified, and the band does not hold. Fit a log with such motion as well."
     )
 
 
