@@ -117,9 +117,7 @@ def identify(
         raise InputError("The logs are of a turning and of a sliding joint: fit logs of one joint.")
     as_read = tuple(corrected(recording, sensors) for recording in recordings)
     priors = _scaled_priors(as_read)
-    settings = _Settings(
-        adopt=adopt, cutoff_Hz=cutoff_Hz, critic=effort != "draft", priors=priors
-    )
+    settings = _Settings(adopt=adopt, cutoff_Hz=cutoff_Hz, critic=effort != "draft", priors=priors)
 
     def fitted(logs: tuple[Recording, ...], law: FitFriction, how: Effort) -> FitResult:
         with as_of_a_joint():
@@ -239,5 +237,3 @@ def _times(prior: object, factor: float) -> object:
         return LogNormalPrior(median=median, factor_90=prior.factor_90)
     assert isinstance(prior, NormalPrior)
     return NormalPrior(mean=prior.mean * factor, sd=prior.sd * factor)
-
-

@@ -239,9 +239,7 @@ def _promise(log: Held) -> str:
 
 
 def _gaps(joint: Identified) -> Panel:
-    rows = tuple(
-        Row(gap.what, (words("why", gap.why),), gap.motion) for gap in joint.gaps
-    )
+    rows = tuple(Row(gap.what, (words("why", gap.why),), gap.motion) for gap in joint.gaps)
     return Panel(
         "gaps",
         PART,

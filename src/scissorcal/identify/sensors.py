@@ -87,31 +87,36 @@ def corrected(recording: Recording, sensors: Sensors) -> Recording:
 def estimate_delay(squares: Callable[[float], float], independent: float, tick_s: float) -> Delay:
     """The delay that leaves the least squares, with its interval by the profile likelihood.
 
-    ``squares`` gives the mean squared residual of a fit at a delay (s). Of n independent residuals
-    twice the log-likelihood falls by n log(S / S_least); parabolas through three points, ever
-    closer, give its top and where it has fallen by 2.71 (90 %). Raises InputError where the top
-    lies beyond the search, or the interval is wider than it: the log does not tell the delay.
+    ``squares`` gives the mean squared residual of a fit at a delay (s). The least is walked to by
+    steps of four samples, then of one. Of n independent residuals twice the log-likelihood falls by
+    n log(S / S_least): a parabola through the three lowest gives its top, and where it has fallen
+    by 2.71 (90 %). Raises InputError where the top lies beyond the search, or the interval is
+    wider than it: the log does not tell the delay.
     """
-    middle, reach = 0.0, 0.0
-    for ticks in (4.0, 4.0, 1.0, 0.5):
-        step = ticks * tick_s
-        left, here, right = (squares(middle + side * step) for side in (-1.0, 0.0, 1.0))
-        below, above = (independent * np.log(side / here) for side in (left, right))
-        curvature = (below + above) / step**2
-        if curvature <= 0.0:  # beyond the parabola's part: walk on
-            middle += -4.0 * step if left < right else 4.0 * step
-        else:
-            middle -= float(np.clip((above - below) / (2.0 * step * curvature), -0.01, 0.01))
-            reach = float(np.sqrt(2.71 / curvature))
-        if abs(middle) > MOST_DELAY_S:
-            raise InputError(
-                f"No delay of the effort up to {1e3 * MOST_DELAY_S:g} ms explains the log best. "
-                "Check that position and effort are of one joint, or state the delay: "
-                "--delay effort=SECONDS."
-            )
-    if not 0.0 < reach <= MOST_DELAY_S:
+    known: dict[int, float] = {}
+
+    def at(ticks: int) -> float:
+        if ticks not in known:
+            known[ticks] = squares(ticks * tick_s)
+        return known[ticks]
+
+    place = 0
+    for step in (4, 1):
+        while min(at(place - step), at(place + step)) < at(place):
+            place += step if at(place + step) < at(place - step) else -step
+            if abs(place * tick_s) > MOST_DELAY_S:
+                raise InputError(
+                    f"No delay of the effort up to {1e3 * MOST_DELAY_S:g} ms explains the log "
+                    "best. Check that position and effort are of one joint, or state the delay: "
+                    "--delay effort=SECONDS."
+                )
+    below, above = (independent * np.log(at(place + side) / at(place)) for side in (-1, 1))
+    curvature = (below + above) / tick_s**2
+    if curvature <= 0.0 or 2.71 / curvature > MOST_DELAY_S**2:
         raise InputError(_not_told())
-    return Delay(middle, middle - reach, middle + reach)
+    value = place * tick_s - (above - below) / (2.0 * tick_s * curvature)
+    reach = float(np.sqrt(2.71 / curvature))
+    return Delay(value, value - reach, value + reach)
 
 
 def _not_told() -> str:

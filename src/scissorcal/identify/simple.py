@@ -78,5 +78,7 @@ def simple_law(fit: FitResult, *, constant: bool) -> SimpleLaw:
         offset=levels[2],
         rms=float(np.sqrt(np.mean(left**2))),
         worst=float(np.quantile(np.abs(left), 0.99)),
-        measured_rms=float(np.sqrt(np.mean((left + fit.series.measured - fit.series.predicted) ** 2))),
+        measured_rms=float(
+            np.sqrt(np.mean((left + fit.series.measured - fit.series.predicted) ** 2))
+        ),
     )
