@@ -110,7 +110,7 @@ def test_declared_sensors_are_taken_off(folder: Path) -> None:
     [{"gain": {"effort": 0.0}}, {"delay_s": {"effort": 3.0}}, {"offset": {"torque": 1.0}}],
 )
 def test_a_sensor_that_cannot_be_is_refused(sensors: dict[str, dict[str, float]]) -> None:
-    with pytest.raises(InputError, match="--(gain|delay|offset)"):
+    with pytest.raises(InputError, match=r"--(gain|delay|offset)"):
         Sensors(**sensors)
 
 

@@ -6,9 +6,10 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from scissorcal.aliases import Array
 from scissorcal.calibration import fit_friction, friction_experiment
 from scissorcal.calibration.fit_model import FrictionRun
-from scissorcal.calibration.friction.predict import Prediction, effort_band, predict_effort
+from scissorcal.calibration.friction.predict import Band, Prediction, effort_band, predict_effort
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.errors import InputError
 from scissorcal.identify.gaps import Gap, gaps_of
@@ -81,7 +82,8 @@ class Held:
     """A log that the fit did not see, predicted from its motion alone.
 
     ``beyond`` is the share of its motion that is faster than all of the fitted logs, or outside
-    their positions: the prediction there rests on the form of the law.
+    their positions or loads: the prediction there rests on the form of the law. The band is that of
+    a new recording where several were fitted, else that of a new stroke; `promise` is in words.
     """
 
     source: str
@@ -89,7 +91,7 @@ class Held:
     relative_rms: float
     share_inside: float
     beyond: float
-    band: str
+    promise: str
     prediction: Prediction
 
 
@@ -148,6 +150,8 @@ def compare(joint: Identified, recording: Recording) -> Held:
     with as_of_a_joint():
         design = friction_experiment(joint.recordings, joint.settings, joint.fit)
         band = effort_band(design, joint.fit)
+        if band.new_recording is not None:
+            band = replace(band, moving=band.new_recording)
         found = predict_effort(joint.fit, band, (seen,), joint.settings.cutoff_Hz)
     measured = found.measured[found.moving & np.isfinite(found.measured)]
     if not len(measured):
@@ -157,19 +161,36 @@ def compare(joint: Identified, recording: Recording) -> Held:
         rms=found.rms_error,
         relative_rms=found.rms_error / float(np.sqrt(mean_square(measured))),
         share_inside=found.share_inside,
-        beyond=_beyond(joint.fit, found),
-        band=plain(band.sentence),
+        beyond=_beyond(joint, found, seen),
+        promise=_promise(band),
         prediction=found,
     )
 
 
-def _beyond(fit: FitResult, found: Prediction) -> float:
-    """Share of a prediction's motion outside the speeds and positions of the fit."""
-    series, moving = fit.series, found.moving
+def _promise(band: Band) -> str:
+    """What the band of a log that was not fitted promises."""
+    if band.new_recording is None:
+        return plain(band.sentence)
+    return (
+        f"{band.level:.0%} of the samples of a new recording, made like the {band.recordings} of "
+        "the fit, lie in the band: its width is from the errors on each of them without it."
+    )
+
+
+def _beyond(joint: Identified, found: Prediction, seen: Recording) -> float:
+    """Share of a prediction's motion outside the speeds, positions and loads of the fit."""
+    series, moving = joint.fit.series, found.moving
     place, speed = found.opening[moving], np.abs(found.rate[moving])
     outside = (place < series.opening.min()) | (place > series.opening.max())
     outside |= speed > np.abs(series.opening_rate).max()
+    known = np.concatenate([_load(recording) for recording in joint.recordings])
+    load = np.interp(found.time_s[moving], seen.device_time_s, _load(seen))
+    outside |= (load < known.min()) | (load > known.max())
     return float(np.mean(outside))
+
+
+def _load(recording: Recording) -> Array:
+    return np.asarray(recording.samples["handle_force"], dtype=np.float64)
 
 
 def _shifted(recording: Recording, delay_s: float) -> Recording:

@@ -5,7 +5,6 @@ from datetime import datetime
 
 import numpy as np
 
-from scissorcal.aliases import Array
 from scissorcal.calibration import friction_curve
 from scissorcal.calibration.friction.curve import partial_residuals
 from scissorcal.identify.gaps import identified
@@ -43,11 +42,11 @@ def page_of(joint: Identified, panels: Sequence[Panel], made: tuple[datetime, st
 
 
 def panels_of(joint: Identified, held: Sequence[Held] = ()) -> list[Panel]:
-    """The panels in order: parameters, curve, residuals, other logs, gaps, simple laws, checks."""
-    found = [_parameters(joint), _gaps(joint), _curve(joint), _residuals(joint), _ripple(joint)]
-    if held:
-        found.append(_held(joint, held))
-    return [*found, _simple(joint), _checks(joint)]
+    """The panels in order: the joint, what is missing, other logs, residuals, reading, checks."""
+    first = [_parameters(joint), _curve(joint), _gaps(joint)]
+    others = [_held(joint, held)] if held else []
+    rest = [_residuals(joint), _ripple(joint), _simple(joint), _reading(joint), _checks(joint)]
+    return [*first, *others, *rest]
 
 
 def _parameters(joint: Identified) -> Panel:
@@ -60,8 +59,8 @@ def _parameters(joint: Identified) -> Panel:
                     "median", parameter.q50, parameter.unit, low=parameter.q05, high=parameter.q95
                 ),
                 words("identified", identified(fit, parameter.name)),
+                words("meaning", parameter.meaning),
             ),
-            parameter.meaning,
         )
         for parameter in fit.parameters
     ]
@@ -70,9 +69,9 @@ def _parameters(joint: Identified) -> Panel:
         f"{fit.effort_unit} rms, {joint.relative_rms:.1%} of the effort."
     )
     how = (
-        "intervals by the posterior's curvature; --effort standard samples them"
+        "by the posterior's curvature (--effort standard samples it)"
         if fit.effort == "draft"
-        else "intervals by sampling"
+        else "by sampling"
     )
     return Panel(
         "parameters",
@@ -80,8 +79,7 @@ def _parameters(joint: Identified) -> Panel:
         "Parameters",
         sentence,
         rows=tuple(rows),
-        notes=joint.notes,
-        caption=f"Medians with 90 % intervals, {how}, widened for autocorrelated residuals.",
+        caption=f"Medians with 90 % intervals: {how}; widened for autocorrelated residuals.",
     )
 
 
@@ -97,12 +95,12 @@ def _curve(joint: Identified) -> Panel:
     found = friction_curve(fit)
     series: list[Series] = []
     if found is not None:
-        rate = factor * found.rate
-        half = len(rate) // 2
-        for part, name in ((slice(0, half), ""), (slice(half, None), " ")):
-            shown = [each[part] for each in (rate, found.friction, found.low, found.high)]
-            series.append(band(f"90 %{name}", shown[0], shown[2], shown[3], "blue"))
-            series.append(curve(f"law{name}", shown[0], shown[1], "blue"))
+        rate, law, low, high = (
+            np.insert(values, len(found.rate) // 2, np.nan)  # no line through rest
+            for values in (factor * found.rate, found.friction, found.low, found.high)
+        )
+        series.append(band("90 %", rate, low, high, "blue"))
+        series.append(curve("law", rate, law, "blue"))
         measured = partial_residuals(fit)
         kept = _thinned(len(measured))
         places = factor * fit.series.opening_rate[kept]
@@ -228,14 +226,20 @@ def _held(joint: Identified, held: Sequence[Held]) -> Panel:
 
 
 def _promise(log: Held) -> str:
-    """What the band promises, and what it does not where the log's motion is beyond the fit's."""
-    if log.beyond < LEAST_BEYOND:
-        return log.band
-    return (
-        f"{log.beyond:.0%} of its motion is faster than the fitted logs, or outside their "
-        "positions: the prediction there rests on the form of the law and on what is not "
-        "identified, and the band does not hold. Fit a log with such motion as well."
-    )
+    """What the band promises, and why it does not hold where it does not."""
+    if log.beyond >= LEAST_BEYOND:
+        return (
+            f"{log.beyond:.0%} of its motion is faster than the fitted logs, or outside their "
+            "positions or loads: the prediction there rests on the form of the law and on what is "
+            "not identified, and the band does not hold. Fit a log with such motion as well."
+        )
+    if log.share_inside < 0.5:
+        return (
+            "The log differs from the fitted ones by more than those do among themselves, as after "
+            "another set-up or at another temperature: fit several logs that differ so. "
+            + log.promise
+        )
+    return log.promise
 
 
 def _gaps(joint: Identified) -> Panel:
@@ -269,6 +273,12 @@ def _simple(joint: Identified) -> Panel:
         rows=tuple(rows),
         caption="Off: the closest such law less the fitted one, over the motion of the log.",
     )
+
+
+def _reading(joint: Identified) -> Panel:
+    """How the logs were read, and what was done with them."""
+    names = ", ".join(recording.source for recording in joint.recordings)
+    return Panel("reading", PART, "How it was read", f"{names}.", notes=joint.notes)
 
 
 def _checks(joint: Identified) -> Panel:
