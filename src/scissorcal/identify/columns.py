@@ -69,10 +69,8 @@ def read_log(path: Path, options: LogOptions = LogOptions()) -> Recording:
     column is missing or several could be meant, and where a unit is not known.
     """
     with as_of_a_joint():
-        if path.suffix == ".mcap":
-            recording = read_recording(path)
-        else:
-            recording = _table(path, options)
+        stored = path.suffix == ".mcap"
+        recording = read_recording(path) if stored else _table(path, options)
         _refuse_constant(path, recording)
     return recording
 
@@ -206,9 +204,9 @@ def _kind(
         if channel == "effort" and ("N", 1) in dimension:
             return "linear" if dimension == of_linear else "rotary"
     raise InputError(
-        f"{path}: the unit of the position {_heading(path, headings, columns['position'])!r} is not "
-        "known, so whether the joint turns or slides is not either. State it: -u position=deg, "
-        "-u position=mm (or, with a scale, --joint)."
+        f"{path}: the unit of the position {_heading(path, headings, columns['position'])!r} "
+        "is not known, so whether the joint turns or slides is not either. State it: "
+        "-u position=deg, -u position=mm (or, with a scale, --joint)."
     )
 
 
@@ -226,5 +224,5 @@ def _refuse_constant(path: Path, recording: Recording) -> None:
 
 
 def named(recording: Recording) -> Recording:
-    """The recording under its file's name alone: a page that is passed on tells nothing of disks."""
+    """The recording under its file's name alone: a page tells nothing of the disk."""
     return replace(recording, source=Path(recording.source).name)

@@ -17,7 +17,7 @@ DECADE = 10.0
 
 @dataclass(frozen=True)
 class Gap:
-    """One quantity that the log does not determine: ``what``, ``why``, and the ``motion`` for it."""
+    """A quantity that the log does not determine: ``what``, ``why``, and the ``motion`` for it."""
 
     what: str
     why: str

@@ -30,8 +30,8 @@ from scissorcal.recording import Recording
 USUAL_EFFORT = {"rotary": 0.05, "linear": 50.0}
 """Drive (rms; N m, N) of the joints that the priors of a friction fit are stated for."""
 LAWS = tuple(law for law in CANDIDATES if "viscous" in parts_of(law))
-"""All have viscous friction: where one speed alone was recorded it keeps its prior's width, and what
-Coulomb friction loses to it stands in the intervals of both."""
+"""All have viscous friction: where one speed alone was recorded it keeps its prior's width, and
+what Coulomb friction loses to it stands in the intervals of both."""
 
 
 class _Settings(FitFriction):
@@ -229,7 +229,7 @@ def _scaled_priors(recordings: Sequence[Recording]) -> JointPriors:
     """
     kind = recordings[0].joint.kind
     drive = np.sqrt(np.mean([mean_square(r.drive_effort) for r in recordings]))
-    factor = 10.0 ** np.round(np.log10(max(float(drive), 1e-12) / USUAL_EFFORT[kind]))
+    factor = float(10.0 ** np.round(np.log10(max(float(drive), 1e-12) / USUAL_EFFORT[kind])))
     usual = JointPriors()
     if factor == 1.0:
         return usual
