@@ -133,8 +133,8 @@ def _one_speed(fit: FitResult) -> list[Gap]:
     return [
         Gap(
             "friction at other speeds",
-            "all strokes have one speed, so that viscous, Coulomb and Stribeck friction differ in "
-            "the starts and stops alone.",
+            "all strokes are alike in speed, so that viscous, Coulomb and Stribeck friction differ "
+            "only by how the speed changes within a stroke.",
             _motion(fit, "viscous"),
         )
     ]

@@ -113,13 +113,13 @@ def estimate_delay(squares: Callable[[float], float], independent: float, tick_s
     below, above = (independent * np.log(at(place + side) / at(place)) for side in (-1, 1))
     curvature = (below + above) / tick_s**2
     if curvature <= 0.0 or 2.71 / curvature > MOST_DELAY_S**2:
-        raise InputError(_not_told())
+        raise InputError(_delay_unknown())
     value = place * tick_s - (above - below) / (2.0 * tick_s * curvature)
     reach = float(np.sqrt(2.71 / curvature))
     return Delay(value, value - reach, value + reach)
 
 
-def _not_told() -> str:
+def _delay_unknown() -> str:
     return (
         "The log does not tell the delay of the effort: only motion whose effort changes quickly "
         "does. Record quick reversals or a chirp, or state it: --delay effort=SECONDS."
