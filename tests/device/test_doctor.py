@@ -1,6 +1,7 @@
 """The doctor measures what is there, and names the remedy for what is wrong."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -73,6 +74,24 @@ def test_each_problem_fails_its_check_and_names_the_remedy(
     (verdict,) = failed(diagnose(measured, "/dev/ttyUSB0"))
     assert verdict.check == check
     assert remedy in verdict.why
+
+
+def test_a_busy_computer_fails_no_virtual_rig() -> None:
+    busy = replace(
+        SOUND,
+        simulated=True,
+        round_trip=Percentiles.of(np.full(100, 30.0)),
+        interval=Percentiles.of(np.full(100, 40.0)),
+        lateness=Percentiles.of(np.full(100, 20.0)),
+        unanswered=1,
+        lost=20,
+    )
+    verdicts = {verdict.check: verdict for verdict in diagnose(busy, "sim")}
+    times = ("round trip", "frame intervals", "lost frames", "wake-up lateness")
+    assert {verdicts[name].status for name in times} == {"not_evaluated"}
+    assert all("'scissorcal device doctor --device sim' again" in verdicts[n].why for n in times)
+    real = {v.check: v.status for v in diagnose(replace(busy, simulated=False), "/dev/ttyUSB0")}
+    assert {real[name] for name in times} == {"fail"}
 
 
 def test_what_was_not_measured_is_not_judged() -> None:

@@ -1,6 +1,7 @@
 """States of the steps: what makes a result stale, incomplete, failed or unverified."""
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -123,6 +124,20 @@ def test_an_earlier_version_is_kept_and_restored(copied: Workspace) -> None:
     assert copied.fit_path("friction").read_bytes() == before
     assert state(copied, "fit cut") == "unverified"
     assert [version.current for version in versions(Engine.of(copied), "friction")].count(True) == 1
+
+
+def test_a_copy_of_a_workspace_keeps_the_names_of_its_versions(copied: Workspace) -> None:
+    fit_workspace(copied, ("friction",), FitOptions(seed=7, force=True))
+    before = versions(Engine.of(copied), "friction")
+    for file in copied.root.rglob("*"):
+        os.utime(file, (1e9, 1e9))  # as a copy without times of files
+    after = versions(Engine.of(copied), "friction")
+    assert {version.name for version in after} == {version.name for version in before}
+    (earlier,) = (version for version in before if not version.current)
+    assert [v.time_utc for v in after if not v.current] == [earlier.time_utc]
+    restored, _ = restore(Engine.of(copied), earlier.path.parent.name)  # its folder names it, too
+    assert restored.name == earlier.name
+    assert len(versions(Engine.of(copied), "friction")) == 2
 
 
 def test_a_fit_that_cannot_be_written_leaves_the_earlier_one(

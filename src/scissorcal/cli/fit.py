@@ -241,19 +241,20 @@ def log(
     \b
     Example:
       $ scissorcal fit log friction
-      version                               model                                   checks
-      friction-20261122T143201Z-1f2e3d4c *  stribeck + angle, symmetric (standard)  passed
-      friction-20261121T091500Z-9a8b7c6d    coulomb + viscous, symmetric (draft)    failed: k-hat
+      version              written (UTC)     model                                   checks
+      friction-1f2e3d4c *  2026-11-22 14:32  stribeck + angle, symmetric (standard)  passed
+      friction-9a8b7c6d    2026-11-21 09:15  coulomb + viscous, symmetric (draft)    failed: k-hat
     """
     from scissorcal.workday.engine import Engine
     from scissorcal.workday.history import versions
 
     found = versions(Engine.of(open_workspace(folder)), what or "")
-    rows = [["version", "model", "checks"]]
+    rows = [["version", "written (UTC)", "model", "checks"]]
     for version in found:
         checks = f"failed: {', '.join(version.failed)}" if version.failed else "passed"
         checks += ", trust check kept" if version.verified and not version.current else ""
-        rows.append([version.name + (" *" if version.current else ""), version.label, checks])
+        name = version.name + (" *" if version.current else "")
+        rows.append([name, version.written, version.label, checks])
     text = table(rows) if found else "There is no fit yet: run 'scissorcal fit'."
     return Answer({"versions": found}, text)
 
@@ -275,8 +276,8 @@ def restore(
 
     \b
     Example:
-      $ scissorcal fit restore friction-20261121T091500Z
-      fits/friction.nc: friction-20261121T091500Z-9a8b7c6d is in use again
+      $ scissorcal fit restore friction-9a8b
+      fits/friction.nc: friction-9a8b7c6d is in use again
       kept: fits/history/friction-20261122T143201Z-1f2e3d4c
       next: scissorcal fit cut
     """

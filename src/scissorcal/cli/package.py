@@ -15,6 +15,7 @@ from scissorcal.workday.options import ExportOptions
 
 if TYPE_CHECKING:
     from scissorcal.package import Manifest
+    from scissorcal.verdicts import Verdict
 
 _COMMANDS = {
     "build": ("scissorcal.cli.package:build", "Compile the fits into tables with an error bound."),
@@ -104,6 +105,8 @@ def check(
 ) -> Answer:
     """Check a package: bytes, error bound, extremes, fits, review, signature.
 
+    That of the workspace is also held to its fits: a package of earlier ones fails.
+
     A review names who signed and every file that was reviewed. Without a key anyone can write one,
     and the whole package; --trusted-key demands that keys that you know signed both.
 
@@ -116,14 +119,21 @@ def check(
     from scissorcal.package import check_package, open_package
     from scissorcal.package.keys import read_public_keys
 
+    current: tuple[Verdict, ...] = ()
     if path is None:
+        from scissorcal.workday.engine import Engine
+        from scissorcal.workday.runs.package import current_verdict
+
         workspace = open_workspace(folder)
         path = workspace.package_path(workspace.recipe())
+        current = (current_verdict(Engine.of(workspace)),) if path.is_file() else ()
     trusted = read_public_keys(trusted_key) if trusted_key else None
     package = open_package(path, warn=False)
     manifest = package.manifest
     return Answer(
-        _facts(manifest), f"{path}: {_contents(manifest)}", check_package(package, trusted)
+        _facts(manifest),
+        f"{path}: {_contents(manifest)}",
+        (*check_package(package, trusted), *current),
     )
 
 

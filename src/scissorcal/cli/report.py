@@ -181,7 +181,7 @@ def sign(
     unverified = [state.name for state in engine.states() if state.state == "unverified"]
     if unverified:
         text += (
-            f"\nnote: {' and '.join(unverified)} {'is' if len(unverified) == 1 else 'are'} "
-            "unverified: a trust check that is made later voids this signature"
+            f"\nnote: it covers {' and '.join(unverified)} as unverified. A trust check that is "
+            "made later is not covered: run 'scissorcal verify', 'scissorcal report', then sign"
         )
     return Answer(review.model_dump(), text, files=[path])

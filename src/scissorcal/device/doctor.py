@@ -198,6 +198,22 @@ LATENESS = Check("host.scheduler wake-up lateness", f"{LOOP}: 99 % of the delays
 RIGHTS = Check("host.scheduler real-time rights", f"{LOOP}: priority that is granted", at_least=1.0)
 
 
+BUSY = (
+    "The virtual rig runs on this computer, which other programs kept busy, so this says nothing "
+    "of a rig: close them, and run 'scissorcal device doctor --device sim' again."
+)
+
+
+def _judge(
+    check: Check, m: Measurements, value: float, found: str, bad: str, limit: float | None = None
+) -> Verdict:
+    """Judge a time; that of a virtual rig is not evaluated where it is too long."""
+    verdict = check.judge(value, found, bad, threshold=limit)
+    if m.simulated and verdict.status == "fail":
+        return check.not_evaluated(f"{found} {BUSY}", value, threshold=limit)
+    return verdict
+
+
 def diagnose(m: Measurements, port: str) -> tuple[Verdict, ...]:
     """Turn measurements into verdicts; ``why`` of a failed one names the remedy."""
     return (
@@ -234,9 +250,11 @@ def _round_trip(m: Measurements) -> Verdict:
         f"{found} Connect the device directly (no hub){_timer_too(m)}, and close programs that "
         "load the processor."
     )
-    if m.unanswered:
+    if m.unanswered and not (m.simulated and _held_up(m)):
         return ROUND_TRIP.verdict("fail", m.round_trip.p99, bad, threshold=limit)
-    return ROUND_TRIP.judge(m.round_trip.p99, found, bad, threshold=limit)
+    if m.unanswered:
+        return ROUND_TRIP.not_evaluated(f"{found} {BUSY}", m.round_trip.p99, threshold=limit)
+    return _judge(ROUND_TRIP, m, m.round_trip.p99, found, bad, limit)
 
 
 def _timer_too(m: Measurements) -> str:
@@ -250,11 +268,13 @@ def _intervals(m: Measurements) -> Verdict:
         f"{m.interval.p99:.2f} ms, 99.9 % within {m.interval.p999:.2f} ms, longest "
         f"{m.interval.worst:.1f} ms."
     )
-    return FRAME_INTERVALS.judge(
+    return _judge(
+        FRAME_INTERVALS,
+        m,
         m.interval.p99,
         found,
         f"{found} Frames arrive in batches{_timer_too(m)}: close programs that load the processor.",
-        threshold=INTERVAL_LIMIT_TICKS * m.tick_ms,
+        INTERVAL_LIMIT_TICKS * m.tick_ms,
     )
 
 
@@ -262,14 +282,21 @@ def _losses(m: Measurements, port: str) -> Verdict:
     share = 100.0 * m.lost / max(m.lost + m.frames, 1)
     found = f"{m.lost} frames lost ({share:.2g} %) and {m.garbled} garbled on {port}."
     bad = f"{found} Use a shorter, shielded cable, and the baud rate that the device is built for."
-    if m.lost and m.interval.worst >= m.lost * m.tick_ms:
+    if m.lost and _held_up(m):
         bad = (
             f"{found} No frame was read for {m.interval.worst:.0f} ms: this computer was held up, "
             "or the device paused. Close programs that load this computer, and measure again."
         )
     if m.garbled:
         return LOST_FRAMES.verdict("fail", share, bad)
-    return LOST_FRAMES.judge(share, found, bad)
+    if not _held_up(m):  # a virtual rig can lose frames on its line, too
+        return LOST_FRAMES.judge(share, found, bad)
+    return _judge(LOST_FRAMES, m, share, found, bad)
+
+
+def _held_up(m: Measurements) -> bool:
+    """Whether nothing was read for as long as all lost frames take: no line did that."""
+    return m.interval.worst >= m.lost * m.tick_ms
 
 
 def _adapter(m: Measurements, port: str) -> Verdict:
@@ -320,7 +347,9 @@ def _scheduler(m: Measurements) -> Verdict:
         f"A wait of 1 ms ends {m.lateness.p50:.2f} ms late in the middle, 99 % within "
         f"{m.lateness.p99:.2f} ms, at worst {m.lateness.worst:.1f} ms."
     )
-    return LATENESS.judge(
+    return _judge(
+        LATENESS,
+        m,
         m.lateness.p99,
         found,
         f"{found} Close other programs, choose the processor's performance governor, and grant "

@@ -144,7 +144,7 @@ def compose(
     origin = decision.origin_of(evidence.recordings)
     panels = (
         decision.origin_panel(origin, evidence.recordings),
-        decision.trust_panel(headlines, list(named)),
+        decision.trust_panel(headlines, list(named), evidence.next_command),
         totals,
         decision.checked_panel(list(named.values()), checks),
         decision.felt_panel(rendered, why, fits, recipe),

@@ -87,7 +87,8 @@ class Evidence:
     ``choice`` says what of the fitted laws the scene needs, ``pieces`` are those of a drawn plate
     (`recipe.plate_layers.plate_pieces`). ``panels`` are further ones, such as what a package
     states. ``recipe_text`` is the recipe as it was written; without it the values are printed as
-    read. ``inputs_hash`` is the workspace's identity of all inputs.
+    read. ``inputs_hash`` is the workspace's identity of all inputs, ``next_command`` what comes
+    next in it once the report is written; without it the fits alone say.
     """
 
     recordings: tuple[Recording, ...] = ()
@@ -99,3 +100,4 @@ class Evidence:
     panels: tuple[Panel, ...] = ()
     recipe_text: str = ""
     inputs_hash: str = ""
+    next_command: str = ""

@@ -35,8 +35,8 @@ def signature_block(review: "Review | None") -> str:
     """What stands there: that nobody signed, or who did, when, and over which digest."""
     if review is None:
         return (
-            "<h2>Not signed</h2><p>Sign with <code>scissorcal report sign --name NAME --decision "
-            "accept</code> or <code>reject</code>.</p>"
+            "<h2>Not signed</h2><p>Once it is read: <code>scissorcal report sign --name NAME "
+            "--decision accept</code> or <code>reject</code>.</p>"
         )
     done = "✓ Accepted" if review.decision == "accept" else "✗ Rejected"
     note = f"<p>{escape(review.note)}</p>" if review.note else ""

@@ -338,6 +338,8 @@ class Engine:
                 return f"{item} is {state.state}"
         if step.kind == "sign":
             return self._unlike_signed(facts)
+        if step.kind == "verify" and not self.file(step.inputs[0]).is_file():
+            return f"{step.inputs[0]} is missing"
         efforts = EFFORTS if step.by_effort else ("",)
         inputs = str(facts["inputs"]).removeprefix(UNFINISHED)
         if inputs not in {self.identity(step.name, effort) for effort in efforts}:

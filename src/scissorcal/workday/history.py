@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 HASH = 8
 """Digits of the content's digest in a version's name."""
 
+STAMP = "%Y%m%dT%H%M%SZ"
+
 _NAME = re.compile(r"^(?P<what>[a-z]+(-[a-z]+)?)-(?P<stamp>\d{8}T\d{6}Z)-(?P<hash>[0-9a-f]{8})$")
 
 
@@ -38,6 +40,9 @@ _NAME = re.compile(r"^(?P<what>[a-z]+(-[a-z]+)?)-(?P<stamp>\d{8}T\d{6}Z)-(?P<has
 class Version:
     """One version of a fit. ``name`` identifies it, ``current`` marks the one in use.
 
+    The name is of the fit's content alone, so a copy of the workspace has the same names.
+    ``time_utc`` is the time of the file in use; for an earlier version, that of its file when it
+    was kept, which stands in its folder's name.
     ``label`` is its model and effort, ``failed`` the checks that failed; both are empty for a file
     that cannot be read. ``verified`` says that its trust check was kept with it.
     """
@@ -51,6 +56,11 @@ class Version:
     current: bool
     path: Path
 
+    @property
+    def written(self) -> str:
+        """``time_utc`` to the minute, as people read it."""
+        return datetime.strptime(self.time_utc, STAMP).strftime("%Y-%m-%d %H:%M")
+
 
 def keep(engine: Engine, name: str) -> Path | None:
     """Have the result of a step, its trust check and its pictures in fits/history/<version>/ too.
@@ -62,7 +72,7 @@ def keep(engine: Engine, name: str) -> Path | None:
     if not path.is_file():
         return None
     folder = _version_folder(engine, path)
-    if folder.exists():
+    if folder.is_dir():
         _put_all(path, folder / path.name)
         return folder
     folder.parent.mkdir(exist_ok=True)
@@ -87,13 +97,15 @@ def versions(engine: Engine, what: str = "") -> tuple[Version, ...]:
             found.append(_version(engine, step.name, file, current=True))
         in_use = {version.name for version in found}
         folders = sorted(_folder(engine).glob(f"{step.what}-*/{file.name}"))
-        kept = [
-            _version(engine, step.name, path, current=False)
+        # the newest folder of each content: earlier releases kept one for each time of a file
+        kept = {
+            version.name: version
             for path in folders
             if _NAME.match(path.parent.name)
-        ]
+            for version in (_version(engine, step.name, path, current=False),)
+        }
         # A restore that was killed leaves its version in both places.
-        found += [version for version in kept if version.name not in in_use]
+        found += [version for version in kept.values() if version.name not in in_use]
     engine.index.save()
     return tuple(sorted(found, key=lambda version: (version.time_utc, version.name), reverse=True))
 
@@ -120,7 +132,8 @@ def restore(engine: Engine, name: str) -> tuple[Version, Path | None]:
     there is no version of this name, InputError where it is in use already.
     """
     every = versions(engine)
-    found = [version for version in every if version.name.startswith(name)]
+    asked = _named(name)
+    found = [version for version in every if asked and version.name.startswith(asked)]
     if len(found) != 1:
         earlier = ", ".join(version.name for version in every if not version.current) or "none"
         how = "names several versions" if found else "names no version"
@@ -242,10 +255,9 @@ def _version(engine: Engine, name: str, path: Path, current: bool) -> Version:
         facts = engine.index.facts(path, f"{name} {step.version}", step.read)
     except InputError as error:
         facts["failed"] = (str(error),)
-    matched = _NAME.match(path.parent.name)
-    when = datetime.fromtimestamp(path.stat().st_mtime, UTC).strftime("%Y%m%dT%H%M%SZ")
-    digest = engine.index.digest(path)[:HASH]
-    own = matched.group(0) if matched else f"{step.what}-{when}-{digest}"
+    matched = None if current else _NAME.match(path.parent.name)
+    when = matched["stamp"] if matched else _time_of(path)
+    own = f"{step.what}-{engine.index.digest(path)[:HASH]}"
     verified = path.with_suffix(".verify.json").is_file()
     return Version(
         own, step.what, when, facts["label"], tuple(facts["failed"]), verified, current, path
@@ -254,8 +266,25 @@ def _version(engine: Engine, name: str, path: Path, current: bool) -> Version:
 
 def _version_folder(engine: Engine, path: Path) -> Path:
     """The folder of the version that the result ``path`` is, whether or not it is there."""
-    stamp = datetime.fromtimestamp(path.stat().st_mtime, UTC).strftime("%Y%m%dT%H%M%SZ")
-    return _folder(engine) / f"{path.stem}-{stamp}-{engine.index.digest(path)[:HASH]}"
+    digest = engine.index.digest(path)[:HASH]
+    there = sorted(_folder(engine).glob(f"{path.stem}-*-{digest}"))
+    kept = [folder for folder in there if _of_step(folder.name, path.stem)]
+    return kept[-1] if kept else _folder(engine) / f"{path.stem}-{_time_of(path)}-{digest}"
+
+
+def _of_step(folder: str, what: str) -> bool:
+    matched = _NAME.match(folder)
+    return matched is not None and matched["what"] == what
+
+
+def _named(name: str) -> str:
+    """The version that a user asks for; a folder of fits/history may be named, too."""
+    matched = _NAME.match(name)
+    return f"{matched['what']}-{matched['hash']}" if matched else name
+
+
+def _time_of(path: Path) -> str:
+    return datetime.fromtimestamp(path.stat().st_mtime, UTC).strftime(STAMP)
 
 
 def _folder(engine: Engine) -> Path:

@@ -13,6 +13,7 @@ from scissorcal.recipe.requirements import (
     requirements,
 )
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.next_step import next_step
 from scissorcal.workday.runs.probe import probe_state
 from scissorcal.workday.states import StepState
 from scissorcal.workday.workspace import Workspace
@@ -29,7 +30,8 @@ class Plan:
     ``probe`` is what is known of the rig's probe, ``costs`` what each capture of the rig takes that
     is still to be made. ``choice`` says what of the fitted laws the scene needs; None until the
     fits are there and a report or a package was made of them. ``design`` is the list of captures
-    that was designed last, if it is for what there is now.
+    that was designed last, if it is for what there is now. ``next_command`` is what comes next
+    (`next_step`), None where nothing is left to do.
     """
 
     recipe: str
@@ -42,25 +44,13 @@ class Plan:
     design: "CaptureDesign | None" = None
     edge: str = ""
     plate: str = ""
+    next_command: str | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What drawn edges and plates are, then sentences on single steps, each once, in order."""
         drawn = filter(None, (self.edge, self.plate))
         return (*drawn, *dict.fromkeys(note for step in self.steps for note in step.notes))
-
-    @property
-    def next_command(self) -> str | None:
-        """The command of the first step that needs one; None where nothing is left to do.
-
-        Optional steps and trust checks come last, as nothing waits for them.
-        """
-        needed = [step for step in self.steps if not step.optional]
-        waiting = [step for step in needed if step.state not in ("done", "unverified")]
-        unverified = [step for step in needed if step.state == "unverified"]
-        if waiting:
-            return waiting[0].command
-        return "scissorcal verify" if unverified else None
 
 
 def make_plan(workspace: Workspace) -> Plan:
@@ -81,6 +71,7 @@ def make_plan(workspace: Workspace) -> Plan:
         _design(engine),
         edge_sentence(engine.recipe.rig.edge, engine.recipe.rig.joint),
         _plate_sentence(engine),
+        next_step(engine),
     )
 
 

@@ -78,8 +78,11 @@ def _simulated(recording: Recording) -> bool | None:
     return bool(stated & SIMULATOR) if isinstance(stated, int) else None
 
 
-def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
-    """The overall outcome, and one row per fit; ``rig`` names the fits of recordings."""
+def trust_panel(headlines: Sequence[Headline], rig: Sequence[str], next_command: str = "") -> Panel:
+    """The overall outcome, and one row per fit; ``rig`` names the fits of recordings.
+
+    ``next_command`` is what comes next in the workspace; without it the worst fit's headline says.
+    """
     rows = tuple(
         Row(
             headline.fit,
@@ -94,9 +97,14 @@ def trust_panel(headlines: Sequence[Headline], rig: Sequence[str]) -> Panel:
     first = next(
         (headline for headline in worst if headline.fit in rig), worst[0] if worst else None
     )
-    sentence = f"Next: {first.next_steps[0]}" if first and first.next_steps else ""
+    steps = first.next_steps[:1] if first else ()
+    sentence = f"Next: {steps[0]}" if steps else ""
+    notes: tuple[str, ...] = ()
+    if next_command:
+        sentence = f"Next: `{next_command}`."
+        notes = steps if overall in ("reject", "care") else ()
     title = "Checks passed" if first and _photographs_passed(first, rig) else OUTCOMES[overall]
-    return Panel(f"{PART}-trust", PART, title, sentence, rows)
+    return Panel(f"{PART}-trust", PART, title, sentence, rows, notes=notes)
 
 
 def _decision(headline: Headline, rig: Sequence[str]) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from scissorcal.calibration.store import load
 from scissorcal.calibration.verify.result import VerifyResult
 from scissorcal.errors import InputError, MissingError, VerdictError
-from scissorcal.verdicts import Verdict
+from scissorcal.verdicts import Check, Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.runs.sign import standing_review
@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from scissorcal.package.simplest.choice import SceneChoice
     from scissorcal.workday.workspace import Workspace
 
+CURRENT = Check(
+    "package current",
+    "what is rendered: 1 if it was built from the workspace's fits as they are now",
+    at_least=1.0,
+)
 UNSIGNED = (
     "The package's signature was left out, as it was given with another review: sign it again "
     "with 'scissorcal package build --key'."
@@ -127,6 +132,26 @@ def built_package(workspace: "Workspace", purpose: str) -> Path:
         command = Engine.of(workspace).leads_to("package build")
         raise MissingError(f"There is no package to {purpose} yet: run '{command}' first.")
     return path
+
+
+def current_verdict(engine: Engine) -> Verdict:
+    """Whether the workspace's package is of its fits; not evaluated where one of them is gone."""
+    state = engine.state("package build")
+    gone = [
+        item
+        for item in BY_NAME["package build"].inputs
+        if engine.needed(item) and not engine.file(item).is_file()
+    ]
+    if gone:
+        return CURRENT.not_evaluated(
+            f"{' and '.join(gone)} of the workspace {'is' if len(gone) == 1 else 'are'} missing, "
+            "so whether the package is of its fits is not known: run "
+            f"'{engine.leads_to('package build')}', or 'scissorcal fit restore' if it was kept."
+        )
+    command = engine.leads_to("package build")
+    stale = f"The package is {state.state}: {state.found}. Run '{command}'."
+    why = "The package was built from the workspace's fits as they are now."
+    return CURRENT.judge(float(state.state != "stale"), why, stale)
 
 
 def _fits(engine: Engine) -> dict[str, Any]:

@@ -32,6 +32,7 @@ from scissorcal.report import (
 from scissorcal.report.build import ReportFiles
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine
+from scissorcal.workday.next_step import next_after_report
 from scissorcal.workday.recordings import used_recordings
 from scissorcal.workday.runs.fit import available, load_result, pictures_beside
 from scissorcal.workday.steps import steps_of
@@ -91,6 +92,7 @@ def write_workspace_report(
                 plate_pieces(engine.recipe.plate, workspace.root),
                 recipe_text=read_text(workspace.recipe_path),
                 inputs_hash=engine.identity("report"),
+                next_command=next_after_report(engine),
             ),
             workspace.report_html.parent,
             created=now or datetime.now(UTC),
