@@ -60,6 +60,14 @@ def _edge_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Edg
     return edge_prior.with_values(named)
 
 
+_EDGE_TERMS = {
+    "offset_m": "offset at the pivot",
+    "taper_rad": "taper",
+    "curvature_per_m": "curvature",
+    "bend_per_m2": "change of the curvature",
+}
+
+
 def edge_layout(edge_prior: EdgeDistribution) -> Layout:
     """Parameters of an edge that was measured, with that estimate as their prior."""
     units = {"offset_m": "m", "taper_rad": "rad", "curvature_per_m": "1/m", "bend_per_m2": "1/m^2"}
@@ -72,7 +80,7 @@ def edge_layout(edge_prior: EdgeDistribution) -> Layout:
                 IDENTITY,
                 float(mean),
                 float(sd),
-                "the blade's edge, as photographs or the recipe tell it",
+                f"{_EDGE_TERMS.get(name, name.replace('_', ' '))} of the blade's edge",
                 measured_prior=True,
             )
             for name, mean, sd in zip(edge_prior.names, edge_prior.mean, sds, strict=True)
