@@ -46,7 +46,7 @@ export class App {
   private readonly bladesBox = html("label", { hidden: true }, html("input", {
     type: "checkbox", change: (event) => this.moveBlades((event.target as HTMLInputElement).checked),
   }), "move the blades");
-  private readonly hint = html("p", { class: "hint" }, "Drag the purple handle down to cut");
+  private readonly hint = html("p", { class: "hint" }, "↓ Drag the handle to cut");
   private drawn: Drawn | null = null;
   /** Edge of the blades that a person drew; null: as fitted. */
   private edge: Edge | null = null;
@@ -255,6 +255,7 @@ export class App {
   }
 
   private show3d(isOn: boolean): void {
+    this.begun();
     this.solid.hidden = !isOn;
     this.drawing.canvas.hidden = isOn;
     if (isOn && !this.view3d) this.open3d();
