@@ -86,12 +86,16 @@ def edge_layout(edge_prior: EdgeDistribution) -> Layout:
                 IDENTITY,
                 float(mean),
                 float(sd),
-                f"{_EDGE_TERMS.get(name, name.replace('spline_m_', 'spline weight '))} of the blade's edge",
+                f"{_edge_term(name)} of the blade's edge",
                 measured_prior=True,
             )
             for name, mean, sd in zip(edge_prior.names, edge_prior.mean, sds, strict=True)
         )
     )
+
+
+def _edge_term(name: str) -> str:
+    return _EDGE_TERMS.get(name, name.replace("spline_m_", "spline weight "))
 
 
 def geometry_of(recipe: Recipe, edge: Edge) -> dict[str, Any]:
