@@ -1,13 +1,14 @@
 """The page at first sight: what to do first, where the blades start, what each colour means."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from scissorcal.package.layer_pieces import PieceRecord, StripRecord
 from scissorcal.prototype.document import page_of
 from scissorcal.prototype.page_parts import LayerPart, LayersPart, Numbers, Stroke
 from scissorcal.prototype.scene import Scene
@@ -112,9 +113,10 @@ PLACES = """(places) => { const { drawing, rig } = scissorcal;
   return places.map((m) => [[x(m), above], [x(m), beside]]); }"""
 
 
-def piece_of(begin_m: float, end_m: float, scene: Scene) -> PieceRecord:
-    strip = StripRecord(end_m=end_m, fracture_energy_J_per_m=scene.numbers[4])
-    return PieceRecord(begin_m=begin_m, upper_face_m=scene.upper_face_m, scale=1.0, strips=(strip,))
+def piece_of(begin_m: float, end_m: float, scene: Scene) -> dict[str, Any]:
+    strip = {"end_m": end_m, "fracture_energy_J_per_m": scene.numbers[4]}
+    face_m = scene.upper_face_m
+    return {"begin_m": begin_m, "upper_face_m": face_m, "scale": 1.0, "strips": [strip]}
 
 
 def rectangle(left: float, right: float, half: float) -> tuple[tuple[float, float], ...]:
@@ -132,10 +134,12 @@ def test_a_hole_is_drawn_in_both_plain_views(
         holes=((rectangle(8.0, 16.0, 9.0),),),
         regions=(),
     )
-    pieces = tuple(piece_of(*ends, scene) for ends in ((0.0, 0.008), (0.016, 0.040)))
-    told = {"pieces": pieces, "drawn_plate": LayersPart(cut_line_mm=0.0, layers=(layer,))}
+    pieces = [piece_of(*ends, scene) for ends in ((0.0, 0.008), (0.016, 0.040))]
+    plate = LayersPart(cut_line_mm=0.0, layers=(layer,))
+    told = {**json.loads(scene.model_dump_json()), "pieces": pieces}
+    holed = Scene.model_validate_json(json.dumps(told)).model_copy(update={"drawn_plate": plate})
     file = tmp_path / "holed.html"
-    file.write_text(page_of(scene.model_copy(update=told)), encoding="utf-8")
+    file.write_text(page_of(holed), encoding="utf-8")
     opened = open_page(browser, file, viewport=WIDE)
     opened.settle(0.3)
     in_hole, in_sheet = opened.run(PLACES, [0.012, 0.020])
