@@ -1,10 +1,14 @@
 """Progress is drawn on a terminal and printed as lines elsewhere; questions need a terminal."""
 
+import io
+import itertools
+import re
 from collections import deque
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from scissorcal.cli import live_view
 from scissorcal.cli import progress as progress_module
@@ -12,7 +16,7 @@ from scissorcal.cli.live_view import LiveView, effort_plot
 from scissorcal.cli.output import table
 from scissorcal.cli.progress import progress
 from scissorcal.cli.terminal import drawn
-from scissorcal.device import OPENING, CoverageGrid, Recorder
+from scissorcal.device import ADVANCE, OPENING, CoverageGrid, Recorder
 from scissorcal.errors import InputError, VerdictError
 from scissorcal.recording import SAMPLE_DTYPE, RecordingWriter
 
@@ -52,14 +56,18 @@ def test_work_far_beyond_its_limit_ends_with_a_sentence(monkeypatch: pytest.Monk
             tell(0.4, "blade: searching")
 
 
-def recorded(tmp_path: Path) -> Recorder:
+def cells_of(low: float, high: float, count: int = 8) -> tuple[tuple[float, float], ...]:
+    return tuple(itertools.pairwise(np.linspace(low, high, count + 1).tolist()))
+
+
+def recorded(tmp_path: Path, grid: CoverageGrid | None = None) -> Recorder:
     """Give a recorder that took half a second of closing at 2 mN m."""
     samples = np.zeros(500, dtype=SAMPLE_DTYPE)
     samples["sequence"] = np.arange(500)
     samples["device_time_us"] = 1000 * np.arange(500)
     samples["opening"] = np.linspace(0.4, 0.2, 500)
     samples["motor_torque"] = 0.002
-    grid = CoverageGrid((0.1, 0.4), ((0.2, 0.3), (0.3, 0.4)))
+    grid = grid or CoverageGrid((0.1, 0.4), ((0.2, 0.3), (0.3, 0.4)))
     with RecordingWriter(tmp_path / "a.mcap", "friction") as writer:
         recorder = Recorder(writer, grid)
         recorder.take(samples)
@@ -94,6 +102,50 @@ def test_a_terminal_shows_torque_over_opening_with_units(
     assert "motor torque (mN m)" in said
     assert "opening (deg)" in said
     assert "(rad/s)" in said
+
+
+@pytest.mark.parametrize("along", ["opening", "advance"])
+@pytest.mark.parametrize("width", [60, 80, 100, 120])
+def test_no_line_of_the_live_view_is_broken(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    width: int,
+    along: str,
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", str(width))
+    speeds = (0.0125, 0.05, 0.2, 0.8)
+    axis = OPENING if along == "opening" else ADVANCE
+    if axis is OPENING:
+        grid = CoverageGrid(speeds, cells_of(0.1, 0.9))
+    else:
+        grid = CoverageGrid(speeds, cells_of(-0.12, 0.04), ("backward", "forward"), axis=axis)
+    with LiveView() as view:
+        view.show(0.35, "stroke 3 of 20", recorded(tmp_path, grid))
+    frames = re.split(r"(?:\x1b\[1A|\r)?\x1b\[2K", capsys.readouterr().err)
+    frame = max(frames, key=len)
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]|\r", "", frame)
+    lines = [line.rstrip() for line in plain.splitlines() if line.strip()]
+    assert max(map(len, lines)) <= width
+    head, values, bar, name, *plot = lines[:13]
+    assert head.startswith(" 35 %  stroke 3 of 20")
+    assert values.startswith(f"{axis.channel} ")
+    assert set(bar) <= set("━╸╺")
+    assert name == f"{axis.effort_name} ({axis.effort_unit})"
+    assert all(" |" in line for line in plot[:8])
+    assert f"{axis.channel} ({axis.unit})" in plot[8]
+    title, *table = lines[13:]
+    assert title.startswith("coverage ")
+    assert len({len(line) for line in table}) == 1
+    assert len([line for line in table if line.count("│") >= 9]) == 2 * len(speeds)
+    assert not any("…" in line for line in lines)
+
+
+def test_a_grid_without_place_for_its_table_is_a_sentence() -> None:
+    text = io.StringIO()
+    Console(file=text, width=60).print(CoverageGrid((0.1,), cells_of(0.1, 0.9, count=40)))
+    assert text.getvalue().startswith("0 of 80 cells filled; thin: closing at 0.1")
 
 
 def test_the_newest_point_of_the_plot_is_marked() -> None:

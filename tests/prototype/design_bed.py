@@ -45,7 +45,13 @@ COLOURS = {
     "light": {"ink": "#202224", "muted": "#6b7075", "grid": "#dfe2e5", "paper": "#ffffff"},
     "dark": {"ink": "#e8eaec", "muted": "#9aa1a8", "grid": "#33383d", "paper": "#16181a"},
 }
-SHARED = {"raised": "#eef0f2", "blue": "#0072b2", "vermillion": "#d55e00"}
+SHARED = {
+    "raised": "#eef0f2",
+    "fitted": "#0072b2",
+    "whatif": "#d55e00",
+    "material": "#00865f",
+    "hand": "#8a3f9c",
+}
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
 
 THICKNESS_MM, ENERGY_J_PER_M = 0.1, 0.4

@@ -64,7 +64,7 @@ CONTRASTS = """() => {
   // canvases and the drawing write in these on these, or on a seam of the paper's colour
   const style = getComputedStyle(document.body);
   const named = (name) => rgba(style.getPropertyValue(`--${name}`).trim());
-  for (const ink of ["ink", "muted", "blue"]) {
+  for (const ink of ["ink", "muted", "hand"]) {
     found.push([contrast(named(ink), named("paper")), "canvas", ink]);
   }
   const clear = (one) => getComputedStyle(one).paintOrder.startsWith("stroke");
@@ -93,9 +93,19 @@ def test_every_text_has_the_contrast_that_reading_needs(
     page.keyboard.press("Enter")
     page.locator(".design .warning").wait_for()
     page.locator("section.now .warning").wait_for(state="visible")
+    opened.run("() => { document.querySelector('.hint').hidden = false; }")
     found: list[list[Any]] = opened.run(CONTRASTS)
     put_back(page)
     texts = {kind for _, kind, _ in found}
-    assert {"p.request", "button.stop", "button.primary", "p.note", "p.warning", "dt."} <= texts
+    assert {
+        "p.request",
+        "button.stop",
+        "button.primary",
+        "p.note",
+        "p.warning",
+        "dt.",
+        "p.hint",
+        "span.state",
+    } <= texts
     assert len(found) > 100
     assert [one for one in found if one[0] < LEAST] == []

@@ -10,6 +10,7 @@ import pytest
 
 from scissorcal.package import build_package, open_package
 from scissorcal.prototype.document import page_of
+from scissorcal.prototype.page_parts import State
 from scissorcal.prototype.scene import Scene, scene_of
 from scissorcal.recording import RecordingWriter
 from tests.package.fits import cut_fit, friction_fit, recipe
@@ -67,13 +68,16 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 @pytest.mark.parametrize("socket", [None, "/rig?token=a"])
 def test_a_name_is_text_in_the_page(name: str, socket: str | None, scene: Scene) -> None:
     plain = Elements(page_of(scene.model_copy(update={"name": "paper"}), socket=socket))
-    page = page_of(scene.model_copy(update={"name": name, "warnings": (name,)}), socket=socket)
+    page = page_of(
+        scene.model_copy(update={"name": name, "states": (State(label=name, sentence=name),)}),
+        socket=socket,
+    )
     found = Elements(page)
     assert found.found == plain.found
     assert json.loads(found.data["server"]) == (socket and {"socket": socket})
     if "scene" in found.data:
         told = json.loads(found.data["scene"])
-        assert (told["name"], told["warnings"]) == (name, [name])
+        assert (told["name"], told["states"]) == (name, [{"label": name, "sentence": name}])
 
 
 @pytest.mark.parametrize("name", ["<img src=x onerror=alert(1)>", "'\" x", "\u202egnp.", "a\nb"])

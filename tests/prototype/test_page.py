@@ -13,12 +13,14 @@ from playwright.sync_api import Browser, Page
 from scissorcal.package import ModelPackage, build_package, central_values, open_package
 from scissorcal.package.variations import variations
 from scissorcal.prototype.document import page_of
+from scissorcal.prototype.page_parts import State
 from scissorcal.prototype.scene import scene_of
 from tests.browser import Seen, open_file, put_back, wait_until
 from tests.package.fits import cut_fit, friction_fit, recipe
 from tests.prototype.test_scene import unpacked as read
 
 MOST_BYTES = 1_000_000
+OLD = State(label="old", sentence="The rig is old.")
 UNNAMED = """() => [...document.querySelectorAll("input, button, select, textarea, canvas.plain")]
   .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim()
     || [...(one.labels || [])].some((label) => label.textContent.trim())))
@@ -66,7 +68,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[ModelPackage, Any, 
     path = folder / "paper.zip"
     build_package(chosen, friction_fit(), cut, path, np.random.default_rng(3))
     package = open_package(path, warn=False)
-    told = {"made_utc": "2026-11-24T00:00:00Z", "version": "1", "warnings": ("The rig is old.",)}
+    told = {"made_utc": "2026-11-24T00:00:00Z", "version": "1", "states": (OLD,)}
     scene = scene_of(package, **told)
     (folder / "paper.html").write_text(page_of(scene), encoding="utf-8")
     return package, scene, folder / "paper.html"
@@ -98,8 +100,10 @@ def test_the_file_alone_is_the_page(shown: Shown, built: Any) -> None:
     path = built[2]
     assert path.stat().st_size < MOST_BYTES
     assert [url for url in shown.seen.requests if not url.startswith("data:")] == [path.as_uri()]
-    told = shown.page.locator("header .warning").all_inner_texts()
-    assert told == ["The rig is old.", *shown.package.warnings]
+    shown.page.locator(".states summary").click()
+    told = shown.page.locator(".states p").all_inner_texts()
+    assert told[0] == "old: The rig is old."
+    assert [line.partition(": ")[2] for line in told[1:]] == list(shown.package.warnings)
     assert shown.page.locator("h1").inner_text() == shown.package.manifest.name
 
 
@@ -297,11 +301,11 @@ def test_the_solid_view_and_the_designer_open(shown: Shown) -> None:
 
 def test_the_other_law_beside_the_felt_one_has_its_own_name(shown: Shown) -> None:
     names = "() => [...document.querySelectorAll('section.now dt')].map((one) => one.textContent)"
-    shown.page.wait_for_selector("[data-number='what if, the same motion']")
+    shown.page.wait_for_selector("[data-number='torque, what if']")
     shown.page.locator("[data-key=whatIf]").check()
-    shown.page.wait_for_selector("[data-number='as fitted, the same motion']")
-    assert "as fitted, the same motion" in shown.run(names)
-    assert "what if, the same motion" not in shown.run(names)
+    shown.page.wait_for_selector("[data-number='torque, as fitted']")
+    assert "torque, as fitted" in shown.run(names)
+    assert "torque, what if" not in shown.run(names)
 
 
 def test_beyond_the_range_of_the_package_is_said_for_all_to_see(shown: Shown) -> None:

@@ -1,4 +1,4 @@
-"""The page of a package: the hand that feels, warnings, themes, and how often it draws."""
+"""The page of a package: the hand that feels, states, themes, and how often it draws."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -123,7 +123,7 @@ def test_what_if_stands_beside_as_fitted_and_is_felt_after_a_swap(opened: Open) 
     opened.set_slider("fracture_energy", 400)
     drag(opened, 0.45)
     opened.settle()
-    beside = "what if, the same motion"
+    beside = "torque, what if"
     assert opened.number(beside) > 1.15 * opened.number("torque")
     canvas = opened.page.locator("canvas.plain")
     canvas.focus()
@@ -132,14 +132,20 @@ def test_what_if_stands_beside_as_fitted_and_is_felt_after_a_swap(opened: Open) 
     assert opened.page.locator("[data-key=whatIf]").is_checked()
 
 
-def test_warnings_come_first(opened: Open, scene: Scene) -> None:
-    assert scene.warnings
-    found = opened.page.locator("header .warning")
-    assert tuple(found.all_inner_texts()) == scene.warnings
-    first, stage = found.first.bounding_box(), opened.page.locator("canvas.plain").bounding_box()
-    assert first is not None
+def test_what_is_to_be_known_is_one_line_of_labels_that_opens(opened: Open, scene: Scene) -> None:
+    assert scene.states
+    labels = opened.page.locator(".states .state")
+    assert labels.all_inner_texts() == list(dict.fromkeys(state.label for state in scene.states))
+    sentences = opened.page.locator(".states p")
+    assert not sentences.first.is_visible()
+    line, stage = labels.first.bounding_box(), opened.page.locator("canvas.plain").bounding_box()
+    assert line is not None
     assert stage is not None
-    assert first["y"] < stage["y"]
+    assert line["y"] + line["height"] < stage["y"]
+    assert line["height"] < 30
+    opened.page.locator(".states summary").click()
+    told = [f"{state.label}: {state.sentence}" for state in scene.states]
+    assert sentences.all_inner_texts() == told
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -179,6 +185,6 @@ def test_a_law_that_the_kernel_refuses_is_named_and_its_blades_stand(opened: Ope
     }"""
     said, is_hidden, active = opened.run(code)
     assert "as fitted" in said
-    assert "stand still" in said
+    assert "refuses" in said
     assert is_hidden
     assert active == "fitted"

@@ -19,7 +19,7 @@ from scissorcal.package import (
     table_file,
 )
 from scissorcal.package.variations import variations
-from scissorcal.prototype.page_parts import Numbers, Slider
+from scissorcal.prototype.page_parts import Numbers, Slider, State
 from scissorcal.prototype.scene import NODES, Scene, scene_of, slider_nodes
 from tests.package.conftest import pad
 from tests.package.fits import cut_fit, friction_fit, recipe
@@ -164,10 +164,23 @@ def test_only_fits_of_the_package_say_what_its_parameters_mean(package: ModelPac
     assert any(slider.meaning for slider in with_own.sliders)
 
 
-def test_warnings_stand_before_those_of_the_package(package: ModelPackage) -> None:
-    scene = scene_of(package, made_utc="", version="", warnings=["Simulated."])
-    assert scene.warnings == ("Simulated.", *package.warnings)
-    assert any("not signed" in sentence for sentence in package.warnings)
+def test_states_stand_before_those_of_the_package(package: ModelPackage) -> None:
+    simulated = State(label="simulated", sentence="Simulated.")
+    scene = scene_of(package, made_utc="", version="", states=[simulated])
+    assert scene.states[0] == simulated
+    assert tuple(state.sentence for state in scene.states[1:]) == package.warnings
+    assert any(
+        state.label == "unsigned" and "not signed" in state.sentence for state in scene.states
+    )
+
+
+def test_each_slider_has_a_label_of_its_own_and_torques_one_unit(package: ModelPackage) -> None:
+    scene = scene_of(package, made_utc="", version="")
+    labels = [slider.meaning or slider.name for slider in scene.sliders]
+    assert len(set(labels)) == len(labels)
+    units = {slider.unit for slider in scene.sliders}
+    assert "mN m" in units
+    assert not any(unit.startswith("N m") or unit == "m" for unit in units)
 
 
 @given(

@@ -41,14 +41,14 @@ def differ(one: Picture, other: Picture) -> int:
     return int(np.count_nonzero(np.abs(one - other).max(axis=2) > 24))
 
 
-def reddish(shown: Picture) -> int:
-    """Pixels of the plate: its colour is the only warm one."""
-    return int(np.count_nonzero(shown[..., 0] - shown[..., 2] > 40))
+def greenish(shown: Picture) -> int:
+    """Pixels of the plate: its colour is the only green one."""
+    return int(np.count_nonzero(shown[..., 1] - shown[..., 0] > 40))
 
 
 def test_blades_sheet_and_crack_are_seen(bed: Bed) -> None:
     plain = picture(bed)
-    assert reddish(plain) > 5000
+    assert greenish(plain) > 5000
     steel = np.abs(plain - plain.mean(axis=2, keepdims=True)).max(axis=2) < 8
     assert np.count_nonzero(steel & (plain.mean(axis=2) < 225)) > 2000
     assert differ(plain, picture(bed)) == 0
@@ -61,7 +61,7 @@ def test_blades_sheet_and_crack_are_seen(bed: Bed) -> None:
 def test_a_drawn_plate_has_its_hole_and_its_layers(bed: Bed) -> None:
     whole = picture(bed, drawn=drawn(layer(SHEET)), crack=0.0)
     holed = layer(SHEET, holes=[box(45, -20, 75, 20)])
-    assert reddish(picture(bed, drawn=drawn(holed), crack=0.0)) < reddish(whole) - 1500
+    assert greenish(picture(bed, drawn=drawn(holed), crack=0.0)) < greenish(whole) - 1500
     thick = drawn(layer(SHEET), layer(box(40, -25, 75, 25), 6.0, name="second"))
     assert differ(whole, picture(bed, drawn=thick, crack=0.0)) > 1500
     regions = [{"toughness_ratio": 3.0, "outline": box(45, -20, 75, 20)}]
@@ -76,7 +76,7 @@ def test_pieces_without_a_drawing_are_shown_as_long_as_they_are(bed: Bed) -> Non
     one = picture(bed, pieces=[piece(0.0, 0.08)], crack=0.0)
     two = picture(bed, pieces=[piece(0.0, 0.03), piece(0.06, 0.08)], crack=0.0)
     strips = picture(bed, pieces=[piece(0.0, 0.03, 0.08)], crack=0.0)
-    assert reddish(two) < reddish(one) - 1500
+    assert greenish(two) < greenish(one) - 1500
     assert differ(one, strips) > 1500
 
 
@@ -171,13 +171,13 @@ def test_it_is_disposed_of_and_made_again(bed: Bed) -> None:
             " made.dispose(); made.draw(view); if (other.children.length) throw new Error('left');"
             " other.remove(); }"
         )
-    assert reddish(picture(bed)) > 5000
+    assert greenish(picture(bed)) > 5000
 
 
 def test_one_blade_that_moves_lifts_no_flap(browser: Browser, tmp_path: Path) -> None:
     with open_bed(browser, tmp_path, moving_blades=1) as bed:
         bed.run("() => { window.shown = new View3d(document.getElementById('three')); }")
-        assert reddish(picture(bed)) > 5000
+        assert greenish(picture(bed)) > 5000
 
 
 def test_without_webgl_a_sentence_says_so(browser: Browser, tmp_path: Path) -> None:

@@ -27,7 +27,10 @@ _DRAW_EVERY_S = 0.1
 _TRACE_POINTS = 300
 _BARS, _BARS_SHOWN = "▁▂▃▄▅▆▇█", 40
 _TRACE_SIZE = (60, 8)
-"""Columns and rows of the plot of torque over opening."""
+"""Most columns and the rows of the plot of torque over opening."""
+_MARGIN = 12
+"""Columns left of that plot: its marks and its axis."""
+_BAR_COLUMNS = 40
 
 
 class LiveView:
@@ -79,16 +82,19 @@ class LiveView:
             return
         self._drawn_s, self._finished = now, done >= 1.0
         share = min(max(done, 0.0), 1.0)
-        head = f"{100 * share:3.0f} %  {sentence} ({pace(share, now - self._began_s)})"
+        head = [f"{100 * share:3.0f} %  {sentence} ({pace(share, now - self._began_s)})"]
         if self._trace and self._axis:
             (place, effort), axis = self._trace[-1], self._axis
-            head += f"; {axis.channel} {place:.1f} {axis.unit}, "
-            head += f"{axis.effort_name} {effort:.1f} {axis.effort_unit}"
+            head.append(
+                f"{axis.channel} {place:.1f} {axis.unit}, "
+                f"{axis.effort_name} {effort:.1f} {axis.effort_unit}"
+            )
         if self._live is None:
-            coverage = f"; {recorder.coverage.sentence()}" if recorder and self._listed else ""
-            echo(head + coverage, err=True)
+            coverage = [recorder.coverage.sentence()] if recorder and self._listed else []
+            echo("; ".join([*head, *coverage]), err=True)
         else:
-            self._live.update(self._drawing(share, head, recorder), refresh=True)
+            width = self._live.console.width
+            self._live.update(self._drawing(share, head, recorder, width), refresh=True)
 
     def approach(self, mark: "UntilMark") -> None:
         """Show how far a capture is from the scene's tolerance, after each update of the fit."""
@@ -141,14 +147,20 @@ class LiveView:
             self._live.stop()
             self._live = None
 
-    def _drawing(self, share: float, head: str, recorder: "Recorder | None") -> Any:
+    def _drawing(
+        self, share: float, head: list[str], recorder: "Recorder | None", width: int
+    ) -> Any:
+        """What stands on a terminal of ``width`` columns; only sentences are folded there."""
         from rich.console import Group
+        from rich.padding import Padding
         from rich.progress_bar import ProgressBar
         from rich.text import Text
 
-        drawn: list[Any] = [Text(head), ProgressBar(total=1.0, completed=share, width=40)]
+        bar = ProgressBar(total=1.0, completed=share, width=min(_BAR_COLUMNS, width))
+        # a bar of rich ends no line; padded, it is a line of its own
+        drawn: list[Any] = [*map(Text, head), Padding(bar, 0)]
         if self._trace and self._axis:
-            drawn.append(Text(effort_plot(self._trace, self._axis)))
+            drawn.append(Text(effort_plot(self._trace, self._axis, width)))
         if self._approach:
             drawn.append(Text(_band_line(self._approach)))
         elif recorder and self._listed:
@@ -170,9 +182,10 @@ def _band_line(marks: "Sequence[UntilMark]") -> str:
     return f"{bars} {marks[-1].sentence}".strip()
 
 
-def effort_plot(points: deque[tuple[float, float]], of: "CoveredAxis") -> str:
-    """Plot an axis's effort over its place with characters; the newest point is an o."""
-    columns, rows = _TRACE_SIZE
+def effort_plot(points: deque[tuple[float, float]], of: "CoveredAxis", width: int = 80) -> str:
+    """Plot an axis's effort over its place within ``width`` columns; the newest point is an o."""
+    most, rows = _TRACE_SIZE
+    columns = max(min(most, width - _MARGIN), 2)
     left, right = _range([point[0] for point in points])
     low, high = _range([point[1] for point in points])
     grid = [[" "] * columns for _ in range(rows)]
@@ -182,7 +195,7 @@ def effort_plot(points: deque[tuple[float, float]], of: "CoveredAxis") -> str:
         grid[row][column] = "o" if index == len(points) else "."
     marks = [f"{high:9.1f}", *[" " * 9] * (rows - 2), f"{low:9.1f}"]
     lines = [f"{mark} |{''.join(cells)}".rstrip() for mark, cells in zip(marks, grid, strict=True)]
-    axis = f"{left:<10.1f}{f'{of.channel} ({of.unit})':^{columns - 20}}{right:>10.1f}"
+    axis = f"{left:<10.1f}{f'{of.channel} ({of.unit})':^{max(columns - 20, 0)}}{right:>10.1f}"
     return "\n".join([f"{of.effort_name} ({of.effort_unit})", *lines, " " * 11 + axis])
 
 

@@ -5,6 +5,7 @@ from .control import loop_margins as loop_margins
 from .control_design import Demand as Demand
 from .control_design import design_gains as design_gains
 from .counting import count_recorded as count_recorded
+from .coverage import ADVANCE as ADVANCE
 from .coverage import OPENING as OPENING
 from .coverage import CoverageGrid as CoverageGrid
 from .cut_trajectory import Blade as Blade

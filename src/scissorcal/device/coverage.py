@@ -1,5 +1,6 @@
 """Coverage of a capture: which speeds were recorded at which angles, per direction, live."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
@@ -15,7 +16,9 @@ from scissorcal.recipe.requirements import CaptureKind
 from scissorcal.recipe.schema import Recipe
 
 if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions
     from rich.table import Table
+    from rich.text import Text
 
 Range = tuple[float, float]
 Direction = Literal["closing", "opening", "backward", "forward"]
@@ -161,18 +164,20 @@ class CoverageGrid:
         counts = f"{int(self.filled.sum())} of {self.filled.size} cells filled"
         return f"{counts}; thin: {'; '.join(parts)}" if parts else counts
 
-    def table(self) -> "Table":
-        """Return the grid as a table for rich: a row per speed, a column per place."""
+    def table(self, *, narrow: bool = False) -> "Table":
+        """Return the grid as a table for rich: a row per speed, a column per place.
+
+        In a ``narrow`` one a column is named by the lower end of its place alone.
+        """
         from rich.table import Table
 
         axis = self.axis
-        of = f"speed ({axis.rate_unit}) over {axis.channel} ({axis.unit})"
-        title = f"coverage {100 * self.share:.0f} %: {of}"
-        table = Table(title=title, title_justify="left")
-        table.add_column(axis.rate_unit, justify="right")
+        table = Table(padding=(0, 0 if narrow else 1))
+        table.add_column(axis.rate_unit, justify="right", no_wrap=True)
         for cell in self.cells:
             low, high = (axis.places * end for end in cell)
-            table.add_column(f"{low:.0f}-{high:.0f}", justify="center")
+            name = f"{low:.0f}" if narrow else f"{low:.0f}-{high:.0f}"
+            table.add_column(name, justify="center", no_wrap=True)
         for d, direction in enumerate(self.directions):
             for s, speed in enumerate(self.speeds):
                 marks = [self._mark(float(seconds)) for seconds in self.seconds[d, s]]
@@ -180,8 +185,24 @@ class CoverageGrid:
                 table.add_row(name, *marks, end_section=s + 1 == len(self.speeds))
         return table
 
-    def __rich__(self) -> "Table":
-        return self.table()
+    def __rich_console__(
+        self, console: "Console", options: "ConsoleOptions"
+    ) -> "Iterator[Table | Text]":
+        """The table that a terminal has place for, under a title; else the sentence."""
+        from rich.measure import Measurement
+        from rich.text import Text
+
+        of = f"{self.axis.channel} ({self.axis.unit})"
+        roomy = options.update(width=10_000)
+        for narrow in (False, True):
+            table = self.table(narrow=narrow)
+            if Measurement.get(console, roomy, table).maximum <= options.max_width:
+                over = f"{of}, from" if narrow else of
+                speed = f"speed ({self.axis.rate_unit})"
+                yield Text(f"coverage {100 * self.share:.0f} %: {speed} over {over}")
+                yield table
+                return
+        yield Text(self.sentence())
 
     def _mark(self, seconds: float) -> str:
         if seconds >= self.needed_s:

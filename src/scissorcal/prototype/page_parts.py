@@ -109,6 +109,13 @@ class Stroke(Part):
     torque: Numbers
 
 
+class State(Part):
+    """What is to be known of a package: a label of one or two words, and the sentence behind it."""
+
+    label: str
+    sentence: str
+
+
 class PosePart(Part):
     """Where the plate stands, in the rig's frame."""
 

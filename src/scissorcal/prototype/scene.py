@@ -28,6 +28,7 @@ from scissorcal.prototype.page_parts import (
     PosePart,
     Rows,
     Slider,
+    State,
     Stroke,
 )
 from scissorcal.report.numbers import shown_unit
@@ -49,6 +50,8 @@ MOST_STROKES = 24
 ABOVE_ZERO = 1e-3
 """A slider of a parameter that is above 0 stays above this share of its fitted value."""
 AT_MOST_1 = ("kappa",)
+_UNITS = {"m": (1e3, "mm"), "N m": (1e3, "mN m"), "N m s/rad": (1e3, "mN m s/rad")}
+"""Units in which all of the page shows lengths, torques, and torques over a rate."""
 LEAST_EXPONENT = 1.0
 """A softer law has an infinite stiffness at the first touch, which no table holds."""
 
@@ -68,7 +71,7 @@ class Scene(Part):
     name: str
     made_utc: str
     version: str
-    warnings: tuple[str, ...]
+    states: tuple[State, ...]
     bound_Nm: float
     torque_limit_Nm: float
     opening_rad: tuple[float, float]
@@ -93,6 +96,7 @@ class Scene(Part):
     recipe: str | None = None
     drawn_plate: LayersPart | None = None
     plate_pose: PosePart | None = None
+    next_step: str = ""
 
 
 def scene_of(
@@ -102,13 +106,13 @@ def scene_of(
     version: str,
     fits: Sequence[FitResult] = (),
     hands: Sequence[Hand] = (),
-    warnings: Sequence[str] = (),
+    states: Sequence[State] = (),
 ) -> Scene:
     """What a page shows of a package; ``fits`` add measured strokes and meanings.
 
     A fit that the package was not built from adds nothing: its inputs hash is another.
-    ``warnings`` stand before those of the package. What a workspace adds to it, ``recipe`` and
-    ``drawn_plate``, is put in by ``model_copy``.
+    ``states`` stand before those of the package. What a workspace adds to it, ``recipe``,
+    ``drawn_plate`` and ``next_step``, is put in by ``model_copy``.
     """
     manifest = package.manifest
     fit_hashes = set(manifest.fit_hashes.values())
@@ -120,7 +124,7 @@ def scene_of(
         name=manifest.name,
         made_utc=made_utc,
         version=version,
-        warnings=(*warnings, *package.warnings),
+        states=(*states, *package_states(package)),
         bound_Nm=manifest.bound.stated_Nm,
         torque_limit_Nm=manifest.limits.torque_Nm,
         opening_rad=ranges.opening_rad,
@@ -143,6 +147,18 @@ def scene_of(
         hands=tuple(hands),
         pieces=manifest.pieces,
         plate_pose=_pose_part(manifest.plate),
+    )
+
+
+def package_states(package: ModelPackage) -> tuple[State, ...]:
+    """The warnings of a package, each under a label of its kind."""
+    named = [("unsigned", package.review_warnings), ("failed checks", package.fit_warnings)]
+    known = {sentence for _, sentences in named for sentence in sentences}
+    rest = tuple(sentence for sentence in package.warnings if sentence not in known)
+    return tuple(
+        State(label=label, sentence=sentence)
+        for label, sentences in (*named, ("limits", rest))
+        for sentence in sentences
     )
 
 
@@ -209,7 +225,7 @@ def _slider(
     numbers = (law.fracture_energy, law.kappa, law.rate_damping)
     if not rows.tables and all(np.ptp(one) == 0.0 for one in numbers):
         return None
-    scale, unit = shown_unit(parameter.unit)
+    scale, unit = _UNITS.get(parameter.unit) or shown_unit(parameter.unit)
     return Slider(
         name=parameter.name,
         column=column,

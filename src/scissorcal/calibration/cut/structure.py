@@ -73,8 +73,22 @@ def _edge_from(structure: Mapping[str, Any], values: Mapping[str, Array]) -> Edg
     return edge_prior.with_values(named)
 
 
+_EDGE_TERMS = {
+    "offset_m": "offset at the pivot",
+    "taper_rad": "taper",
+    "curvature_per_m": "curvature",
+    "bend_per_m2": "change of the curvature",
+}
+
+
 def edge_layout(edge_prior: EdgeDistribution) -> Layout:
-    """Parameters of an edge that was measured, with that estimate as their prior."""
+    """Parameters of an edge that was measured, with that estimate as their prior.
+
+    >>> line = Edge("line", offset_m=-0.008, taper_rad=0.03, length_m=0.07)
+    >>> named = EdgeDistribution(line, ("offset_m", "taper_rad"), np.diag([1e-10, 1e-8]))
+    >>> [parameter.meaning for parameter in edge_layout(named).parameters]
+    ["offset at the pivot of the blade's edge", "taper of the blade's edge"]
+    """
     units = {"offset_m": "m", "taper_rad": "rad", "curvature_per_m": "1/m", "bend_per_m2": "1/m^2"}
     sds = np.sqrt(np.diag(edge_prior.covariance))
     return Layout(
@@ -85,12 +99,16 @@ def edge_layout(edge_prior: EdgeDistribution) -> Layout:
                 IDENTITY,
                 float(mean),
                 float(sd),
-                "the blade's edge, as photographs or the recipe tell it",
+                f"{_edge_term(name)} of the blade's edge",
                 measured_prior=True,
             )
             for name, mean, sd in zip(edge_prior.names, edge_prior.mean, sds, strict=True)
         )
     )
+
+
+def _edge_term(name: str) -> str:
+    return _EDGE_TERMS.get(name, name.replace("spline_m_", "spline weight "))
 
 
 def geometry_of(recipe: Recipe, edge: Edge) -> dict[str, Any]:

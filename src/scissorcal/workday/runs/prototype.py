@@ -17,7 +17,7 @@ from scissorcal.identity import VERSION
 from scissorcal.kernel import Capability
 from scissorcal.package import open_package
 from scissorcal.prototype.document import ensure_page, page_of, policy_of
-from scissorcal.prototype.page_parts import Hand, LayersPart, Numbers, layers_part
+from scissorcal.prototype.page_parts import Hand, LayersPart, Numbers, State, layers_part
 from scissorcal.prototype.rig_commands import RigCommand
 from scissorcal.prototype.scene import Scene, scene_of
 from scissorcal.recipe.load import read_text
@@ -26,6 +26,7 @@ from scissorcal.recording import Recording, read_header, read_recording
 from scissorcal.render.engine import REQUEST
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, PrototypeOptions
+from scissorcal.workday.plan import make_plan
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.runs.package import built_package
@@ -40,6 +41,7 @@ TRACK_REQUEST = (
     "The motors stay off. Move the handles so that the blade's tip taps the plate, at several "
     "places."
 )
+_STALE = "stale"
 HAND_POINTS = 1500
 """Of a recorded hand: 30 s at 50 Hz."""
 LONGEST_HAND_s = 60.0
@@ -64,15 +66,20 @@ def workspace_scene(
         version=VERSION,
         fits=fits,
         hands=workspace_hands(workspace),
-        warnings=[
+        states=[
             *(() if package_path else _origin(workspace)),
-            *(sentence for sentence in said if sentence not in package.warnings),
+            *(
+                State(label=_STALE if _STALE in sentence else "unverified", sentence=sentence)
+                for sentence in said
+                if sentence not in package.warnings
+            ),
         ],
     )
     if package_path:
         return scene
     recipe = read_text(workspace.recipe_path)
-    return scene.model_copy(update={"recipe": recipe, "drawn_plate": workspace_plate(workspace)})
+    added = {"recipe": recipe, "drawn_plate": workspace_plate(workspace)}
+    return scene.model_copy(update={**added, "next_step": make_plan(workspace).next_command or ""})
 
 
 def workspace_plate(workspace: Workspace) -> LayersPart | None:
@@ -90,7 +97,7 @@ def workspace_plate(workspace: Workspace) -> LayersPart | None:
     return layers_part(recipe.plate.cut_line_mm, layers)
 
 
-def _origin(workspace: Workspace) -> tuple[str, ...]:
+def _origin(workspace: Workspace) -> tuple[State, ...]:
     """A sentence where recordings of the workspace come from a virtual rig, as they state."""
     paths = [*workspace.recordings("friction"), *workspace.recordings("cut")]
     stated = []
@@ -103,10 +110,8 @@ def _origin(workspace: Workspace) -> tuple[str, ...]:
     if not any(stated):
         return ()
     which = "all" if all(stated) else f"{sum(stated)} of {len(stated)}"
-    return (
-        f"Simulated: {which} recordings of friction and cuts come from a virtual rig, so what is "
-        "shown as measured is not of a real specimen.",
-    )
+    sentence = f"Simulated: {which} recordings of friction and cuts come from a virtual rig."
+    return (State(label="simulated", sentence=sentence),)
 
 
 def workspace_hands(workspace: Workspace) -> tuple[Hand, ...]:

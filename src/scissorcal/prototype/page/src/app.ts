@@ -3,8 +3,8 @@
 import { edgeTable } from "./blade_edge";
 import { Curves, TimeChart, TorqueChart } from "./charts";
 import { Controls } from "./controls";
-import { mountDesign } from "./design";
-import { Drawing } from "./drawing";
+import { mountDesign, packagePlate } from "./design";
+import { Drawing, View } from "./drawing";
 import { html, refilled } from "./elements";
 import { madeHand, oneStroke, recordedHand } from "./hand";
 import { KEYS, takeInput } from "./input";
@@ -17,9 +17,12 @@ import { RigPanel } from "./rig_panel";
 import { Ripple } from "./ripple";
 import { Scene, unpack } from "./scene";
 import { RigSamples, Server } from "./socket";
-import { View, View3d } from "./view3d";
+import { View3d } from "./view3d";
 
 const CHARTS_EVERY_ms = 100; // as often as the numbers; twice as often, both took 17 % of a processor
+const COLOURS = [
+  ["measured", "measured"], ["fitted", "fitted model"], ["whatif", "what if"], ["material", "material"], ["hand", "you move it"],
+];
 const AT_REST_ms = 250; // nothing changes then but colours and sizes
 const STIRS = ["pointerdown", "pointerup", "keydown", "wheel", "input", "change", "click", "resize", "visibilitychange"];
 
@@ -43,10 +46,11 @@ export class App {
   private readonly bladesBox = html("label", { hidden: true }, html("input", {
     type: "checkbox", change: (event) => this.moveBlades((event.target as HTMLInputElement).checked),
   }), "move the blades");
+  private readonly hint = html("p", { class: "hint" }, "↓ Drag the handle to cut");
   private drawn: Drawn | null = null;
   /** Edge of the blades that a person drew; null: as fitted. */
   private edge: Edge | null = null;
-  private readonly bladesNote = html("p", { class: "note", hidden: true }, "The blades are drawn: both curves are the law with these, and sliders and draws of the fitted edge do nothing; the shaded interval and the measured lines are of the blades as fitted.");
+  private readonly bladesNote = html("p", { class: "note", hidden: true }, "The blades are drawn: interval and measured lines are of the fitted ones, whose sliders do nothing.");
   /** Timer of the next picture while the blades stand still, else 0. */
   private resting = 0;
   private stirredAt = 0;
@@ -59,6 +63,7 @@ export class App {
     this.largestTorque = largestOf(scene);
     this.rig = new Rig(scene, module);
     this.rig.cut(scene.pieces);
+    this.drawn = packagePlate(scene);
     this.average = new Average(module);
     this.fitted = asFitted(scene);
     this.laws = { fitted: this.fitted, whatIf: this.fitted };
@@ -69,10 +74,10 @@ export class App {
     const [torque, time, now, law, design, rig] = ["torque", "time", "now", "law", "design", "rig"].map((name) => html("section", { class: name }));
     refilled(page, this.header(),
       html("main", {},
-        html("section", { class: "stage" }, this.actions(), canvas, this.solid, keyHelp()),
+        html("section", { class: "stage" }, html("div", { class: "view" }, canvas, this.solid, this.hint), this.actions(), keyHelp()),
         torque, now, time, law, server ? rig : null,
         html("details", { class: "designer", toggle: (event) => this.openDesign(event.target as HTMLDetailsElement, design) }, html("summary", {}, "Draw plates and blades"), design)),
-      html("footer", { class: "note" }, `${scene.name}, page made ${scene.made_utc} by scissorcal ${scene.version}. Tables within ${(1e3 * scene.bound_Nm).toPrecision(2)} mN m of the fitted law.`));
+      html("footer", { class: "note" }, `scissorcal ${scene.version}, ${scene.made_utc}; tables within ${(1e3 * scene.bound_Nm).toPrecision(2)} mN m of the fit`));
     this.drawing = new Drawing(canvas);
     torque.append(html("h2", {}, "Torque over the opening"), html("p", { class: "note" }, torqueNote(scene)), this.bladesNote);
     time.append(html("h2", {}, "The last 8 seconds"));
@@ -82,6 +87,7 @@ export class App {
     this.controls = new Controls(law, scene, () => this.changed());
     this.panel = server ? new RigPanel(rig, server, (samples) => this.follow(samples)) : null;
     takeInput(canvas, this.rig, scene, this.acts);
+    for (const name of ["pointerdown", "keydown"]) canvas.addEventListener(name, () => this.begun());
     this.changed();
     this.rig.freshSheet();
   }
@@ -201,7 +207,13 @@ export class App {
     return { ...law, numbers, tables: { ...law.tables, edge: edgeTable(this.edge, law.tables.edge.x) } };
   }
 
+  /** Somebody moves the blades: what to do first need not be said any more. */
+  private begun(): void {
+    this.hint.hidden = true;
+  }
+
   private stroke(): void {
+    this.begun();
     this.rig.play(oneStroke(this.scene, this.rig.pose));
   }
 
@@ -209,8 +221,19 @@ export class App {
     const { scene } = this;
     return html("header", {},
       html("h1", {}, scene.name),
-      ...scene.warnings.map((sentence) => html("p", { class: "warning" }, sentence)),
-      html("p", { class: "note" }, "Blue is the fitted model, orange what if, grey measured, and the last closing stroke that of the blades on this page: a model, too, on the C core that renders on the rig."));
+      this.states(),
+      html("ul", { class: "key", "aria-label": "Colours" }, ...COLOURS.map(([name, label]) => html("li", { class: name }, label))));
+  }
+
+  /** One line of labels; opened, the sentences behind them and the next step. */
+  private states(): HTMLElement | null {
+    const { states, next_step } = this.scene;
+    if (!states.length && !next_step) return null;
+    const labels = [...new Set(states.map(({ label }) => label))];
+    return html("details", { class: "states" },
+      html("summary", {}, ...(labels.length ? labels : ["next step"]).map((label) => html("span", { class: "state" }, label))),
+      ...states.map(({ label, sentence }) => html("p", {}, html("strong", {}, `${label}: `), sentence)),
+      next_step ? html("p", { class: "next" }, html("strong", {}, "next: "), html("code", {}, next_step)) : null);
   }
 
   private actions(): HTMLElement {
@@ -220,17 +243,19 @@ export class App {
     return html("div", { class: "row actions", role: "toolbar", "aria-label": "Hands and views" },
       button("One stroke", () => this.stroke()),
       button("Strokes", () => this.play(madeHand(this.scene, this.rig.start))),
-      ...this.scene.hands.map((hand) => button(`Hand of ${hand.name}`, () => this.play(recordedHand(hand)))),
+      ...this.scene.hands.map((hand) => button(shortName(hand.name), () => this.play(recordedHand(hand)))),
       button("Fresh sheet", () => this.rig.freshSheet()),
-      box("3-D", (isOn) => this.show3d(isOn)), this.bladesBox, box("sound", (isOn) => this.ripple.sound(isOn)), box("gamepad rumble", (isOn) => this.ripple.rumble(isOn)));
+      box("3-D", (isOn) => this.show3d(isOn)), this.bladesBox, box("sound", (isOn) => this.ripple.sound(isOn)), box("rumble", (isOn) => this.ripple.rumble(isOn)));
   }
 
   private play(script: Parameters<Rig["play"]>[0]): void {
+    this.begun();
     this.rig.freshSheet();
     this.rig.play(script);
   }
 
   private show3d(isOn: boolean): void {
+    this.begun();
     this.solid.hidden = !isOn;
     this.drawing.canvas.hidden = isOn;
     if (isOn && !this.view3d) this.open3d();
@@ -249,7 +274,7 @@ export class App {
   private openDesign(details: HTMLDetailsElement, section: HTMLElement): void {
     if (!details.open || section.childElementCount) return;
     mountDesign(section, this.scene, (pieces: Piece[] | null, applied) => {
-      this.drawn = applied?.drawn ?? null;
+      this.drawn = applied?.drawn ?? packagePlate(this.scene);
       this.edge = applied?.edge ?? null;
       this.bladesNote.hidden = !this.edge;
       this.rig.cut(pieces ?? this.scene.pieces);
@@ -266,8 +291,13 @@ function largestOf(scene: Scene): number {
 }
 
 function torqueNote(scene: Scene): string {
-  const measured = scene.strokes.length ? "grey lines are measured closing strokes with friction taken off" : "this package brings no measured strokes";
-  return `Shaded: the model's 90 % interval at the contact where the stroke began; ${measured}. The curves leave out the rig's friction, and of a drawn plate they show the uniform sheet.`;
+  return `Of the uniform sheet, without friction; shaded: 90 % interval.${scene.strokes.length ? "" : " No measured strokes."}`;
+}
+
+/** A recording without the seconds of its time, which no two of one day share. */
+function shortName(name: string): string {
+  const [, kind, day, hour, minute] = /^(\w+)-\d{4}(\d{4})T(\d{2})(\d{2})\d{2}Z$/.exec(name) ?? [];
+  return kind ? `Replay ${kind} ${day.slice(0, 2)}-${day.slice(2)} ${hour}:${minute}` : `Replay ${name}`;
 }
 
 function keyHelp(): HTMLElement {

@@ -41,7 +41,7 @@ export class TorqueChart {
     const [low, high] = scene.opening_rad;
     this.openings = Float32Array.from({ length: GRID }, (_, i) => low + ((high - low) * i) / (GRID - 1));
     this.degrees = Array.from(this.openings, (opening) => DEG * opening);
-    this.measured = scene.strokes.map((stroke) => onGrid(stroke, this.openings));
+    this.measured = scene.strokes.filter((stroke) => stroke.kind === "closing").map((stroke) => onGrid(stroke, this.openings));
     new ResizeObserver(() => this.size()).observe(this.container);
   }
 
@@ -74,10 +74,10 @@ export class TorqueChart {
       series: [
         { label: "opening", value: (_, v) => (v === null ? "" : `${v.toFixed(1)}°`) },
         line("5 %", "transparent", 0), line("95 %", "transparent", 0), ...measured,
-        line("draw", colours.muted, 1.5, [2, 3]), line("what if", colours.vermillion, 2, [6, 4]),
-        line("as fitted", colours.blue, 2), line("last closing stroke", colours.ink, 1.5),
+        line("draw", colours.muted, 1.5, [2, 3]), line("what if", colours.whatIf, 2, [6, 4]),
+        line("as fitted", colours.fitted, 2), line("last closing stroke", colours.ink, 1.5),
       ],
-      bands: [{ series: [2, 1], fill: alpha(colours.blue, 0.18) }],
+      bands: [{ series: [2, 1], fill: alpha(colours.fitted, 0.18) }],
       scales: { x: { time: false }, y: { range: (_, low, high) => [Math.min(low, 0), Math.max(high, 1e-3) * 1.05] } },
       axes: [
         axis(colours, "opening, degrees"),
@@ -143,8 +143,8 @@ export class TimeChart {
       series: [
         { label: "time", value: (_, v) => (v === null ? "" : `${v.toFixed(2)} s`) },
         torque,
-        { label: "force along the cut", stroke: colours.vermillion, width: 1.5, scale: "N", ...show, value: (_, v) => (v === null ? "" : `${v.toFixed(2)} N`) },
-        ...(this.followsRig ? [{ ...torque, label: "torque of the rig", stroke: colours.blue }] : []),
+        { label: "force along the cut", stroke: colours.ink, width: 1.5, dash: [5, 4], scale: "N", ...show, value: (_, v) => (v === null ? "" : `${v.toFixed(2)} N`) },
+        ...(this.followsRig ? [{ ...torque, label: "torque of the rig", stroke: colours.muted }] : []),
       ],
       scales: { x: { time: false, range: [-LAST_s, 0] }, y: { range: () => this.ranges[0] }, N: { range: () => this.ranges[1] } },
       axes: [

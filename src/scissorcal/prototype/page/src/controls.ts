@@ -33,7 +33,7 @@ export class Controls {
       html("div", { class: "row", role: "group", "aria-label": "Parts of the law" }, ...PARTS.map(([name, label]) => this.part(name, label))),
       this.draws, this.refusal,
       html("h3", {}, "What if"),
-      html("p", { class: "note" }, "A slider spans at least half to twice the fitted value. The bar is the posterior's 5 to 95 %; the tick is the fitted value."),
+      html("p", { class: "note" }, "Bar: 5 to 95 %; tick: fitted."),
       this.sliders,
     );
     if (!scene.numbers.length) return;
@@ -49,7 +49,7 @@ export class Controls {
 
   /** Name the laws that the kernel did not take, such as one whose response has no stiffness. */
   refuse(names: string[]): void {
-    refilled(this.refusal, names.length ? `The kernel does not take this law (${names.join(", ")}): its blades stand still. Move the parameters back.` : null);
+    refilled(this.refusal, names.length ? `The kernel refuses this law (${names.join(", ")}): move the parameters back.` : null);
     this.refusal.hidden = !names.length;
   }
 
@@ -122,7 +122,7 @@ export class Controls {
       this.fillDraws();
     };
     refilled(this.draws,
-      numberField(`draw of the posterior (1 to ${count}, 0 for none)`, choices.draw === null ? 0 : choices.draw + 1, { key: "draw", least: 0, most: count }, (value) => chosen(value < 0.5 ? null : Math.round(value) - 1)),
+      numberField(`posterior draw, 1 to ${count}`, choices.draw === null ? 0 : choices.draw + 1, { key: "draw", least: 0, most: count }, (value) => chosen(value < 0.5 ? null : Math.round(value) - 1)),
       html("button", { type: "button", click: next, "data-key": "next" }, "Next draw"),
       html("button", { type: "button", click: play, "data-key": "play", "aria-pressed": String(this.playing !== 0) }, this.playing ? "Stop" : "Play draws"));
   }
@@ -132,7 +132,7 @@ export class Controls {
     const [low, high] = [nodes[0], nodes[nodes.length - 1]];
     const value = this.choices.values.get(slider.name) ?? slider.value;
     const share = (at: number): number => Math.min(Math.max((at - low) / (high - low), 0), 1);
-    const [scale, unit] = slider.unit === "m" ? [1e3, "mm"] : [slider.scale, slider.unit === "1" ? "" : slider.unit];
+    const [scale, unit] = [slider.scale, slider.unit === "1" ? "" : slider.unit];
     const decimals = decimalsOf(scale * slider.sd);
     const shown = (at: number): string => `${(scale * at).toFixed(decimals).replace("-", "−")} ${raised(unit)}`.trim();
     const output = html("output", {}, shown(value));
@@ -154,9 +154,9 @@ export class Controls {
     interval.style.left = `${100 * share(slider.q05)}%`;
     interval.style.width = `${Math.max(100 * (share(slider.q95) - share(slider.q05)), 0.7)}%`;
     tick.style.left = `${100 * share(slider.value)}%`;
-    return html("div", { class: "slider" },
-      html("span", { class: "name" }, slider.meaning || slider.name), output, input, range,
-      html("span", { class: "note" }, `${slider.name}: fitted ${shown(slider.value)}, 5 to 95 % ${shown(slider.q05)} to ${shown(slider.q95)}`));
+    const interval_text = `${slider.name}: fitted ${shown(slider.value)}, 5 to 95 % ${shown(slider.q05)} to ${shown(slider.q95)}`;
+    return html("div", { class: "slider", title: interval_text },
+      html("span", { class: "name" }, slider.meaning || slider.name), output, input, range);
   }
 }
 

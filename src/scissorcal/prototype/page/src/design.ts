@@ -8,11 +8,12 @@ import { Blades, edgePanel } from "./edge_panel";
 import { html, refilled } from "./elements";
 import { tableOf } from "./law";
 import { Calibrated, Drawn, Edge, Piece, piecesOf } from "./pieces";
-import { calibratedOf, drawnFromRecipe, recipeText } from "./recipe_text";
+import { calibratedOf, drawnFromRecipe, Obstacle, obstacleOf, recipeText } from "./recipe_text";
 import { Scene, unpack } from "./scene";
 import { svgOf } from "./svg_file";
 
 const PULL = "Pull it out on the drawing, or press Enter there.";
+const FROM_FILES = "The package's plate, from its SVG files; their y points down, and up here.";
 const TOOLS: [Tool, string, string][] = [
   ["move", "Move", ""], ["polygon", "Polygon", "Click the corners; a double click or Enter closes it."],
   ["rectangle", "Rectangle", PULL], ["circle", "Circle", PULL],
@@ -38,12 +39,28 @@ export function mountDesign(container: HTMLElement, scene: Scene, apply: Apply):
   new Designer(container, scene, apply);
 }
 
+/** The drawing of the package's plate; null where it has none or it cannot be drawn. */
+export function packagePlate(scene: Scene): Drawn | null {
+  try {
+    return scene.pieces ? ownPlate(scene) : null;
+  } catch {
+    return null; // the designer gives the reason
+  }
+}
+
+function ownPlate(scene: Scene): Drawn | null {
+  if (scene.drawn_plate) return drawnFromPlate(scene.drawn_plate);
+  const own = drawnFromRecipe(scene.recipe ?? "");
+  return own.layers.length ? { ...own, edge: null, edge_points: [] } : null;
+}
+
 class Designer {
   private readonly calibrated: Calibrated;
   private readonly fitted: Blades;
   private readonly design: Design;
   private readonly canvas: DesignCanvas;
   private readonly status = html("p", { class: "design-status", role: "status" });
+  private readonly obstacle = html("p", { class: "design-obstacle", hidden: true });
   private readonly side = html("div", { class: "design-side" });
   private readonly tools = html("div", { class: "row", role: "toolbar", "aria-label": "Tools of the drawing" });
   private readonly cuts = html("input", { type: "checkbox", change: () => {
@@ -66,7 +83,8 @@ class Designer {
     container.classList.add("design");
     container.addEventListener("keydown", (event) => undoKeys(event, this.design));
     container.replaceChildren(
-      html("p", {}, `Plates from above; thickness and toughness are compared with what was calibrated (${calibratedText(this.calibrated)}).`),
+      this.obstacle,
+      html("p", {}, `Plates from above, against the calibrated ${calibratedText(this.calibrated)}.`),
       html("div", { class: "row" }, html("label", { class: "field" }, "The next shape is ", this.kinds()), this.tools),
       this.files(), this.status, html("div", { class: "design-both" }, paper, this.side),
     );
@@ -79,14 +97,12 @@ class Designer {
   /** What is drawn first: the package's own plate where its recipe holds one, else the plain sheet. */
   private begun(): { drawn: Drawn; sentence: string } {
     const { scene } = this;
+    const drawn = packagePlate(scene);
+    if (drawn) return { drawn, sentence: scene.drawn_plate ? FROM_FILES : "" };
     const plain = plainSheet(this.calibrated, scene.blade_length_m);
     if (!scene.pieces) return { drawn: plain, sentence: "" };
     try {
-      if (scene.drawn_plate) {
-        return { drawn: drawnFromPlate(scene.drawn_plate), sentence: "The package's plate, from its SVG files; their y points down, and up here." };
-      }
-      const own = drawnFromRecipe(scene.recipe ?? "");
-      if (own.layers.length) return { drawn: { ...own, edge: null, edge_points: [] }, sentence: "" };
+      ownPlate(scene);
     } catch (error) {
       return { drawn: plain, sentence: `The plate of the package cannot be drawn here: ${(error as Error).message}` };
     }
@@ -146,6 +162,23 @@ class Designer {
       layerList(design), pieceTable(this.pieces, this.refusal),
       cornerTable(design, say), edgePanel(design, this.fitted, say, this.unfelt()));
     this.buttons();
+    this.obstruct();
+  }
+
+  /** What would keep the drawing out of the recipe is offered to be changed before one draws. */
+  private obstruct(): void {
+    const { design } = this;
+    let found: Obstacle | null = null;
+    try {
+      found = obstacleOf(design.base);
+    } catch {
+      // no recipe at all: saving it gives the reason
+    }
+    this.obstacle.hidden = !found;
+    refilled(this.obstacle, ...(found ? [`${found.sentence} `, html("button", { type: "button", "data-key": "obstacle", click: () => {
+      design.replace(design.drawn, true, found.base, !this.cuts.checked); // a box that is not ticked stays so
+      this.say(`${found.offer}: done. Undo takes it back.`);
+    } }, found.offer)] : []));
   }
 
   private buttons(): void {

@@ -3,8 +3,12 @@
 import { Step } from "./kernel";
 import { bladeLength, heldValue, Law } from "./law";
 import { Pose } from "./hand";
+import { rectangle } from "./outline";
+import { Drawn, Piece } from "./pieces";
 import { Scene } from "./scene";
+import { slabsOf, Tinted } from "./slabs";
 
+/** What is drawn; without pieces the sheet is uniform. `drawn` is what the pieces were made of. */
 export interface View {
   scene: Scene;
   law: Law;
@@ -12,6 +16,10 @@ export interface View {
   wanted: Pose;
   step: Step;
   crack: number;
+  pieces?: readonly Piece[] | null;
+  /** Crack of each piece, m. */
+  cracks?: readonly number[] | null;
+  drawn?: Drawn | null;
 }
 
 interface Colours {
@@ -20,8 +28,10 @@ interface Colours {
   grid: string;
   paper: string;
   raised: string;
-  blue: string;
-  vermillion: string;
+  fitted: string;
+  whatIf: string;
+  material: string;
+  hand: string;
 }
 
 type Point = [number, number];
@@ -30,9 +40,15 @@ type Point = [number, number];
 export const LENGTHS_ACROSS = 2.1;
 const EDGE_POINTS = 120; // as fine as sixteen cubics ask
 const STRIP_px = 56;
+const HALF_WIDTH_mm = 30; // of a plate that nobody drew
+const THINNEST_px = 2;
+const SECOND = 0.55; // opacity of a layer on another one
+const KNOB_px = 10;
 const LENS_m = 0.0012; // across the magnified circle
 
 export class Drawing {
+  /** Where the handle is that a person drags, px. */
+  handle: [number, number] = [0, 0];
   private scale = 1;
   private origin: Point = [0, 0];
   private readonly context: CanvasRenderingContext2D;
@@ -55,6 +71,7 @@ export class Drawing {
     this.blade(view, beta, 1, colours);
     this.blade(view, view.scene.moving_blades === 2 ? beta : 0, -1, colours);
     this.hand(view, colours);
+    this.knob(view, colours);
     this.circle(this.origin, 4, colours.ink);
     this.lens(view, colours, width);
     this.strip(view, colours, width, height);
@@ -105,7 +122,7 @@ export class Drawing {
     context.lineWidth = 1;
     context.stroke();
     this.path(edge.map(([s, e]) => turned(s, offset * e)), false);
-    context.strokeStyle = side === 1 ? colours.blue : colours.ink;
+    context.strokeStyle = colours.ink;
     context.lineWidth = 2;
     context.stroke();
     // The handle: behind the pivot, on the other side.
@@ -124,27 +141,64 @@ export class Drawing {
     context.stroke();
   }
 
+  /** The sheet or the plates from the side, and behind the crack the two flaps. */
   private sheet(view: View, colours: Colours, width: number): void {
-    const contact = Math.max(view.crack - view.pose.advance, 0);
-    const thick = Math.max(2 * view.scene.upper_face_m * this.scale, 2);
+    const { scene, pose } = view;
+    const contact = Math.max(view.crack - pose.advance, 0);
+    const right = (width - this.origin[0]) / this.scale;
+    const whole = 2 * scene.upper_face_m;
+    const layers: Stretch[] = view.pieces ? stretchesOf(view, view.pieces) : [
+      { from: Math.max(-pose.advance, 0), cut: contact, to: right, low: -0.5 * whole, high: 0.5 * whole, isSecond: false },
+    ];
+    const thinnest = layers.reduce((least, { low, high }) => Math.min(least, high - low), Infinity);
+    const factor = Math.max(1, THINNEST_px / (this.scale * thinnest)); // so that each layer is seen
     const context = this.context;
-    context.strokeStyle = colours.vermillion;
-    context.lineWidth = thick;
-    this.path([[contact, 0], [(width - this.origin[0]) / this.scale, 0]], false);
-    context.stroke();
-    const start = Math.max(-view.pose.advance, 0);
-    if (contact <= start) return;
-    context.globalAlpha = 0.6;
-    for (const side of [1, -1] as const) {
-      const flap: Point[] = [];
-      for (let i = 0; i <= 20; i++) {
-        const x = contact + ((start - contact) * i) / 20;
-        flap.push([x, side * Math.min(heightOver(view, x), 0)]);
+    context.strokeStyle = context.fillStyle = colours.material;
+    for (const { from, cut, to, low, high, isSecond } of layers) {
+      context.globalAlpha = isSecond ? SECOND : 1;
+      if (to > cut && cut < right) this.box([Math.max(cut, 0), factor * high], [Math.min(to, right), factor * low]);
+      const [near, far] = [Math.min(cut, to), Math.max(from, 0)];
+      if (near <= far) continue;
+      context.globalAlpha = 0.6;
+      context.lineWidth = Math.max(factor * (high - low) * this.scale, 2);
+      for (const side of [1, -1] as const) {
+        const flap: Point[] = [];
+        for (let i = 0; i <= 20; i++) {
+          const x = near + ((far - near) * i) / 20;
+          flap.push([x, side * Math.min(heightOver(view, x), 0)]);
+        }
+        this.path(flap, false);
+        context.stroke();
       }
-      this.path(flap, false);
-      context.stroke();
     }
     context.globalAlpha = 1;
+  }
+
+  private box([left, top]: Point, [right, bottom]: Point): void {
+    const [[x, y], [x1, y1]] = [this.at([left, top]), this.at([right, bottom])];
+    this.context.fillRect(x, y, x1 - x, y1 - y);
+  }
+
+  /** What a person drags: it moves as the pointer does, down where the blades close. */
+  private knob(view: View, colours: Colours): void {
+    const length = bladeLength(view.law);
+    const beta = view.wanted.opening / view.scene.moving_blades;
+    const isBoth = view.scene.moving_blades === 2;
+    const reach = isBoth ? -0.42 * length : 0.97 * length; // the ring that goes down, or the tip that does
+    const side = isBoth ? -1 : 1;
+    const [x, y] = this.at([reach * Math.cos(beta), side * (reach * Math.sin(beta) - (isBoth ? 0.06 : -0.06) * length)]);
+    const context = this.context;
+    const at: Point = isBoth ? [x - 12, y] : [x, y];
+    this.handle = at;
+    this.circle(at, KNOB_px, colours.hand);
+    context.fillStyle = colours.paper;
+    for (const way of [1, -1]) {
+      context.beginPath();
+      context.moveTo(at[0] - 4, at[1] + 2 * way);
+      context.lineTo(at[0] + 4, at[1] + 2 * way);
+      context.lineTo(at[0], at[1] + 7 * way);
+      context.fill();
+    }
   }
 
   /** Where the hand is while the blades stay behind it. */
@@ -154,7 +208,7 @@ export class Drawing {
     const reach = 0.5 * bladeLength(view.law);
     const beta = view.wanted.opening / view.scene.moving_blades;
     this.context.setLineDash([4, 4]);
-    this.context.strokeStyle = colours.blue;
+    this.context.strokeStyle = colours.hand;
     this.context.lineWidth = 1.5;
     for (const side of [1, -1]) {
       this.path([[0, 0], [-reach * Math.cos(beta), -side * reach * Math.sin(beta)]], false);
@@ -197,7 +251,7 @@ export class Drawing {
     }
     const lower = upper.map(([at, height]): Point => [at, view.scene.moving_blades === 2 ? -height : -face]);
     this.path([...upper, ...lower.reverse()], true);
-    context.fillStyle = colours.vermillion;
+    context.fillStyle = colours.material;
     context.fill();
     for (const side of view.scene.moving_blades === 2 ? [1, -1] : [1]) {
       const edge: Point[] = [];
@@ -206,7 +260,7 @@ export class Drawing {
         edge.push([at, side * heightOver(view, at)]);
       }
       this.path(edge, false);
-      context.strokeStyle = side === 1 ? colours.blue : colours.ink;
+      context.strokeStyle = colours.ink;
       context.lineWidth = 2;
       context.stroke();
     }
@@ -225,23 +279,29 @@ export class Drawing {
     context.fillText(`${(1e3 * LENS_m).toFixed(1)} mm wide`, middle, y + radius + 25);
   }
 
-  /** The sheet from above: what is cut, and where the scissors stand. */
+  /** From above: sheet or plates with holes and layers, what is cut, and where the scissors stand. */
   private strip(view: View, colours: Colours, width: number, height: number): void {
     const context = this.context;
     const [top, middle] = [height - STRIP_px + 16, height - 0.5 * (STRIP_px - 16)];
     const scale = this.scale;
     const left = this.origin[0] - view.pose.advance * scale;
-    context.fillStyle = colours.vermillion;
-    context.globalAlpha = 0.18;
-    context.fillRect(Math.max(left, 0), top, width - Math.max(left, 0), STRIP_px - 20);
-    context.globalAlpha = 1;
-    context.strokeStyle = colours.vermillion;
-    context.lineWidth = 3;
+    context.save();
     context.beginPath();
-    context.moveTo(left, middle);
-    context.lineTo(left + view.crack * scale, middle);
-    context.stroke();
-    context.strokeStyle = colours.blue;
+    context.rect(0, top, width, STRIP_px - 20);
+    context.clip();
+    const reach_mm = (1e3 * (width - left)) / scale;
+    const slabs = slabsOf(view, HALF_WIDTH_mm) ?? [plainSlab(Math.max(reach_mm, 0))];
+    for (const slab of slabs) this.slab(slab, [left, middle], view.drawn?.cut_line_mm ?? 0, colours);
+    context.restore();
+    context.strokeStyle = colours.ink;
+    context.lineWidth = 2;
+    for (const [from, to] of cutsOf(view)) {
+      context.beginPath();
+      context.moveTo(left + from * scale, middle);
+      context.lineTo(left + to * scale, middle);
+      context.stroke();
+    }
+    context.strokeStyle = colours.muted;
     context.lineWidth = 1.5;
     context.beginPath();
     context.moveTo(this.origin[0], middle);
@@ -254,6 +314,66 @@ export class Drawing {
     context.textAlign = "left";
     context.fillText(`from above: ${(1e3 * view.crack).toFixed(1)} mm cut`, 8, top - 4);
   }
+
+  private slab({ outline, holes, tint }: Tinted, [left, middle]: Point, cut_mm: number, colours: Colours): void {
+    const context = this.context;
+    const mm = 1e-3 * this.scale;
+    context.beginPath();
+    for (const contour of [outline, ...holes]) {
+      contour.forEach(([x, y], i) => {
+        const place: Point = [left + mm * x, middle - mm * (y - cut_mm)];
+        if (i) context.lineTo(...place);
+        else context.moveTo(...place);
+      });
+      context.closePath();
+    }
+    context.fillStyle = tint === "weaker" ? colours.paper : tint === "tougher" ? colours.ink : colours.material;
+    context.globalAlpha = tint === "sheet" || tint === "second" ? 0.22 : 0.35;
+    context.fill("evenodd");
+    context.globalAlpha = 1;
+    context.strokeStyle = colours.material;
+    context.lineWidth = 1;
+    context.stroke();
+  }
+}
+
+/** A layer in the blades' frame, m: its ends, where its crack is, its faces. */
+interface Stretch {
+  from: number;
+  cut: number;
+  to: number;
+  low: number;
+  high: number;
+  isSecond: boolean;
+}
+
+function stretchesOf({ scene, pose, cracks }: View, pieces: readonly Piece[]): Stretch[] {
+  const moving = scene.moving_blades;
+  const whole = scene.upper_face_m * moving;
+  const height = pieces.reduce((most, piece) => Math.max(most, moving * piece.upper_face_m), 0);
+  const base = moving === 2 ? 0.5 * height : 0;
+  return pieces.map((piece, i) => {
+    const high = moving * piece.upper_face_m;
+    const thick = piece.scale * whole;
+    const end = piece.strips[piece.strips.length - 1].end_m;
+    return {
+      from: piece.begin_m - pose.advance, cut: Math.max(cracks?.[i] ?? 0, piece.begin_m) - pose.advance, to: end - pose.advance,
+      low: high - thick - base, high: high - base, isSecond: high > 1.000001 * thick,
+    };
+  });
+}
+
+/** Where the cut is, m from the sheet's near edge. */
+function cutsOf({ crack, pieces, cracks }: View): [number, number][] {
+  if (!pieces) return [[0, crack]];
+  return pieces.map((piece, i): [number, number] => {
+    const end = piece.strips[piece.strips.length - 1].end_m;
+    return [piece.begin_m, Math.min(Math.max(cracks?.[i] ?? 0, piece.begin_m), end)];
+  });
+}
+
+function plainSlab(reach_mm: number): Tinted {
+  return { outline: rectangle([0, -HALF_WIDTH_mm], [reach_mm, HALF_WIDTH_mm]), holes: [], low: 0, high: 1, tint: "sheet" };
 }
 
 /** The edge in the blade's frame: station and offset. */
@@ -279,6 +399,6 @@ export function coloursOf(element: Element): Colours {
   const named = (name: string): string => style.getPropertyValue(`--${name}`).trim();
   return {
     ink: named("ink"), muted: named("muted"), grid: named("grid"), paper: named("paper"),
-    raised: named("raised"), blue: named("blue"), vermillion: named("vermillion"),
+    raised: named("raised"), fitted: named("fitted"), whatIf: named("whatif"), material: named("material"), hand: named("hand"),
   };
 }

@@ -94,7 +94,7 @@ export function madeHand(scene: Scene, start: Pose, strokes = 3): Script {
     const within = time - number * (2 * half + 0.3);
     const share = within < half ? within / half : Math.max(0, 2 - within / half);
     const moving = Math.min(Math.max((within - 2 * half) / 0.3, 0), 1);
-    return { opening: open - (open - closed) * eased(Math.min(share, 1)), advance: Math.min(-near - 0.2 * (far - near), start.advance) + step * (number + moving) };
+    return { opening: open - (open - closed) * eased(Math.min(share, 1)), advance: start.advance + step * (number + moving) };
   };
 }
 

@@ -10,9 +10,9 @@ const SHOWN_EVERY_ms = 100;
 
 const DEG = 180 / Math.PI;
 /** What stands beside the law that is felt: the other one, on the same motion. */
-const BESIDE = { fitted: "what if, the same motion", whatIf: "as fitted, the same motion" };
-const LEANING = "Somewhere the edge stands upright or leans back at this opening: the model gives no torque there.";
-const BEYOND = "Outside the range of the package: nothing was checked here.";
+const BESIDE = { fitted: "torque, what if", whatIf: "torque, as fitted" };
+const LEANING = "The edge leans back at this opening: no torque.";
+const BEYOND = "Outside the range of the package: not checked.";
 
 /** The state in numbers: shown ten times a second, told to screen readers every two seconds. */
 export class Readout {
@@ -26,8 +26,7 @@ export class Readout {
 
   constructor(container: HTMLElement, private readonly scene: Scene, private readonly isServed: boolean) {
     container.append(
-      html("h2", {}, "Now"), this.warning, this.state, html("h3", {}, "Energy since the fresh sheet or the last change of the law, mJ"), this.energy,
-      html("p", { class: "note" }, "Work of the hand = stored + fracture + arrest + friction, up to the error of steps of a tick."), this.said);
+      html("h2", {}, "Now"), this.warning, this.state, html("h3", {}, "Energy"), this.energy, this.said);
   }
 
   /** `measured`: torque (N m) of the rig whose motion the model makes, if one is followed. */

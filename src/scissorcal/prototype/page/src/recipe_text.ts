@@ -17,6 +17,8 @@ const MOST_CORNERS = 2000;
 const MOST_OF_OUTLINE = 1000;
 const MOST_PARTS = 64;
 const SMALLEST_AREA_mm2 = 1e-4;
+const EDGE_HEADER = /^\s*\[rig\.edge\]/m;
+const ESTIMATED = /^(\s*plate_pose\s*=\s*)(?:"estimated"|'estimated')/m;
 
 /** What was calibrated, as the pieces of a drawing are compared with it. */
 export function calibratedOf(scene: Scene): Calibrated {
@@ -56,11 +58,33 @@ export function recipeText(drawn: Drawn, scene: Scene, base: string | null): str
   return whole;
 }
 
+/** What keeps a drawing out of a recipe, and what would let it in: a sentence, a label, the other recipe. */
+export interface Obstacle {
+  sentence: string;
+  offer: string;
+  base: string | null;
+}
+
+/** Why no plate, or no edge, that is drawn could be saved into a recipe; null where any could. */
+export function obstacleOf(base: string | null): Obstacle | null {
+  if (base === null) return null;
+  const { plate, scene, rig } = parsed(base) as { plate?: Toml; scene?: Toml; rig?: Toml };
+  if (scene?.plate_pose === "estimated") {
+    const text = base.replace(ESTIMATED, '$1"known"');
+    if ((parsed(text).scene as Toml).plate_pose === "known") {
+      return { sentence: "This recipe estimates where the plate stands; a drawn plate needs it known.", offer: "Set plate_pose to known in what is saved", base: text };
+    }
+  }
+  const isInline = (plate?.layers !== undefined && !/^\s*\[\[\s*plate\.layers\s*\]\]/m.test(base)) || (rig?.edge !== undefined && !EDGE_HEADER.test(base));
+  if (!isInline && scene?.plate_pose !== "estimated") return null;
+  return { sentence: "This recipe has its plate, pose or edge in lines that cannot be replaced.", offer: "Save a new recipe, made from this page", base: null };
+}
+
 /** The recipe with another edge; as it stands where it has that edge already. */
 function withEdgeTable(text: string, edge: Edge | null): string {
   const before = edgeIn(parsed(text));
   if (!edge || (before && JSON.stringify(edgeOf(before)) === JSON.stringify(edge))) return text;
-  if (before && !/^\s*\[rig\.edge\]/m.test(text)) {
+  if (before && !EDGE_HEADER.test(text)) {
     throw new Error("This recipe has the blade's edge on one line (an inline table), which cannot be replaced: write [rig.edge].");
   }
   return withTable(text, "rig.edge", edgeText(edge, before));

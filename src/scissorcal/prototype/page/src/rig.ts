@@ -4,7 +4,7 @@ import { AT, Kernel, Step } from "./kernel";
 import { Coupling, Pose, Script } from "./hand";
 import { asFitted, bladeLength, freeFrom, Law } from "./law";
 import { Piece } from "./pieces";
-import { Scene } from "./scene";
+import { Scene, unpack } from "./scene";
 import { RigSamples } from "./socket";
 
 export type Which = "fitted" | "whatIf";
@@ -271,8 +271,17 @@ function none(): Energy {
   return { hand: 0, stored: 0, fracture: 0, arrest: 0, friction: 0 };
 }
 
-/** Open, with the material's edge a quarter into the range of contacts, or farther where the blades are free of it. */
+/** Open, with the material's edge where measured strokes began, or farther where only there the blades are free of it. */
 function startOf(scene: Scene, law: Law): Pose {
   const [near, far] = scene.contact_m;
-  return { opening: scene.opening_rad[1], advance: -Math.max(near + 0.25 * (far - near), freeFrom(scene, law) + FREE_m) };
+  const measured = measuredStart(scene);
+  const contact = measured === null
+    ? Math.max(near + 0.25 * (far - near), freeFrom(scene, law) + FREE_m) : Math.max(measured, freeFrom(scene, law));
+  return { opening: scene.opening_rad[1], advance: -contact };
+}
+
+/** Median contact (m) at which the measured closing strokes began; null without any. */
+function measuredStart({ strokes }: Scene): number | null {
+  const began = strokes.filter(({ kind }) => kind === "closing").map((stroke) => unpack(stroke.contact)[0]).sort((a, b) => a - b);
+  return began.length ? began[Math.floor(began.length / 2)] : null;
 }

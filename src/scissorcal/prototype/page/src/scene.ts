@@ -79,7 +79,7 @@ export interface Scene {
   name: string;
   made_utc: string;
   version: string;
-  warnings: string[];
+  states: { label: string; sentence: string }[];
   bound_Nm: number;
   torque_limit_Nm: number;
   opening_rad: [number, number];
@@ -108,6 +108,8 @@ export interface Scene {
   drawn_plate?: DrawnPlate | null;
   /** Where the plate stands in the frame of the pivot, where a pose is known. */
   plate_pose?: PlatePose | null;
+  /** The next command of the workspace; "" where it has none or is not known. */
+  next_step?: string;
 }
 
 const FORMAT = "scissorcal-prototype/1";

@@ -5,22 +5,14 @@ import {
   LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial, MeshPhongMaterial, Quaternion, Scene as World, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { Blades } from "./blades3d";
-import { coloursOf, heightOver, View as PlainView } from "./drawing";
+import { coloursOf, heightOver, View } from "./drawing";
 import { Table } from "./kernel";
 import { bladeLength } from "./law";
 import { Orbit } from "./orbit";
 import { Interval, rectangle } from "./outline";
-import { Drawn, materialOf, Piece } from "./pieces";
+import { materialOf } from "./pieces";
 import { Depth, Grid, Solid } from "./solids";
 import { slabsOf, Tinted } from "./slabs";
-
-/** What is drawn; without pieces the sheet is uniform. `drawn` is what the pieces were made of. */
-export type View = PlainView & {
-  pieces?: readonly Piece[] | null;
-  /** Crack of each piece, m. */
-  cracks?: readonly number[] | null;
-  drawn?: Drawn | null;
-};
 
 const HALF_WIDTH_mm = 30; // of a plate that nobody drew
 const CLEAR_mm = 0.3;
@@ -193,21 +185,21 @@ export class View3d {
       context.fillStyle = text;
       return new Color(context.fillStyle);
     };
-    const { ink, muted, paper, blue, vermillion } = colours;
+    const { ink, muted, paper, hand, material } = colours;
     const { materials } = this;
     const steel = read(muted).lerp(new Color(0xffffff), 0.72);
     materials.steel.color = steel;
     materials.handle.color = read(muted).lerp(read(ink), 0.35);
-    materials.ghost.color = read(blue);
-    materials.upperEdge.color = read(blue);
+    materials.ghost.color = read(hand);
+    materials.upperEdge.color = read(ink);
     materials.lowerEdge.color = read(ink);
     materials.crack.color = read(ink);
     materials.grid.color = read(ink);
-    materials.contact.color = read(blue);
-    materials.sheet.color = read(vermillion).lerp(read(paper), 0.25);
-    materials.second.color = read(vermillion).lerp(read(paper), 0.55);
-    materials.tougher.color = read(vermillion).lerp(new Color(0x000000), 0.45);
-    materials.weaker.color = read(vermillion).lerp(new Color(0xffffff), 0.75);
+    materials.contact.color = read(ink);
+    materials.sheet.color = read(material).lerp(read(paper), 0.25);
+    materials.second.color = read(material).lerp(read(paper), 0.55);
+    materials.tougher.color = read(material).lerp(new Color(0x000000), 0.45);
+    materials.weaker.color = read(material).lerp(new Color(0xffffff), 0.75);
   }
 
   /** Make blades and plates anew where they are others than before. */
