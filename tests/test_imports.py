@@ -43,7 +43,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "workday": LOWEST | MIDDLE | {"bench", "prototype"},
     "cli": LOWEST | MIDDLE | {"workday", "bench", "prototype"},
     "library": {"calibration", "package", "recipe", "recording", "workday"},
-    "<root>": {"library", "package"},
+    "examples": {"package", "recording"},
+    "<root>": {"examples", "library", "package", "recording"},
     "__main__": {"cli"},
 }
 ROOMS = set(MAY_IMPORT) - {"<root>"}

@@ -1,5 +1,7 @@
 """Calibrate, identify and render a haptic scissors rig, with intervals tested against known truth.
 
+Fits tell what they do to the logger ``scissorcal`` (level INFO) as well as to a ``progress``.
+
 >>> import scissorcal
 >>> scissorcal.open_package("package/paper-80gsm.zip")
 Traceback (most recent call last):
@@ -11,14 +13,29 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scissorcal.library import open_fit, open_package, open_recording, open_workspace
+    from scissorcal import examples
+    from scissorcal.aliases import Progress
+    from scissorcal.library import (
+        fit_cut,
+        fit_friction,
+        open_fit,
+        open_package,
+        open_recording,
+        open_workspace,
+    )
     from scissorcal.package import OutsideCoverageWarning
+    from scissorcal.recording import Recording
 
     __version__: str
 
 __all__ = [
     "OutsideCoverageWarning",
+    "Progress",
+    "Recording",
     "__version__",
+    "examples",
+    "fit_cut",
+    "fit_friction",
     "open_fit",
     "open_package",
     "open_recording",
@@ -26,12 +43,19 @@ __all__ = [
 ]
 
 
-_HOMES = {"OutsideCoverageWarning": "scissorcal.package", "__version__": "scissorcal.identity"}
+_HOMES = {
+    "OutsideCoverageWarning": "scissorcal.package",
+    "Progress": "scissorcal.aliases",
+    "Recording": "scissorcal.recording",
+    "__version__": "scissorcal.identity",
+}
 
 
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'scissorcal' has no attribute {name!r}")
+    if name == "examples":
+        return importlib.import_module("scissorcal.examples")
     module = importlib.import_module(_HOMES.get(name, "scissorcal.library"))
     return getattr(module, "VERSION" if name == "__version__" else name)
 
