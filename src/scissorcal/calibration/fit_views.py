@@ -1,6 +1,6 @@
 """What people ask of a fit in Python: its table, one parameter, draws, a prediction, pictures."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 class FitViews:
     """Views of a fit of friction or of a cut; each loads what it needs when it is asked for."""
 
-    def __getitem__(self: "FitResult", name: str) -> "FittedParameter":
+    @property
+    def _fit(self) -> "FitResult":
+        """This object, as the type that it is part of."""
+        return cast("FitResult", self)
+
+    def __getitem__(self, name: str) -> "FittedParameter":
         """Give one parameter by name, derived and nuisance parameters among them.
 
         It has ``mean``, ``sd``, ``interval`` (5 and 95 %) and ``unit``. UnknownNameError (a
@@ -34,28 +39,35 @@ class FitViews:
         scissorcal.errors.UnknownNameError: "inertai" is no parameter of this fit of friction. \
 Did you mean "inertia"?
         """
-        everything = (*self.parameters, *self.derived, *self.nuisance)
+        everything = self._everything
         for parameter in everything:
             if parameter.name == name:
                 return parameter
         names = [parameter.name for parameter in everything]
-        raise UnknownNameError(unknown_name(f"parameter of this fit of {self.what}", name, names))
+        raise UnknownNameError(
+            unknown_name(f"parameter of this fit of {self._fit.what}", name, names)
+        )
 
-    def __contains__(self: "FitResult", name: object) -> bool:
-        everything = (*self.parameters, *self.derived, *self.nuisance)
-        return any(parameter.name == name for parameter in everything)
+    def __contains__(self, name: object) -> bool:
+        return any(parameter.name == name for parameter in self._everything)
 
-    def sample(self: "FitResult", name: str) -> "NDArray[np.float64]":
+    @property
+    def _everything(self) -> "tuple[FittedParameter, ...]":
+        fit = self._fit
+        return (*fit.parameters, *fit.derived, *fit.nuisance)
+
+    def sample(self, name: str) -> "NDArray[np.float64]":
         """Give the posterior draws (draws,) of one parameter, in its unit.
 
         Draws of all parameters belong together row by row: ``fit.sample("a") *
         fit.sample("b")`` are draws of the product. Raises UnknownNameError.
         """
         self[name]
+        fit = self._fit
         groups = (
-            (self.parameters, self.draws),
-            (self.derived, self.derived_draws),
-            (self.nuisance, self.nuisance_draws),
+            (fit.parameters, fit.draws),
+            (fit.derived, fit.derived_draws),
+            (fit.nuisance, fit.nuisance_draws),
         )
         for parameters, draws in groups:
             names = [parameter.name for parameter in parameters]
@@ -63,7 +75,7 @@ Did you mean "inertia"?
                 return draws[:, names.index(name)]
         raise UnknownNameError(f"This fit keeps no draws of {name}, only its summary.")
 
-    def summary(self: "FitResult", probability: float = 0.9) -> "FitSummary":
+    def summary(self, probability: float = 0.9) -> "FitSummary":
         """Sum up the fit: a row for each parameter, and how far the draws may be trusted.
 
         ``print(fit.summary())`` shows a table, a notebook shows it as HTML; iterate over it for
@@ -74,10 +86,10 @@ Did you mean "inertia"?
         """
         from scissorcal.calibration.fit_table import summary_of
 
-        return summary_of(self, probability)
+        return summary_of(self._fit, probability)
 
     def predict(
-        self: "FitResult",
+        self,
         opening: ArrayLike,
         rate: ArrayLike,
         acceleration: ArrayLike = 0.0,
@@ -94,16 +106,16 @@ Did you mean "inertia"?
         """
         from scissorcal.calibration.fit_predict import predict
 
-        return predict(self, (opening, rate, acceleration), probability)
+        return predict(self._fit, (opening, rate, acceleration), probability)
 
     @property
-    def plot(self: "FitResult") -> "FitPlots":
+    def plot(self) -> "FitPlots":
         """Pictures of this fit: ``fit.plot.torque()`` and others; needs matplotlib."""
         from scissorcal.calibration.fit_plots import FitPlots
 
-        return FitPlots(self)
+        return FitPlots(self._fit)
 
-    def to_datatree(self: "FitResult") -> "xarray.DataTree":
+    def to_datatree(self) -> "xarray.DataTree":
         """Give the fit as an xarray.DataTree with ArviZ' groups, as in its file.
 
         ``posterior``, ``prior``, ``observed_data`` and so on have the unit of each variable among
@@ -121,10 +133,10 @@ Did you mean "inertia"?
 
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "fit.nc"
-            save(self, path)
+            save(self._fit, path)
             return xarray.open_datatree(path, engine="h5netcdf").load()
 
-    def _repr_html_(self: "FitResult") -> str:
+    def _repr_html_(self) -> str:
         return self.summary()._repr_html_()
 
 
