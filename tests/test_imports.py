@@ -45,7 +45,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "cli": LOWEST | MIDDLE | {"workday", "bench", "prototype", "identify"},
     "stated": {"model", "calibration", "package", "recipe"},
     "library": {"calibration", "package", "recipe", "recording", "workday"},
-    "<root>": {"library", "model", "package", "stated"},
+    "examples": {"package", "recording"},
+    "<root>": {"examples", "library", "model", "package", "recording", "stated"},
     "__main__": {"cli"},
 }
 ROOMS = set(MAY_IMPORT) - {"<root>"}

@@ -1,5 +1,7 @@
 """Calibrate, identify and render a haptic scissors rig, with intervals tested against known truth.
 
+Fits tell what they do to the logger ``scissorcal`` (level INFO) as well as to a ``progress``.
+
 >>> import scissorcal
 >>> scissorcal.open_package("package/paper-80gsm.zip")
 Traceback (most recent call last):
@@ -11,9 +13,19 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scissorcal.library import open_fit, open_package, open_recording, open_workspace
+    from scissorcal import examples
+    from scissorcal.aliases import Progress
+    from scissorcal.library import (
+        fit_cut,
+        fit_friction,
+        open_fit,
+        open_package,
+        open_recording,
+        open_workspace,
+    )
     from scissorcal.model import ResponseLaw
     from scissorcal.package import OutsideCoverageWarning
+    from scissorcal.recording import Recording
     from scissorcal.stated import Blades, Friction, Material, build_package
 
     __version__: str
@@ -23,9 +35,14 @@ __all__ = [
     "Friction",
     "Material",
     "OutsideCoverageWarning",
+    "Progress",
+    "Recording",
     "ResponseLaw",
     "__version__",
     "build_package",
+    "examples",
+    "fit_cut",
+    "fit_friction",
     "open_fit",
     "open_package",
     "open_recording",
@@ -35,6 +52,8 @@ __all__ = [
 
 _HOMES = {
     "OutsideCoverageWarning": "scissorcal.package",
+    "Progress": "scissorcal.aliases",
+    "Recording": "scissorcal.recording",
     "ResponseLaw": "scissorcal.model",
     "__version__": "scissorcal.identity",
     **dict.fromkeys(("Blades", "Friction", "Material", "build_package"), "scissorcal.stated"),
@@ -44,6 +63,8 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'scissorcal' has no attribute {name!r}")
+    if name == "examples":
+        return importlib.import_module("scissorcal.examples")
     module = importlib.import_module(_HOMES.get(name, "scissorcal.library"))
     return getattr(module, "VERSION" if name == "__version__" else name)
 

@@ -5,6 +5,7 @@ Every message is a whole sentence that names the file or device, the place in it
 
 import errno
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 
 
@@ -26,6 +27,17 @@ class InputError(ScissorcalError):
 
 class ModelError(InputError, ValueError):
     """A law or a shape of the model has an unknown name or an impossible number (exit code 2)."""
+
+
+class UnknownNameError(InputError, KeyError):
+    """A name is none of those that there are; the sentence has the nearest (exit code 2).
+
+    It is a KeyError too, as of any mapping.
+    """
+
+    def __str__(self) -> str:
+        """The sentence as it is: a KeyError by itself would show it in quotes."""
+        return str(self.args[0])
 
 
 class OtherKindError(InputError):
@@ -67,6 +79,32 @@ class MissingError(ScissorcalError):
     """A previous step is missing: nothing captured, fitted or built yet (exit code 5)."""
 
     exit_code = 5
+
+
+MOST_LISTED = 8
+"""Names that a sentence lists; of more, it has the nearest alone."""
+
+
+def unknown_name(what: str, given: object, names: Iterable[str]) -> str:
+    """The sentence on a name that is none of ``names``: the nearest, and all where they are few.
+
+    >>> print(unknown_name("effort of a fit", "drafty", ("draft", "standard", "thorough")))
+    "drafty" is no effort of a fit. Did you mean "draft"? There are: draft, standard, thorough.
+    """
+    import difflib  # loads three modules, for a message alone
+
+    known = tuple(names)
+    listed = f" There are: {', '.join(known)}." if len(known) <= MOST_LISTED else ""
+    close = difflib.get_close_matches(str(given)[:100].lower(), known, 1, 0.5)
+    hint = f' Did you mean "{close[0]}"?' if close else ""
+    return f'"{str(given)[:100]}" is no {what}.{hint}{listed}'
+
+
+def check_known(what: str, given: object, names: Iterable[str]) -> None:
+    """UnknownNameError, naming the nearest, unless ``given`` is one of ``names``."""
+    known = tuple(names)
+    if not isinstance(given, str) or given not in known:
+        raise UnknownNameError(unknown_name(what, given, known))
 
 
 def needs_unix(what: str) -> DeviceError:

@@ -1,21 +1,28 @@
-"""Open what a workspace holds, from Python: a workspace, a recording, a fit, a package.
+"""The library's first functions: open what a workspace holds, and fit recordings without one.
 
 Each function is also an attribute of ``scissorcal`` and loads what it needs when it is called.
 """
 
+import logging
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from scissorcal.errors import InputError, MissingError
 
 if TYPE_CHECKING:
+    from scissorcal.aliases import Progress
     from scissorcal.calibration.camera.result import CameraFit
     from scissorcal.calibration.edge.result import BladeResult
     from scissorcal.calibration.plate.result import PlateFit
     from scissorcal.calibration.result import FitResult
     from scissorcal.package import ModelPackage
+    from scissorcal.recipe import Recipe
     from scissorcal.recording import Recording
     from scissorcal.workday.workspace import Workspace
+
+Effort = Literal["draft", "standard", "thorough"]
+LOG = logging.getLogger("scissorcal")
 
 
 def open_workspace(path: Path | str = ".") -> "Workspace":
@@ -68,9 +75,9 @@ def open_fit(path: Path | str) -> "FitResult | CameraFit | BladeResult | PlateFi
     """Read a fit: of friction, of a cut, or of photographs of a camera, a blade or a plate.
 
     Each has what it is of (``what``), ``verdicts``, ``sources`` and ``notes``; a fit of friction or
-    of a cut has ``parameters``, ``draws`` and ``series`` besides. ``arviz.from_netcdf`` reads the
-    same file. Raises MissingError where there is no file, InputError where it is no fit of
-    scissorcal.
+    of a cut has ``summary()``, ``fit["kappa"]`` and ``plot`` besides. The same file is read by
+    ``arviz.from_netcdf``. Raises MissingError where there is no file, InputError where it is no fit
+    of scissorcal.
 
     >>> open_fit("fits/cut.nc")
     Traceback (most recent call last):
@@ -102,6 +109,128 @@ def open_package(path: Path | str) -> "ModelPackage":
     from scissorcal.package import open_package as opened
 
     return opened(_existing(path, "Make it with 'scissorcal package build'."))
+
+
+def fit_friction(
+    recordings: "Recording | Path | str | Sequence[Recording | Path | str]",
+    *,
+    recipe: "Recipe | Path | str | None" = None,
+    effort: Effort = "standard",
+    seed: int = 0,
+    progress: "Progress | None" = None,
+) -> "FitResult":
+    """Fit inertia and friction to one recording of empty motion, or to several of one joint.
+
+    Recordings may be files (.mcap). ``recipe`` (one of your own, its file, or a built-in one's
+    name) has the priors and settings, which are the usual ones without it. ``effort`` is "draft"
+    (quick, one law, intervals unchecked), "standard" or "thorough". Equal recordings, recipe and
+    ``seed`` give equal draws, those of 'scissorcal fit friction' in a new workspace.
+
+    Raises InputError where there is too little motion, a value is no measurement, or there is no
+    such recipe, and UnknownNameError for an effort that there is not.
+
+    >>> from scissorcal import examples
+    >>> fit = fit_friction(examples.load("friction"), effort="draft")
+    >>> print(f"{1e6 * fit['inertia'].mean:.0f} kg mm^2")
+    190 kg mm^2
+    """
+    import numpy as np
+
+    from scissorcal.calibration import FrictionRun, check_effort
+    from scissorcal.calibration import fit_friction as fitted
+    from scissorcal.recipe import FitFriction
+    from scissorcal.workday.runs.friction import STREAM
+
+    check_effort(effort)
+    settings, run = FitFriction(), FrictionRun(progress=_told(progress))
+    if recipe is not None:
+        chosen = _recipe(recipe)
+        tolerance = 0.01 * chosen.scene.tolerance_percent
+        settings, run = chosen.fit.friction, FrictionRun(run.progress, tolerance=tolerance)
+    used = _recordings(recordings, "friction")
+    rng = np.random.default_rng([seed, STREAM])
+    return fitted(used, settings, effort=effort, rng=rng, run=run)
+
+
+def fit_cut(
+    recordings: "Recording | Path | str | Sequence[Recording | Path | str]",
+    recipe: "Recipe | Path | str",
+    friction: "FitResult | Path | str",
+    *,
+    effort: Effort = "standard",
+    seed: int = 0,
+    progress: "Progress | None" = None,
+) -> "FitResult":
+    """Fit a material's response and fracture to recordings of cuts (or presses).
+
+    ``recipe`` has blades, scene and priors; ``friction`` is the fit of empty motion, or its file.
+    The rest is as in `fit_friction`. The edge is the recipe's: one of photographs needs a
+    workspace. Raises InputError where the blades hardly touched the material, or ``friction`` is
+    another fit.
+
+    >>> fit_cut("cut.mcap", "paper-80gsm", "friction.nc")
+    Traceback (most recent call last):
+    scissorcal.errors.MissingError: There is no file cut.mcap. Record one with 'scissorcal capture'.
+    """
+    import numpy as np
+
+    from scissorcal.calibration import CutRun, FitResult, check_effort
+    from scissorcal.calibration import fit_cut as fitted
+    from scissorcal.workday.runs.cut import STREAM
+
+    check_effort(effort)
+    used, chosen = _recordings(recordings, "cut"), _recipe(recipe)
+    known = friction if isinstance(friction, FitResult) else open_fit(friction)
+    if not isinstance(known, FitResult) or known.what != "friction":
+        raise InputError(
+            f"A fit of a cut builds on a fit of friction, and this one is of {known.what}: give "
+            "the fit of fit_friction(), or fits/friction.nc."
+        )
+    rng = np.random.default_rng([seed, STREAM])
+    run = CutRun(progress=_told(progress))
+    return fitted(used, chosen, known, effort=effort, rng=rng, run=run)
+
+
+def _recordings(
+    given: "Recording | Path | str | Sequence[Recording | Path | str]", kind: str
+) -> "tuple[Recording, ...]":
+    """The recordings that were given, those of files read; InputError for one of another kind."""
+    from scissorcal.recording import Recording
+
+    alone = isinstance(given, Recording | Path | str)
+    items: Sequence[Recording | Path | str] = [given] if alone else given  # type: ignore[assignment,list-item]
+    found = tuple(one if isinstance(one, Recording) else open_recording(one) for one in items)
+    if not found:
+        raise InputError("There is no recording to fit: give one, or a list of them.")
+    for recording in found:
+        if recording.kind != kind:
+            raise InputError(
+                f"{recording.source or 'The recording'} is of {recording.kind}, not of {kind}."
+            )
+    return found
+
+
+def _recipe(given: "Recipe | Path | str") -> "Recipe":
+    from scissorcal.recipe import Recipe
+    from scissorcal.recipe.load import load_recipe, recipe_file
+
+    return given if isinstance(given, Recipe) else load_recipe(recipe_file(str(given)))
+
+
+def _told(progress: "Progress | None") -> "Progress":
+    """Tell each new stage to the log, and everything to who follows."""
+    last = ""
+
+    def tell(done: float, sentence: str, /) -> None:
+        nonlocal last
+        stage = sentence.partition(" (")[0]
+        if stage != last:
+            LOG.info("%s", sentence)
+            last = stage
+        if progress is not None:
+            progress(done, sentence)
+
+    return tell
 
 
 def _existing(path: Path | str, remedy: str) -> Path:

@@ -34,6 +34,12 @@ from .edge.result import SeenPair as SeenPair
 from .fit_model import CutRun as CutRun
 from .fit_model import Experiment as Experiment
 from .fit_model import FrictionRun as FrictionRun
+from .fit_plots import FitPlots as FitPlots
+from .fit_predict import TorqueBand as TorqueBand
+from .fit_table import FitSummary as FitSummary
+from .fit_table import SummaryRow as SummaryRow
+from .fit_views import check_effort as check_effort
+from .friction.curve import FrictionCurve as FrictionCurve
 from .friction.curve import friction_curve as friction_curve
 from .friction.curve import friction_map as friction_map
 from .friction.fit import fit_friction as fit_friction
@@ -83,12 +89,16 @@ __all__ = [
     "CutExperiment",
     "CutRun",
     "Experiment",
+    "FitPlots",
     "FitResult",
     "FitSeries",
+    "FitSummary",
     "FittedParameter",
     "FrictionExperiment",
     "FrictionRun",
     "StrokeError",
+    "SummaryRow",
+    "TorqueBand",
     "cut_experiment",
     "cutting_from",
     "fit_cut",

@@ -82,6 +82,11 @@ class FittedParameter:
         return {"mean": mean, "sd": sd, "q05": q05, "q50": q50, "q95": q95}
 
     @property
+    def interval(self) -> tuple[float, float]:
+        """The 5 and 95 % quantiles, in ``unit``."""
+        return self.q05, self.q95
+
+    @property
     def moments(self) -> tuple[float, float] | None:
         """Mean and sd for people to read; None where they do not agree with the quantiles."""
         agree = moments_agree(self.mean, self.sd, self.q05, self.q95)

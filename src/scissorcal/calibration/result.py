@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
+from scissorcal.calibration.fit_views import FitViews
 from scissorcal.calibration.parameters import FittedParameter
 from scissorcal.recipe.requirements import command_words
 from scissorcal.verdicts import Verdict, failed
@@ -291,7 +292,7 @@ class Predictive:
 
 
 @dataclass(frozen=True, repr=False)
-class FitResult(Result):
+class FitResult(FitViews, Result):
     """The result of one fit: the same type for friction and for a cut.
 
     ``what`` is "friction" (of the opening), "friction-advance" (of the carriage) or "cut".

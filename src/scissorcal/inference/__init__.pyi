@@ -6,6 +6,7 @@ from .checkpoint import save_walks as save_walks
 from .curvature import gradient as gradient
 from .curvature import hessian as hessian
 from .curvature import likelihood_information as likelihood_information
+from .effective import bulk_ess as bulk_ess
 from .importance import smooth_weights as smooth_weights
 from .infer import infer as infer
 from .noise import ArNoise as ArNoise
@@ -24,6 +25,7 @@ from .problem import Problem as Problem
 from .problem import SamplingStatus as SamplingStatus
 from .problem import SearchStatus as SearchStatus
 from .problem import Stop as Stop
+from .thorough import rank_r_hat as rank_r_hat
 
 __all__ = [
     "ArNoise",

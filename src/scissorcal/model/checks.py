@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from scissorcal.errors import ModelError
+from scissorcal.errors import ModelError, unknown_name
 
 LARGEST = sys.float_info.max
 SMALLEST = 5e-324
@@ -24,12 +24,7 @@ There are: power, exponential.
     known = tuple(names)
     if isinstance(given, str) and given in known:
         return
-    import difflib  # loads three modules, for a message alone
-
-    listed = f" There are: {', '.join(known)}." if len(known) <= 8 else ""
-    close = difflib.get_close_matches(str(given)[:100].lower(), known, 1, 0.5)
-    hint = f' Did you mean "{close[0]}"?' if close else ""
-    raise ModelError(f'"{str(given)[:100]}" is no {what}.{hint}{listed}')
+    raise ModelError(unknown_name(what, given, known))
 
 
 def check_numbers(what: str, value: Any, low: float = -LARGEST, high: float = LARGEST) -> None:

@@ -5,6 +5,8 @@ from .faulty_values import lone_excursion as lone_excursion
 from .faulty_values import marks_in as marks_in
 from .faulty_values import overflows as overflows
 from .following import RecordingFollower as RecordingFollower
+from .from_arrays import recording_from_arrays as recording_from_arrays
+from .from_arrays import recording_from_pandas as recording_from_pandas
 from .header import UNTIL_MARK as UNTIL_MARK
 from .header import Joint as Joint
 from .header import Kind as Kind

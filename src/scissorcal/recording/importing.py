@@ -122,8 +122,27 @@ def import_table(
         channel: quantity(table, channel, units.get(channel), scale.get(channel), joint)
         for channel in columns
     }
+    digest = content_hash(path)
+    source = f"{path.name} (sha256:{digest[:16]})"
+    recording = recording_of_table(table, quantities, rate_Hz, options)
+    return replace(
+        recording,
+        source=str(path),
+        content_hash=digest,
+        notes=(*_general(source, columns, quantities), *recording.notes),
+    )
+
+
+def recording_of_table(
+    table: Table,
+    quantities: Mapping[str, Quantity],
+    rate_Hz: float | None = None,
+    options: ImportOptions = ImportOptions(),
+) -> Recording:
+    """Make a recording of a table's columns by channel, in memory; see `import_table`."""
+    joint = options.joint
     samples = empty_samples(table.length)
-    for channel in set(columns) - {"time"}:
+    for channel in set(table.columns) - {"time"}:
         samples[channel] = table.columns[channel].values * quantities[channel].factor
     sentences = list(table.notes)
     sentences += _opening_goes_on(samples, table, joint)
@@ -137,8 +156,6 @@ def import_table(
     sentences += _note_on_jumps(samples, table, joint)
     strokes, stroke_sentence, odd = _label(samples, joint, options.min_travel)
     sentences += [*odd, *_sizes(samples, quantities, joint)]
-    digest = content_hash(path)
-    source = f"{path.name} (sha256:{digest[:16]})"
     particular = _particular(quantities, samples, sentences)
     return Recording(
         kind=options.kind,
@@ -146,9 +163,7 @@ def import_table(
         strokes=strokes,
         joint=joint,
         handle_radius_m=options.handle_radius_m,
-        source=str(path),
-        content_hash=digest,
-        notes=(*_general(source, columns, quantities), stroke_sentence, *particular),
+        notes=(stroke_sentence, *particular),
         particular=particular,
     )
 

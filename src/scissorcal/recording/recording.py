@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.errors import needs_extra
@@ -67,6 +67,61 @@ class Recording:
             f"<{self.kind} recording: {len(self.samples)} samples, {self.duration_s:.1f} s, "
             f"{len(self.strokes)} strokes, {self.joint.kind} joint, {self.source or 'in memory'}>"
         )
+
+    @classmethod
+    def from_arrays(
+        cls,
+        *,
+        time_s: ArrayLike,
+        opening_rad: ArrayLike | None = None,
+        opening_m: ArrayLike | None = None,
+        torque_Nm: ArrayLike | None = None,
+        force_N: ArrayLike | None = None,
+        **more: Any,
+    ) -> Self:
+        """Make a recording of arrays (n,), with strokes found from the motion, as an import does.
+
+        A rotary joint has ``opening_rad``, which grows when the blades open, and ``torque_Nm`` of
+        the motor, positive when it opens them; a linear one ``opening_m`` and ``force_N``.
+        ``more`` takes ``kind`` ("friction", "cut"), ``notes``, ``handle_force_N`` with
+        ``handle_radius_m``, ``min_travel`` (rad, or m) and ``allow_gaps``, as `ImportOptions` has
+        them. Raises InputError for arrays of other lengths, a number that is not finite, a time
+        that repeats or falls, and a name that there is not.
+
+        >>> time_s = np.arange(0.0, 8.0, 0.005)
+        >>> Recording.from_arrays(
+        ...     time_s=time_s,
+        ...     opening_rad=0.5 + 0.3 * np.cos(np.pi * time_s / 2),
+        ...     torque_Nm=-0.01 * np.sign(np.sin(np.pi * time_s / 2)),
+        ... )
+        <friction recording: 1600 samples, 8.0 s, 4 strokes, rotary joint, in memory>
+        """
+        from scissorcal.recording import recording_from_arrays
+
+        named = {
+            "time_s": time_s,
+            "opening_rad": opening_rad,
+            "opening_m": opening_m,
+            "torque_Nm": torque_Nm,
+            "force_N": force_N,
+        }
+        return cls(**vars(recording_from_arrays(named, more)))
+
+    @classmethod
+    def from_pandas(
+        cls, table: "pd.DataFrame", columns: Mapping[str, str] | None = None, **more: Any
+    ) -> Self:
+        """Make a recording of a table with a row for each sample; see `from_arrays`.
+
+        Columns are those of `to_pandas` (``time_s``, ``opening_rad``, ``motor_torque_Nm``, ...), or
+        those that ``columns`` names by channel, their units in their headings:
+        ``{"time": "t [ms]", "opening": "angle_deg", "motor_torque": "current torque [mNm]"}``.
+        Strokes are found anew. Raises InputError as `from_arrays`, and for a column that there is
+        not.
+        """
+        from scissorcal.recording import recording_from_pandas
+
+        return cls(**vars(recording_from_pandas(table, columns, more)))
 
     def to_pandas(self) -> "pd.DataFrame":
         """Return the samples as a table, one row per sample, the unit in each column's name.

@@ -7,8 +7,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
-from scissorcal.errors import InputError, MissingError, file_error
+from scissorcal.errors import InputError, MissingError, check_known, file_error
 from scissorcal.files import remove_left_over, replacing
+from scissorcal.workday.workspace_steps import WorkspaceSteps
 
 if TYPE_CHECKING:
     from scissorcal.recipe.schema import Recipe
@@ -22,8 +23,8 @@ DEMO_MARKER = ".scissorcal-demo"
 
 
 @dataclass(frozen=True)
-class Workspace:
-    """The file names of one workspace.
+class Workspace(WorkspaceSteps):
+    """The file names of one workspace, and its steps as functions (`WorkspaceSteps`).
 
     captures/<kind>-<UTC stamp>.mcap, fits/friction.nc, fits/friction-advance.nc and fits/cut.nc
     with their trust checks fits/<what>.verify.json, report/report.html and report/report.json with
@@ -91,7 +92,11 @@ class Workspace:
         return load_recipe(self.recipe_path)
 
     def recordings(self, kind: RecordingKind) -> tuple[Path, ...]:
-        """Return all recordings of one kind, oldest first, also those that fits do not use."""
+        """Return all recordings of one kind, oldest first, also those that fits do not use.
+
+        UnknownNameError, with the nearest name, for a kind that there is not.
+        """
+        check_known("kind of recording", kind, get_args(RecordingKind))
         longer = tuple(f"{k}-" for k in get_args(RecordingKind) if k.startswith(f"{kind}-"))
         found = self.captures_dir.glob(f"{kind}-*.mcap")
         own = [path for path in found if not path.name.startswith(longer)]

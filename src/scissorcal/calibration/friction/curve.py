@@ -59,7 +59,7 @@ def friction_curve(fit: FitResult) -> FrictionCurve | None:
         return None
     one_way = np.geomspace(SLOWEST_SHARE * fastest, fastest, POINTS_EACH_WAY)
     rate = np.concatenate([-one_way[::-1], one_way])
-    center = _center(fit)
+    center = angle_centre(fit)
     curves = _friction_at(fit, _draws(fit, MOST_DRAWS), np.asarray(center), rate[None, :])
     low, high = np.quantile(curves, [0.05, 0.95], axis=0)
     return FrictionCurve(center, rate, curves.mean(axis=0), low, high)
@@ -98,7 +98,7 @@ def friction_map(fit: FitResult) -> FrictionMap | None:
 def _friction_at(fit: FitResult, columns: Array, opening: Array, rate: Array) -> Array:
     """The law for parameters ``columns``, whose axis of parameters is the last but one."""
     named = {p.name: np.take(columns, i, axis=-2) for i, p in enumerate(fit.parameters)}
-    return friction_torque(FrictionLaw.of_fit(named, _center(fit)), opening, rate)
+    return friction_torque(FrictionLaw.of_fit(named, angle_centre(fit)), opening, rate)
 
 
 def _draws(fit: FitResult, most: int) -> Array:
@@ -120,7 +120,8 @@ def _residuals(fit: FitResult, rate: Array, opening: Array, reach: float) -> Arr
     return means
 
 
-def _center(fit: FitResult) -> float:
+def angle_centre(fit: FitResult) -> float:
+    """The opening about which a fit's friction changes along the stroke."""
     center = fit.structure.get("angle_center")
     if center is None or not np.isfinite(center):
         return float(np.nanmedian(fit.series.opening))

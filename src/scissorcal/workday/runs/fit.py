@@ -10,7 +10,7 @@ from scissorcal.aliases import Progress
 from scissorcal.calibration.caveats import NEXT_RECORDING, ON_RECORD, STEP_VERSION
 from scissorcal.calibration.result import Effort, FitResult
 from scissorcal.calibration.store import load
-from scissorcal.errors import InputError, MissingError
+from scissorcal.errors import InputError, MissingError, check_known
 from scissorcal.verdicts import Verdict
 from scissorcal.workday.engine import Engine, refuse_other_fit
 from scissorcal.workday.options import FitOptions
@@ -84,9 +84,11 @@ def fit_workspace(
     ``wanted`` again all the same. Fits that a wanted one builds on are run first where they are
     missing or stale. The result that was there is kept (`workday.history`).
 
-    Raises InputError where the scene does not require what is wanted, MissingError where nothing
-    was captured, and what the fits themselves raise.
+    Raises UnknownNameError for a fit that there is not, InputError where the scene does not require
+    what is wanted, MissingError where nothing was captured, and what the fits themselves raise.
     """
+    for what in wanted:
+        check_known("fit", what, [step.what for step in steps_of("fit")])
     engine = Engine.of(workspace)
     steps = steps_to_fit(engine, wanted)
     return tuple(
