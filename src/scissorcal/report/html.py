@@ -298,7 +298,7 @@ def _key(chart: Chart) -> str:
 
 
 def _keyed(chart: Chart) -> bool:
-    """Whether a small chart has a key of its own; cards of strokes share the words around them."""
+    """Whether a small chart has a key; cards of strokes do without, as all show the same."""
     return "-prior-" in chart.id or chart.id.startswith("decision-")
 
 
