@@ -149,7 +149,7 @@ def test_the_page_says_what_staff_must_know(shown: Shown) -> None:
 def test_pictures_are_within_the_page_and_in_words(shown: Shown) -> None:
     page = shown.built.page
     pictures = page.all("img")
-    assert len(pictures) == 7  # all but the chart that is drawn anew
+    assert len(pictures) == 8  # the thumbnail, and all but the chart that is drawn anew
     for picture in pictures:
         assert picture["src"].startswith(DATA)
         raw = np.frombuffer(base64.b64decode(picture["src"].removeprefix(DATA)), np.uint8)
@@ -157,7 +157,7 @@ def test_pictures_are_within_the_page_and_in_words(shown: Shown) -> None:
         assert image is not None
         assert image.shape[:2] == (int(picture["height"]), int(picture["width"]))
         assert len(picture["alt"]) > 40
-    assert len({picture["alt"] for picture in pictures}) == len(pictures)
+    assert len({picture["alt"] for picture in pictures}) == 7  # the thumbnail is one of them
     for figure in page.all("figure", **{"class": "photo"}):
         assert figure["tabindex"] == "0"
     assert page.values("src") == [picture["src"] for picture in pictures]
@@ -230,9 +230,9 @@ def test_many_pictures_are_dropped_and_named(tmp_path: Path) -> None:
     size = len(report.page.source.encode())
     kept = report.page.all("img")
     assert PICTURE_BYTES // 2 < size < 5_000_000
-    assert 0 < len(kept) < 7
+    assert 0 < len(kept) < 8
     assert sum(len(picture["src"]) for picture in kept) <= PICTURE_BYTES
-    assert report.page.text.count("left out to keep this page small") == 7 - len(kept)
+    assert report.page.text.count("left out to keep this page small") == 8 - len(kept)
 
 
 def test_the_first_of_each_fit_come_before_the_second_of_any(tmp_path: Path) -> None:
@@ -253,4 +253,4 @@ def test_a_picture_that_is_gone_is_named(shown: Shown, tmp_path: Path) -> None:
     pictures: dict[GeometryKind, tuple[Path, ...]] = {"blade": (torn, tmp_path / "002-blade-2.png")}
     report = report_of(tmp_path, replace(shown.geometry, pictures=pictures))
     assert report.page.all("img") == []
-    assert report.page.text.count("not there any more, or damaged") == 2
+    assert report.page.text.count("not there any more, or damaged") == 3  # and the thumbnail

@@ -16,7 +16,15 @@ from scissorcal.recipe.schema import Recipe
 from scissorcal.report.inputs import Evidence, Geometry
 from scissorcal.report.panel import Panel, absent, clean
 from scissorcal.report.strokes import FittedStroke, strokes_of
-from scissorcal.report.subjects import candidates, closing, cut, decision, posterior, torque
+from scissorcal.report.subjects import (
+    candidates,
+    closing,
+    cut,
+    decision,
+    overview,
+    posterior,
+    torque,
+)
 from scissorcal.report.subjects.blade import blade_panels
 from scissorcal.report.subjects.camera import camera_panels
 from scissorcal.report.subjects.closing import Provenance, rig_panels
@@ -145,6 +153,9 @@ def compose(
     panels = (
         decision.origin_panel(origin, evidence.recordings),
         decision.trust_panel(headlines, list(named), evidence.next_command),
+        overview.overview_panel(
+            keyed, strokes, photographed, f"{decision.PART}-picture", decision.PART
+        ),
         totals,
         decision.checked_panel(list(named.values()), checks),
         decision.felt_panel(rendered, why, fits, recipe),

@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 
 OUTCOMES = {"pass": "✓ pass", "fail": "✗ fail", "not_evaluated": "– not evaluated"}
 LONG_TABLE = 8
+PRINTED = frozenset({
+    "torque", "law", "response", "edge", "parameters", "verify",
+})  # fmt: skip
+"""Panels that are printed in full beside the decision page, by their address in their part."""
 DECISIONS = {
     "✓ trust": "pass",
     "? not verified": "not_evaluated",
@@ -46,14 +50,21 @@ def report_page(document: ReportDocument, geometry: Geometry) -> str:
     shown = [(panel.part, picture) for panel in document.panels for picture in panel.pictures]
     files: dict[str, list[tuple[Path, int]]] = {}
     for part, picture in shown:
-        paths = (path for path in geometry.pictures.get(part, ()) if path.name == picture.file)  # type: ignore[call-overload]
-        files.setdefault(part, []).append((next(paths), picture.widest_px))
+        found = next(path for path in _paths(geometry, part) if path.name == picture.file)
+        files.setdefault(part, []).append((found, picture.widest_px))
     # the words around pictures take room too: some hundred bytes each
     room = min(PAGE_BYTES - len(page.encode()) - 1000 * len(shown), PICTURE_BYTES)
     images = {part: iter(own) for part, own in place_pictures(files, room).items()}
     for part, picture in shown:
         page = page.replace(_place(part, picture), _photo(picture, next(images[part])), 1)
     return page
+
+
+def _paths(geometry: Geometry, part: str) -> Sequence[Path]:
+    """The pictures of a part; the decision page shows those of any."""
+    pictures: Mapping[str, Sequence[Path]] = {str(k): own for k, own in geometry.pictures.items()}
+    every = tuple(path for own in pictures.values() for path in own)
+    return every if part == "decision" else pictures.get(part, ())
 
 
 def panels_page(
@@ -155,7 +166,9 @@ def _decision(document: ReportDocument) -> str:
     origin, *others = document.panels_of("decision")
     lead = ". ".join(part for part in (document.material, document.recipe_description) if part)
     made = _made_line(document.created.strftime("%Y-%m-%d %H:%M %Z"), document.scissorcal_version)
-    cards = "".join(_card(panel) for panel in others)
+    cards = "".join(
+        _overview(panel) if panel.id == "decision-picture" else _card(panel) for panel in others
+    )
     return (
         f'<section id="decision" aria-labelledby="report-title"><header><div>'
         f'<p class="kicker">Calibration report</p><h1 id="report-title">'
@@ -165,6 +178,13 @@ def _decision(document: ReportDocument) -> str:
         f'<div class="cards">{cards}<article class="card" id="decision-signature">'
         f"{SIGNATURE[0]}{signature_block(None)}{SIGNATURE[1]}</article></div></section>"
     )
+
+
+def _overview(panel: Panel) -> str:
+    """The picture of the decision page; nothing where a report has none to show."""
+    pictures = "".join(_place(panel.part, picture) for picture in panel.pictures)
+    figures = "".join(_figure(chart) for chart in panel.charts) + pictures
+    return f'<div class="overview" id="{panel.id}">{figures}</div>' if figures else ""
 
 
 def _card(panel: Panel) -> str:
@@ -183,7 +203,7 @@ def _card(panel: Panel) -> str:
     sentence = f'<p class="sentence">{prose(panel.sentence)}</p>' if panel.sentence else ""
     return (
         f'<article class="card" id="{panel.id}"><h2>{escape(panel.title)}</h2>{sentence}'
-        f"{table if rows else ''}{_notes(panel.notes)}</article>"
+        f"{_charts(panel.charts)}{table if rows else ''}{_notes(panel.notes)}</article>"
     )
 
 
@@ -220,9 +240,15 @@ def panel_section(panel: Panel, *, open_: bool, above: str = "", whole: bool = F
     if not body:
         return f'<div class="panel" id="{escape(panel.id)}">{head}{sentence}</div>'
     return (
-        f'<details class="panel" id="{escape(panel.id)}"{" open" if open_ else ""}><summary>{head}'
+        f'<details class="panel" id="{escape(panel.id)}"{_printed(panel)}'
+        f"{' open' if open_ else ''}><summary>{head}"
         f"{sentence}</summary>{body}</details>"
     )
+
+
+def _printed(panel: Panel) -> str:
+    """Marks a panel that is opened for printing; of the others the sentence is printed."""
+    return " data-print" if panel.id.removeprefix(f"{panel.part}-") in PRINTED else ""
 
 
 def _notes(notes: Iterable[str]) -> str:
@@ -258,7 +284,7 @@ def _key(chart: Chart) -> str:
     entries: dict[str, str] = {}
     for number, one in enumerate(chart.series):
         word = one.name.partition(",")[0] if not one.toggle or "stroke" in one.name else one.name
-        if not word or word in entries or (chart.small and not chart.id.count("-prior-")):
+        if not word or word in entries or (chart.small and not _keyed(chart)):
             continue
         group = f' data-group="{escape(one.group or str(number))}"' if one.toggle else ""
         fixed = "" if one.toggle else "~"  # those that are switched stand first
@@ -269,6 +295,11 @@ def _key(chart: Chart) -> str:
     listed = sorted(entries.values(), key=lambda entry: entry.startswith("~"))
     items = "".join(entry.removeprefix("~") for entry in listed)
     return f'<ul class="key">{items}</ul>' if len(entries) > 1 else ""
+
+
+def _keyed(chart: Chart) -> bool:
+    """Whether a small chart has a key; cards of strokes do without, as all show the same."""
+    return "-prior-" in chart.id or chart.id.startswith("decision-")
 
 
 def _table(panel: Panel) -> str:

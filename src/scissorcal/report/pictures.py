@@ -35,7 +35,7 @@ def place_pictures(
     ``files`` has the path of each picture, and how many pixels wide it may be. The first of every
     part come before the second of any, so that each part shows something.
     """
-    placed: dict[Path, Image] = {}
+    placed: dict[tuple[Path, int], Image] = {}
     taken = 0
     for file in chain.from_iterable(zip_longest(*files.values())):
         if file is None:
@@ -45,8 +45,8 @@ def place_pictures(
         if image.data and taken + len(image.data) > room:
             image = _without(path, "left out to keep this page small")
         taken += len(image.data)
-        placed[path] = image
-    return {what: tuple(placed[path] for path, _ in part) for what, part in files.items()}
+        placed[file] = image
+    return {what: tuple(placed[file] for file in part) for what, part in files.items()}
 
 
 def _read(path: Path, widest_px: int) -> Image:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from scissorcal.workday.engine import Engine
-from scissorcal.workday.states import StepState
+from scissorcal.workday.states import State, StepState
 from scissorcal.workday.steps import BY_NAME
 
 PHOTOGRAPHED = ("camera", "blade", "plate")
@@ -25,7 +25,7 @@ def next_after_report(engine: Engine) -> str:
 
     So the page says what `next_step` says then, and stays as it is when it is signed.
     """
-    open_steps = {"report": "done", "report sign": "missing"}
+    open_steps: dict[str, State] = {"report": "done", "report sign": "missing"}
     states = [
         replace(state, state=open_steps.get(state.name, state.state), command=_command(state))
         for state in engine.states()

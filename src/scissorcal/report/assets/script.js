@@ -48,8 +48,13 @@
     openAll(open);
     everything.textContent = open ? "Close" : "Open all";
   });
-  addEventListener("beforeprint", () => openAll(true));
-  addEventListener("afterprint", () => openAll(false));
+  // what was opened by hand is printed, too
+  let opened = [];
+  addEventListener("beforeprint", () => {
+    opened = $("details.part, details[data-print]").filter((one) => !one.open);
+    opened.forEach((one) => { one.open = true; });
+  });
+  addEventListener("afterprint", () => opened.forEach((one) => { one.open = false; }));
   const reveal = () => {
     const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
     if (!target) return;

@@ -17,6 +17,7 @@ from scissorcal.report.inputs import Cell, Evidence, Geometry
 from scissorcal.report.numbers import finite, percent
 from scissorcal.report.panel import Panel, Row, Value, count, percent_of, words
 from scissorcal.report.strokes import FittedStroke, kind_word, stroke_label
+from scissorcal.report.subjects.overview import budget_chart, not_in_band_sentence
 from scissorcal.report.subjects.torque import held_out_summary
 from scissorcal.report.subjects.trust import ASSESSMENTS, SAID, Assessment, Headline, coverage_found
 from scissorcal.verdicts import Verdict, failed
@@ -245,29 +246,26 @@ def felt_panel(
 ) -> Panel:
     """What is uncertain of the torque that is felt, as a share of it, against the tolerance."""
     tolerance = f"tolerance {percent(recipe.scene.tolerance_percent / 100)}"
-    rows = []
-    sentence = why
+    rows: list[Row] = []
+    sentence, chart = why, None
     if torque is not None:
         share = torque.share[np.isfinite(torque.share)]
         middle, worst = (
             (float(np.median(share)), float(share.max())) if len(share) else (None, None)
         )
-        rows.append(
-            Row(
-                "uncertainty of the rendered torque",
-                (percent_of("median ±", middle), percent_of("worst ±", worst)),
-            )
-        )
         sentence = (
-            f"± {percent(middle)} of the scene's torque (median place; worst ± {percent(worst)}), "
-            f"{tolerance}: {percent(finite(torque.within_tolerance))} of the places are within it."
+            f"± {percent(middle)} of the scene's torque (median place; worst ± {percent(worst)}) "
+            f"is in the band, {tolerance}: {percent(finite(torque.within_tolerance))} of the "
+            f"places are within it. {not_in_band_sentence(torque)}"
         )
+        chart = budget_chart(torque, f"{PART}-budget")
     for fit in fits:
         middle, worst = held_out_summary(fit)
         if middle is not None:
             name = f"hold-out error, {fit.what}"
             rows.append(Row(name, (percent_of("median ±", middle), percent_of("worst ±", worst))))
-    return Panel(f"{PART}-felt", PART, "Felt error", sentence, tuple(rows))
+    charts = (chart,) if chart else ()
+    return Panel(f"{PART}-felt", PART, "Felt error", sentence, tuple(rows), charts)
 
 
 def weaknesses_panel(
@@ -289,11 +287,8 @@ def weaknesses_panel(
         for fit in fits
         for caveat in caveats_of(fit)
     ]
-    if torque is not None:
-        notes += [
-            f"Not measured, and not in the band: {name}, up to {percent(share)} of the mean torque."
-            for name, share in torque.not_in_band
-        ]
+    if torque is not None and torque.not_in_band:
+        notes.append("Part of the felt error was not measured: see its bar.")
     sentence = "" if notes else NO_WEAKNESS
     title = "Known weaknesses of this fit"
     return Panel(f"{PART}-weaknesses", PART, title, sentence, notes=tuple(notes))

@@ -23,11 +23,11 @@ MOST_DOTS = 900
 def friction_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> Panel | None:
     """The law among partial residuals, and its map; None for a cut or without numbers."""
     charts, sentence = [], ""
-    law = friction_curve(fit)
-    if law is not None:
+    law, chart = friction_curve(fit), friction_chart(fit, strokes, f"{part}-friction")
+    if law is not None and chart is not None:
         first, last = (with_unit(finite(law.friction[at]), fit.effort_unit) for at in (0, -1))
         sentence = f"Friction at the fastest rates is {first} and {last}."
-        charts.append(_curve(fit, strokes, f"{part}-friction"))
+        charts.append(chart)
     found = friction_map(fit)
     if found is not None:
         low, high = float(found.friction.min()), float(found.friction.max())
@@ -43,9 +43,11 @@ def friction_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -
     return Panel(f"{part}-law", part, "Friction", sentence.strip(), charts=tuple(charts))
 
 
-def _curve(fit: FitResult, strokes: Sequence[FittedStroke], id_: str) -> Chart:
+def friction_chart(fit: FitResult, strokes: Sequence[FittedStroke], id_: str) -> Chart | None:
+    """The law over the rate among partial residuals; None where a fit has no friction law."""
     law, words = friction_curve(fit), channels_of(fit)
-    assert law is not None
+    if law is None:
+        return None
     partial, series = partial_residuals(fit), []
     kinds = list(dict.fromkeys(stroke.kind for stroke in strokes))
     for kind in kinds:

@@ -89,9 +89,13 @@ def torque_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> 
 
 
 def strokes_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -> Panel:
-    """Residuals by stroke from the worst: bars, spread, a chart for each of the worst strokes."""
+    """Residuals by stroke from the worst: bars, spread, a chart for each of the worst strokes.
+
+    The rank is by the error that a stroke is shown to have, the lower end of its interval: a stroke
+    of few independent samples has a wide one, and does not lead by chance.
+    """
     title, id_ = "Residuals by stroke, the worst first", f"{part}-residuals"
-    ranked = sorted(strokes, key=lambda one: -(finite(_rms(fit, one)) or -1.0))
+    ranked = sorted(strokes, key=lambda one: -_shown(fit, one, len(strokes)))
     if not ranked:
         return absent(id_, part, title, "The fit holds no strokes.")
     carded = {stroke.anchor for stroke in ranked[:MOST_CARDS]}
@@ -104,7 +108,7 @@ def strokes_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) ->
             charts.append(_spread(fit, strokes, "rate", f"{part}-spread-rate"))
             charts.append(_spread(fit, strokes, "time", f"{part}-spread-time"))
     charts += [_card(fit, stroke) for stroke in ranked[:MOST_CARDS]]
-    worst = max(ranked, key=lambda one: _shown(fit, one, len(ranked)))
+    worst = ranked[0]
     sentence = (
         f"The model misses most on {worst.label}: "
         f"{with_unit(finite(_rms(fit, worst)), fit.effort_unit, 2)} rms."
@@ -128,7 +132,12 @@ def held_out_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -
     if not fit.held_out:
         return absent(id_, part, title, "No stroke was held out.")
     names = {(stroke.stroke, stroke.recording): stroke for stroke in strokes}
-    errors = sorted(fit.held_out, key=lambda e: -(finite(e.relative_rms) or -1.0))
+    tail = 0.05 / len(fit.held_out)  # as in `worst_stroke`
+    errors = sorted(
+        fit.held_out,
+        key=lambda e: (finite(e.interval(tail)[0]) or 0.0, finite(e.relative_rms) or -1.0),
+        reverse=True,
+    )
     rows, marks = [], []
     for error in errors:
         name = names.get((error.stroke, error.recording))
@@ -152,8 +161,8 @@ def held_out_panel(fit: FitResult, strokes: Sequence[FittedStroke], part: str) -
         f"of the rms of all strokes); worst {percent(worst)}."
     )
     caption = (
-        "With 90 % intervals by the independent samples of a stroke. The worst stroke is the one "
-        "whose error is shown to be largest: a few samples may err by more by chance."
+        "With 90 % intervals by the independent samples of a stroke, ranked by their lower ends: "
+        "a few samples may err by more by chance."
     )
     return Panel(id_, part, title, sentence, tuple(rows), charts, caption=caption)
 
