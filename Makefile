@@ -24,7 +24,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Test modules are compiled once, not in each worker of each run; the tree ignores what that writes.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test test-slow test-realtime test-explore lint format format-check types schemas schemas-check docs c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
+.PHONY: demo test test-slow test-realtime test-explore lint format format-check types schemas schemas-check docs pictures c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
 
 demo: $(INSTALLED)
 	$(RUN)/scissorcal demo
@@ -70,6 +70,10 @@ schemas-check: $(STAMP)
 # The documentation as a site, in site/: it opens from a file, with search. A dead link fails.
 docs: $(STAMP)
 	NO_MKDOCS_2_WARNING=1 $(RUN)/mkdocs build --quiet
+
+# Every picture of README and documentation, from the tutorials' own commands; needs Chromium.
+pictures: $(STAMP) page
+	$(RUN)/python -m docs.tools.pictures
 
 # Strict, and again under the address and undefined-behaviour sanitizers; then the fuzzers' inputs.
 c-tests:

@@ -21,8 +21,9 @@ ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 API_PAGE = re.compile(r"docs/api/scissorcal[\w.]*\.md")
 """Made by the build of the site, which tests/test_site.py follows every link of."""
+PROSE_FOLDERS = ("docs", "docs/build", "docs/tutorial", "docs/how-to", "docs/explanation")
 PROSE = [
-    *(page for page in PAGES if page.parent in (ROOT / "docs", ROOT / "docs" / "build")),
+    *(page for page in PAGES if page.parent.relative_to(ROOT).as_posix() in PROSE_FOLDERS),
     ROOT / "README.md",
     ROOT / "CONTRIBUTING.md",
 ]
