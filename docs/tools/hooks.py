@@ -48,7 +48,7 @@ LINK = re.compile(r"(\]\()([^)\s]+)(\))")
 CODE = re.compile(r"^( *)(```|~~~).*?^\1\2[ \t]*$|`[^`\n]*`", re.MULTILINE | re.DOTALL)
 OUTSIDE = "repository"
 """Folder of the site with what stands outside ``docs``."""
-BOOST = {"decisions": 0.2, "api": 0.3, OUTSIDE: 0.5, "tutorial": 1.5, "how-to": 2.0}
+BOOST = {"decisions": 0.2, "api": 0.3, OUTSIDE: 0.5, "tutorial": 1.5, "how-to": 2.0, "faq.md": 2.0}
 """Weights of the search by folder: a page that says what to do comes before why and what."""
 
 
