@@ -117,11 +117,13 @@ class FitRun:
 class FrictionRun(FitRun):
     """How a fit of friction is run: ``critic`` asks for the critic at draft effort too.
 
-    ``tolerance`` is the share of torque by which what the critic finds is judged.
+    ``tolerance`` is the share of torque by which what the critic finds is judged. ``all_laws``
+    compares all candidate laws at draft effort too: they cost less than a second.
     """
 
     critic: bool = False
     tolerance: float = FELT
+    all_laws: bool = False
 
 
 @dataclass(frozen=True)

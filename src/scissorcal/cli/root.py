@@ -26,6 +26,7 @@ _COMMANDS = {
     "capture": ("scissorcal.cli.capture:capture", "Record friction, cuts or photographs."),
     "import": ("scissorcal.cli.import_:import_", "Import a log (CSV, Parquet, .mat) or a camera."),
     "summarise": ("scissorcal.cli.summarise:summarise", "Sum up force or torque over angle."),
+    "identify": ("scissorcal.cli.identify:identify", "Friction of any joint from its log."),
     "export": ("scissorcal.cli.export:export", "Write a recording as Parquet or CSV."),
     "recording": ("scissorcal.cli.recording:recording", "Look into recordings."),
     "fit": ("scissorcal.cli.fit:fit", "Fit what the scene requires; cached."),

@@ -186,7 +186,7 @@ def quantity(
     column = table.columns[channel]
     target = "s" if channel == "time" else unit_of(channel, joint)
     factor = 1.0 if scale is None else _scale_factor(table, channel, scale)
-    heading_unit = _unit_in(column.heading)
+    heading_unit = unit_in(column.heading)
     stated = heading_unit if unit is None else unit
     heading = shortened(column.heading)
     by = repr(heading)
@@ -300,7 +300,7 @@ def _contradiction(table: Table, channel: str, heading: str | None, stated: str 
     )
 
 
-def _unit_in(heading: str) -> str | None:
+def unit_in(heading: str) -> str | None:
     """Return the unit that a heading names, in brackets or after its last words."""
     parts = _in_brackets(heading)
     if parts:

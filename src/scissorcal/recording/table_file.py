@@ -26,7 +26,7 @@ from scissorcal.recording.recording import Recording, columns
 from scissorcal.recording.scan import scan_file
 from scissorcal.recording.schema import RecordingFacts, describe
 from scissorcal.recording.table import Column, Table, Wanted, find_column, shortened
-from scissorcal.recording.textfile import read_text
+from scissorcal.recording.textfile import read_text, text_headings
 
 MOST_ROWS = 40_000_000
 """Eleven hours at 1 kHz. A file states its rows, and a few bytes can state any number."""
@@ -62,6 +62,30 @@ def read_table(
     _check_lengths(table)
     _check_finite(table)
     return table
+
+
+def read_headings(path: Path, delimiter: str | None = None) -> list[str]:
+    """What a table calls its columns; of a .mat file, variables as `read_table` takes them.
+
+    A variable of size one is a number, not a column, and left out. Raises InputError where the file
+    is missing or no table.
+    """
+    refuse_no_table(path)
+    suffix = path.suffix.lower()
+    if suffix in (".parquet", ".pq"):
+        return parquet_headings(path)
+    if suffix != ".mat":
+        with reading(path, LOG):
+            return text_headings(path, delimiter)
+    data = read_foreign(path, MATLAB)
+    variables = parse_isolated(f"{__name__}:_load_variables", data, path, MATLAB)
+    names: list[str] = []
+    for name, values in variables.items():
+        if values.ndim == 2 and 1 not in values.shape:
+            names += [f"{name}[{place}]" for place in range(values.shape[1])]
+        elif values.size > 1:
+            names.append(name)
+    return names
 
 
 def _check_lengths(table: Table) -> None:

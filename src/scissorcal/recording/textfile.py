@@ -50,6 +50,26 @@ def read_text(
     a commented one), and a line of units may follow those. Decimal commas are read where
     the comma does not separate the cells.
     """
+    headings, rows, delimiter, notes = _opened(path, wanted, delimiter, drop_last_line)
+    chosen = {c: find_column(path, headings, column, c) for c, column in wanted.items()}
+    values = _numbers(path, rows, delimiter, chosen, headings)
+    columns = {
+        channel: Column(headings[number], values[:, place])
+        for place, (channel, number) in enumerate(chosen.items())
+    }
+    numbers = np.array([line.number for line in rows], dtype=np.int64)
+    return Table(path, columns, lines=numbers, notes=notes)
+
+
+def text_headings(path: Path, delimiter: str | None = None) -> list[str]:
+    """The headings of a text table, "column 3" where it has none. Raises as `read_text` does."""
+    return _opened(path, {}, delimiter, drop_last_line=True)[0]
+
+
+def _opened(
+    path: Path, wanted: Wanted, delimiter: str | None, drop_last_line: bool
+) -> tuple[list[str], list[Line], str | None, tuple[str, ...]]:
+    """Headings, rows of numbers, the delimiter of both, and notes on what was left out."""
     comments, lines, cut = _lines(path)
     last = [line for line in lines[-21:] if line != cut] or lines
     tail = [line.text for line in last]
@@ -72,15 +92,7 @@ def read_text(
         len(_cells(line.text, delimiter)) == len(first) for line in lines[:start] + commented
     ):
         _refuse_other_headings(path, lines[:start], rows, delimiter, wanted)
-    headings = _headings(lines[:start], commented, delimiter, first)
-    chosen = {c: find_column(path, headings, column, c) for c, column in wanted.items()}
-    values = _numbers(path, rows, delimiter, chosen, headings)
-    columns = {
-        channel: Column(headings[number], values[:, place])
-        for place, (channel, number) in enumerate(chosen.items())
-    }
-    numbers = np.array([line.number for line in rows], dtype=np.int64)
-    return Table(path, columns, lines=numbers, notes=notes)
+    return _headings(lines[:start], commented, delimiter, first), rows, delimiter, notes
 
 
 def _refuse_other_headings(

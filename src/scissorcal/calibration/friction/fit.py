@@ -110,7 +110,9 @@ def fit_friction(
     settings = with_probed(settings, slow)
     every_law, cogging = _laws(windows, settings, joint, prior, zero)
     near = prior.laws if prior else ()
-    laws = list(candidates_for(effort, every_law, usual_law, run.last_chosen, near))
+    laws = every_law
+    if not run.all_laws:
+        laws = list(candidates_for(effort, every_law, usual_law, run.last_chosen, near))
     compared, chosen, law, passed = choose_law(laws, settings.lack_of_fit, run.stop, run.tell)
     options = InferOptions(
         checkpoint=run.checkpoint,
