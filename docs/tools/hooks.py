@@ -34,6 +34,7 @@ ROOMS = (
     "scissorcal.vision",
     "scissorcal.calibration",
     "scissorcal.package",
+    "scissorcal.identify",
     "scissorcal.tracking",
     "scissorcal.kernel",
     "scissorcal.control",

@@ -29,12 +29,14 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[2]
-TUTORIALS = ("virtual-rig", "photographs")
+TUTORIALS = ("virtual-rig", "joint-log", "photographs")
 BLOCK = re.compile(r"^```sh\n(?P<code>.*?)^```|!\[[^\]]*\]\((?P<picture>[^)]+)\)", re.M | re.S)
 STAMP = re.compile(r"20\d{6}T\d{6}Z|20\d\d-\d\d-\d\d([T ]\d\d:\d\d(:\d\d)?)?(\+00:00| UTC)?")
 COLUMNS, ROWS = 112, 40
 DECISION = "#decision"
 BOLD = ' font-weight="bold" fill="#0072B2"'
+BEGINS = {"tutorial-joint-compare.svg": "Logs that the fit did not see"}
+"""Words that a picture of a long text begins with, where the text has them."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -75,6 +77,9 @@ def run_tutorial(tutorial: str, folder: Path) -> Iterator[tuple[Step, Done]]:
             words = shlex.split(command)
             if words[0] == "cd":
                 folder = folder / words[1]
+            elif words[0] == "mv":
+                (moved,) = folder.glob(words[1])
+                moved.rename(folder / words[2])
             else:
                 printed = _run(words, folder)
         yield step, Done(folder, command, printed)
@@ -94,9 +99,16 @@ def _run(words: list[str], folder: Path) -> str:
 # ------------------------------------------------------------------------------- of a terminal
 
 
-def terminal(command: str, printed: str) -> str:
-    """What a command printed, as SVG, with one stamp for all times: two runs give one picture."""
-    lines = [f"$ {command}"]
+def terminal(command: str, printed: str, begins: str = "") -> str:
+    """What a command printed, as SVG, with one stamp for all times: two runs give one picture.
+
+    The text may begin at the line that begins with some words.
+    """
+    if begins:
+        _, mark, after = printed.partition(f"\n{begins}")
+        printed = f"...\n{mark}{after}" if mark else printed
+    lines = textwrap.wrap(f"$ {command}", COLUMNS - 4, subsequent_indent="      ")
+    bold = len(lines)
     for line in STAMP.sub("2026-01-01", printed).rstrip().splitlines():
         lines += textwrap.wrap(line, COLUMNS, subsequent_indent="    ", drop_whitespace=False) or [
             ""
@@ -106,7 +118,7 @@ def terminal(command: str, printed: str) -> str:
     width, height = 9 * COLUMNS + 40, 20 * len(lines) + 36
     rows = [
         f'<text x="20" y="{34 + 20 * number}" xml:space="preserve"'
-        f"{BOLD if number == 0 else ''}>{escape(line)}</text>"
+        f"{BOLD if number < bold else ''}>{escape(line)}</text>"
         for number, line in enumerate(lines)
     ]
     head = (
@@ -169,6 +181,16 @@ def friction_section(chromium: Browser, folder: Path, out: Path) -> None:
         page.screenshot(path=out)
 
 
+def page_of_joint(chromium: Browser, folder: Path, out: Path) -> None:
+    """The page of an identified joint, with every part open."""
+    with opened(chromium, folder / "joint.html", 1100, 1000) as page:
+        page.evaluate("document.querySelectorAll('details').forEach(part => { part.open = true; })")
+        page.get_by_text("Friction curve").last.evaluate(
+            "part => part.scrollIntoView({block: 'start'})"
+        )
+        page.screenshot(path=out)
+
+
 def page_of_package(chromium: Browser, folder: Path, out: Path) -> None:
     """The page of a package while it cuts, at its widest layout."""
     (file,) = folder.glob("my-*.html")
@@ -206,6 +228,7 @@ TAKEN: dict[str, Callable[[Browser, Path, Path], None]] = {
     "tutorial-rig-report.png": decision_page,
     "tutorial-rig-friction.png": friction_section,
     "tutorial-rig-page.png": page_of_package,
+    "tutorial-joint-page.png": page_of_joint,
     "tutorial-photos-blade.jpg": blade_photograph,
     "decision-page.png": decision_page,
 }
@@ -226,7 +249,7 @@ def main() -> None:
     drawings = [sys.executable, "-m", "benchmarks.draw_docs", "--out", str(out.resolve())]
     subprocess.run(drawings, cwd=ROOT, check=True)
     with tempfile.TemporaryDirectory() as folder, browser() as chromium:
-        for tutorial in TUTORIALS:
+        for tutorial in TUTORIALS:  # the pages that are shown afterwards are those of the last
             for step, done in run_tutorial(tutorial, Path(folder)):
                 print(f"{tutorial}: {done.command}", file=sys.stderr)
                 for name in step.pictures:
@@ -240,7 +263,7 @@ def take(chromium: Browser, name: str, done: Done, out: Path) -> None:
     if name in TAKEN:
         TAKEN[name](chromium, done.folder, out / name)
     else:
-        text = terminal(done.command, done.printed)
+        text = terminal(done.command, done.printed, BEGINS.get(name, ""))
         (out / name).write_text(text, encoding="utf-8")
 
 
