@@ -24,7 +24,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Test modules are compiled once, not in each worker of each run; the tree ignores what that writes.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test test-slow test-realtime test-explore lint format format-check types schemas schemas-check api api-check c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
+.PHONY: demo test test-slow test-realtime test-explore lint format format-check types schemas schemas-check docs pictures c-tests fuzz fuzz-coverage fuzz-merge kernel page page-check setup clean
 
 demo: $(INSTALLED)
 	$(RUN)/scissorcal demo
@@ -60,17 +60,20 @@ types: $(STAMP)
 schemas: $(STAMP)
 	$(RUN)/python -m scissorcal.workday.schemas --write
 	$(RUN)/python src/scissorcal/kernel/write_wire.py
+	$(RUN)/python docs/tools/tables.py --write
 
 schemas-check: $(STAMP)
 	$(RUN)/python -m scissorcal.workday.schemas --check
 	$(RUN)/python src/scissorcal/kernel/write_wire.py --check
+	$(RUN)/python docs/tools/tables.py --check
 
-# docs/api and the table of docs/verdicts.md, from the docstrings.
-api: $(STAMP)
-	$(RUN)/python docs/make_api.py --write
+# The documentation as a site, in site/: it opens from a file, with search. A dead link fails.
+docs: $(STAMP)
+	NO_MKDOCS_2_WARNING=1 $(RUN)/mkdocs build --quiet
 
-api-check: $(STAMP)
-	$(RUN)/python docs/make_api.py --check
+# Every picture of README and documentation, from the tutorials' own commands; needs Chromium.
+pictures: $(STAMP) page
+	$(RUN)/python -m docs.tools.pictures
 
 # Strict, and again under the address and undefined-behaviour sanitizers; then the fuzzers' inputs.
 c-tests:
@@ -117,4 +120,4 @@ $(STAMP): pyproject.toml $(KERNEL)
 .NOTPARALLEL:
 
 clean:
-	rm -rf $(VENV) build dist src/*.egg-info
+	rm -rf $(VENV) build dist site src/*.egg-info

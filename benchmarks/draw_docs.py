@@ -1,4 +1,4 @@
-"""Draw the drawings of the documentation as SVG: scissors, stroke, data flow, loop, builds.
+"""Draw the drawings of the documentation as SVG: scissors, strokes, laws, data flow, builds.
 
     python -m benchmarks.draw_docs [--out docs/pictures]
 
@@ -14,6 +14,8 @@ from pathlib import Path
 from benchmarks.drawings import build_wiring, builds
 from benchmarks.drawings.canvas import Drawing
 from benchmarks.drawings.diagrams import dataflow, loop
+from benchmarks.drawings.good_data import camera_places, speeds, strokes
+from benchmarks.drawings.laws import friction_law, likelihood, priors, response_laws
 from benchmarks.drawings.scissors import geometry
 from benchmarks.drawings.stroke import stroke
 
@@ -22,6 +24,13 @@ PICTURES: dict[str, Callable[[], Drawing]] = {
     "stroke": stroke,
     "dataflow": dataflow,
     "loop": loop,
+    "good-strokes": strokes,
+    "good-speeds": speeds,
+    "camera-places": camera_places,
+    "friction-law": friction_law,
+    "response-laws": response_laws,
+    "likelihood": likelihood,
+    "priors": priors,
     "build-course-mechanics": partial(builds.mechanics, builds.COURSE),
     "build-course-wiring": partial(builds.wiring, build_wiring.COURSE),
     "build-lab-mechanics": partial(builds.mechanics, builds.LAB),

@@ -1,7 +1,7 @@
-"""The section of docs/trade.md on the four recipes: runs of `bench trade`, drawn and told.
+"""The section of docs/trade.md on a recipe: a run of `bench trade`, drawn and told.
 
 ``python -m benchmarks.draw_trade --measure FOLDER --budget "5 min"`` makes or continues in FOLDER a
-day of the virtual rig for each built-in recipe, runs `scissorcal bench trade` on it, then writes
+day of the virtual rig for the recipe of the page, runs `scissorcal bench trade` on it, then writes
 the marked section of the page and docs/pictures/trade-*.svg. Without ``--measure``:
 ``python -m benchmarks.draw_trade WORKSPACE...`` tells and draws what was measured in workspaces.
 Figures of the page come from the runs' JSON twins alone.
@@ -21,7 +21,7 @@ from scissorcal.report.trade import standalone_svg, trade_chart
 from scissorcal.workday.workspace import Workspace
 
 DOCS = Path(__file__).parents[1] / "docs"
-RECIPES = ("paper-photographed", "paper-80gsm", "press-only", "cotton-cloth")
+RECIPES = ("paper-80gsm",)
 MARK = "TRADE_RECIPES"
 SEED = 9310
 WIDTH = 128

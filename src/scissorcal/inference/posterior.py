@@ -10,6 +10,8 @@ from scissorcal.inference.optimise import Optimum
 from scissorcal.inference.problem import SamplingStatus, Stop
 
 Effort = Literal["draft", "standard", "thorough"]
+"""How a posterior is drawn: around its optimum; the same, corrected by importance or by nested
+sampling where that is curved; ensembles of walkers. docs/how-to-choose.md compares them."""
 
 
 @dataclass(frozen=True)

@@ -134,8 +134,9 @@ def fit_cut(
 
     Crack laws are rate-independent, so the fit compares the material's mean torque between
     openings: of cracks at rest that the blades load and unload, of running cracks, and of the
-    spectral line of the teeth in a running crack's own phase (docs/model.md). Friction, inertia,
-    cogging and noise are those of ``friction``; its uncertainty widens the material's intervals.
+    spectral line of the teeth in a running crack's own phase
+    (docs/explanation/likelihood.md). Friction, inertia, cogging and noise are those of
+    ``friction``; its uncertainty widens the material's intervals.
 
     Where a verdict on friction failed, this fit fails too. A study of simulated data goes without
     a budget of lack of fit. Raises InputError where the blades hardly touched the material, a value

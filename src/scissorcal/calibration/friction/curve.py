@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.calibration.result import FitResult
 from scissorcal.model.friction import FrictionLaw, friction_torque
+
+if TYPE_CHECKING:
+    from scissorcal.calibration.result import FitResult
 
 POINTS_EACH_WAY = 40
 SLOWEST_SHARE = 5e-3
