@@ -11,7 +11,7 @@ from scissorcal.aliases import Array
 from scissorcal.model.friction import FrictionLaw, friction_torque
 
 if TYPE_CHECKING:
-    from scissorcal.calibration.result import FitResult
+    from scissorcal.calibration import FitResult
 
 POINTS_EACH_WAY = 40
 SLOWEST_SHARE = 5e-3
