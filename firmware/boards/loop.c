@@ -69,7 +69,11 @@ void loop_tick(void)
         return;
     }
     board_measure(&in);
-    for (size_t size = board_receive(&data); size > 0; size = board_receive(&data)) {
+    /* Three bytes in 10 us are the fastest line of docs/protocol.md, 3,000,000 baud at ten bits a byte.
+     * What USB brings beyond that waits for the next tick. */
+    const size_t most = board_table.tick_us * 3u / 10u + 1u;
+    for (size_t got = 0, size = 1; got < most && size > 0; got += size) {
+        size = board_receive(&data);
         fw_receive(&core, data, size);
     }
     fw_tick(&core, &in, &out);

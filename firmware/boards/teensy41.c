@@ -1,9 +1,9 @@
 /* Teensy 4.1 (i.MX RT1062): a brushed motor on a bridge with two inputs, on Teensyduino's start and
  * native USB.
  *
- * Not yet run on hardware. Nothing here addresses a register: the functions below are those of
- * Teensyduino's core (github.com/PaulStoffregen/cores, teensy4/core_pins.h and usb_serial.h), which
- * calls setup and loop.
+ * Not yet run on hardware. The functions below are those of Teensyduino's core
+ * (github.com/PaulStoffregen/cores, teensy4/core_pins.h and usb_serial.h), which calls setup and loop.
+ * The watchdog's registers and bits: the vendor's header of the MIMXRT1062, not its reference manual.
  *
  *     2, 3      encoder A, B                    14 (A0)  motor current, mid-supply at 0 A
  *     4, 5      bridge IN1, IN2                 15 (A1)  supply
@@ -65,10 +65,22 @@ void board_start(void)
     tick_began = micros();
 }
 
-/* Left to the maker: the RT1062's WDOG1 or the library WDT_T4, fed in board_wait. Until then a
- * program that stops leaves the bridge as it was: keep the stop button in the motor's supply. */
+/* RTWDOG (WDOG3): 524 periods of 32,768 Hz are 16 ms; WDOG1 counts half seconds. It is unlocked for 128
+ * bus clocks, so no interrupt may come between. The reset leaves the bridge's inputs open: pull both
+ * down, so that it lets go. */
 void board_start_watchdog(void)
 {
+    REG(CCM_CCGR5) |= 3u << 4; /* its clock */
+    __asm__ volatile("cpsid i" ::: "memory");
+    REG(WDOG3 + 0x04u) = 0xD928C520u;
+    while (!(REG(WDOG3) & 1u << 11)) {
+    }
+    REG(WDOG3 + 0x08u) = 524u;
+    REG(WDOG3 + 0x0Cu) = 0u;                    /* no window */
+    REG(WDOG3) = 1u << 13 | 1u << 8 | 1u << 7; /* 32-bit commands, LPO clock, on, no change later */
+    __asm__ volatile("cpsie i" ::: "memory");
+    while (!(REG(WDOG3) & 1u << 10)) {
+    }
 }
 
 void board_wait(void)
@@ -76,6 +88,7 @@ void board_wait(void)
     while (micros() - tick_began < board_table.tick_us) {
     }
     tick_began += board_table.tick_us;
+    REG(WDOG3 + 0x04u) = 0xB480A602u;
 }
 
 void board_measure(fw_inputs *in)

@@ -44,6 +44,9 @@ const float board_duty_max = 0.95f;
 #define NEWTONS_AT_ZERO (-50.0f)
 #define PWM_HZ 36621.0f                        /* 150 MHz / 2^12: the finest steps at this rate */
 
+#define CCM_CCGR5 0x400FC07Cu
+#define WDOG3 0x400BC000u /* CS, CNT, TOVAL, WIN */
+
 enum { ENCODER_A = 2, ENCODER_B = 3, BRIDGE_IN1 = 4, BRIDGE_IN2 = 5, STOP_BUTTON = 6, BRIDGE_FAULT = 7 };
 enum { CURRENT = 14, SUPPLY = 15, FORCE = 16, PWM_BITS = 12, SEND_SIZE = 256 };
 enum { INPUT_PULLUP = 2, CHANGE = 4 }; /* of core_pins.h */

@@ -158,7 +158,8 @@ static void configure(fw_core *core, const sc_config *config)
         fits = set_home(core, value);
         echo.value = core->home_asked || core->phase == FW_HOMING ? 1.0f : 0.0f;
     } else if (config->key == SC_KEY_RENDER && core->render != NULL) {
-        fits = fw_render_set(core->render, value) == SC_CONFIG_OK;
+        fits = (value != 1.0f || core->phase != FW_FAULT) &&
+               fw_render_set(core->render, value) == SC_CONFIG_OK;
         echo.value = (float)core->render->on;
     } else {
         fits = -1;
@@ -167,6 +168,13 @@ static void configure(fw_core *core, const sc_config *config)
         echo.status = fits ? SC_CONFIG_OK : SC_CONFIG_VALUE_REFUSED;
     }
     fw_put_reply(&core->outbox, payload, sc_pack_config_echo(&echo, payload));
+}
+
+static void end_rendering(fw_core *core)
+{
+    if (core->render != NULL) {
+        fw_render_set(core->render, 0.0f);
+    }
 }
 
 static void load(fw_core *core, const uint8_t *payload, size_t size)
@@ -203,6 +211,7 @@ static void latch(fw_core *core, uint8_t cause)
     }
     core->phase = FW_FAULT;
     core->cause = cause;
+    end_rendering(core); /* and with it the longer silence that the host may have */
 }
 
 static int is_silent(const fw_core *core, float limit_ms)
@@ -224,6 +233,7 @@ static void listen(fw_core *core)
     if (core->unheard_ticks >= (UNHEARD_US + tick_us - 1u) / tick_us) {
         core->streaming = 0;
         core->home_asked = 0;
+        end_rendering(core);
         if (core->phase == FW_HOMING) {
             fw_home_end(core, FW_HOME_STOPPED);
         }
@@ -347,6 +357,9 @@ static void send_state(fw_core *core, const fw_inputs *inputs, const fw_outputs 
     sc_state state;
     state.opening = inputs->opening + core->opening_zero;
     state.cause = core->cause;
+    if (core->phase == FW_UNHOMED && core->home_result != FW_HOME_NOT_TRIED) {
+        state.cause = (uint8_t)(FW_CAUSE_HOME + core->home_result);
+    }
     state.flags = state_flags(core, inputs, state.opening);
     state.sequence = core->sequence;
     state.device_us = inputs->device_us;

@@ -40,7 +40,8 @@ enum {
     FW_HOME_STOPPED = 2,   /* HOME = 0, or 5 s without a frame from the host */
     FW_HOME_TIMED_OUT = 3, /* moved, but home did not come within home_timeout */
     FW_HOME_JAMMED = 4,    /* home_timeout passed and home_torque did not move the blades */
-    FW_HOME_FAULT = 5      /* a fault latched meanwhile */
+    FW_HOME_FAULT = 5,     /* a fault latched meanwhile */
+    FW_CAUSE_HOME = 64     /* added to these: `cause` of a STATE without a zero and without a fault */
 };
 
 typedef struct {
@@ -86,6 +87,8 @@ typedef struct {
     uint32_t home_still;     /* ticks without motion while homing */
     float brake_after_ms;
     float tick_s;
+    float passed_s;          /* from the last measurement to this one, by device_us */
+    uint32_t last_us;        /* device_us of the last measurement */
     float opening_zero;      /* rad, added to the encoder's opening */
     float last_opening;      /* rad, of the last tick, as the encoder gave it */
     float last_advance;      /* m */

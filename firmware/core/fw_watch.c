@@ -3,8 +3,19 @@
 
 enum {
     RATE_TICKS = 4,    /* the rate is smoothed over these; fw_board.c refuses too coarse encoders */
-    ENCODER_TICKS = 16 /* plausible readings in a row after which an encoder is believed again */
+    ENCODER_TICKS = 16, /* plausible readings in a row after which an encoder is believed again */
+    LONGEST_US = 1000000 /* BRAKE_AFTER_MS at most: nothing drives blades on through a longer pause */
 };
+
+/* Time since the last measurement by the clock, which wraps; the table's tick where it stands still. */
+static float passed(const fw_core *core, uint32_t device_us)
+{
+    const uint32_t us = device_us - core->last_us;
+    if (!core->measured || us == 0u) {
+        return core->tick_s;
+    }
+    return 1e-6f * (float)(us < (uint32_t)LONGEST_US ? us : (uint32_t)LONGEST_US);
+}
 
 static int leaps(float from, float to, float farthest)
 {
@@ -22,9 +33,11 @@ static int encoders_wrong(const fw_core *core, const fw_inputs *inputs)
     if (!core->measured) {
         return 0;
     }
-    return leaps(core->last_opening, inputs->opening, core->board.opening_leap) ||
+    /* A late measurement may be farther from the last one; an early one is no better than in a tick. */
+    const float late = core->passed_s > core->tick_s ? core->passed_s / core->tick_s : 1.0f;
+    return leaps(core->last_opening, inputs->opening, late * core->board.opening_leap) ||
            (fw_has_carriage(core) &&
-            leaps(core->last_advance, inputs->advance, core->board.advance_leap));
+            leaps(core->last_advance, inputs->advance, late * core->board.advance_leap));
 }
 
 static float current(const fw_core *core, const fw_inputs *inputs)
@@ -38,7 +51,7 @@ static void warm(fw_core *core, float amperes)
     const fw_board *board = &core->board;
     const float bears = board->current_continuous * board->current_continuous;
     const float most = 2.0f * board->i2t_limit; /* so that it cools in bounded time */
-    core->heat += (amperes * amperes - bears) * core->tick_s;
+    core->heat += (amperes * amperes - bears) * core->passed_s;
     if (!(core->heat < most)) {
         core->heat = most;
     } else if (core->heat < 0.0f) {
@@ -49,6 +62,8 @@ static void warm(fw_core *core, float amperes)
 void fw_measure(fw_core *core, const fw_inputs *inputs)
 {
     const float amperes = current(core, inputs);
+    core->passed_s = passed(core, inputs->device_us);
+    core->last_us = inputs->device_us;
     if (fw_finite(amperes)) {
         warm(core, amperes);
     }
@@ -59,8 +74,10 @@ void fw_measure(fw_core *core, const fw_inputs *inputs)
             core->homed = 0; /* counts may be lost */
         }
     } else if (core->measured) {
-        const float rate = (inputs->opening - core->last_opening) / core->tick_s;
-        core->rate += (rate - core->rate) / (float)RATE_TICKS;
+        /* a lag of RATE_TICKS - 1 ticks of time: a quarter of the way in a tick, less in a shorter one */
+        const float rate = (inputs->opening - core->last_opening) / core->passed_s;
+        const float share = 1.0f + (float)(RATE_TICKS - 1) * (core->tick_s / core->passed_s);
+        core->rate += (rate - core->rate) / share;
         if (core->encoder_doubt > 0) {
             core->encoder_doubt--;
         }
