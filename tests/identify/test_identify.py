@@ -51,6 +51,23 @@ def test_a_log_that_was_not_fitted_is_predicted_within_the_band(joint, folder: P
     assert held.rms < 1.2 * joint.rms
     assert 0.85 < held.share_inside <= 1.0
     assert held.beyond < 0.01
+    assert not held.differs
+
+
+def test_a_log_of_a_joint_that_has_changed_is_told(joint, folder: Path) -> None:
+    rows = MadeJoint(coulomb=0.06).log((0.2, 0.5, 2.0), 2)
+    held = compare(joint, read_log(write(folder / "changed.csv", rows)))
+    assert held.differs
+
+
+def test_weight_is_a_term_by_the_name_of_the_position(folder: Path) -> None:
+    rows = MadeJoint().log((0.1, 0.3, 1.0, 3.0), 4)
+    rows[:, 2] += 0.03 * np.sin(rows[:, 1])
+    log = read_log(write(folder / "arm.csv", rows))
+    found = identify([log], adopt=("sin(position)",))
+    weight = found.fit.parameter("sin(opening)")
+    assert abs(weight.mean - 0.03) < 5 * weight.sd
+    assert "sin(position)" in found.fit.candidate
 
 
 def test_motion_beyond_the_fitted_one_is_said(joint, folder: Path) -> None:

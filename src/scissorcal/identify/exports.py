@@ -14,6 +14,7 @@ import numpy as np
 from scissorcal.calibration import friction_curve
 from scissorcal.identify.joint import Identified
 from scissorcal.identify.simple import full_friction, law_of, simple_law, stateless_friction
+from scissorcal.identify.words import plain
 
 TIMESTEP_S = 0.001
 INTEGRATOR = "implicitfast"
@@ -184,7 +185,7 @@ def _c(joint: Identified) -> str:
         *(["build-up of friction after reversals"] if "presliding_share" in values else []),
         *(["friction by load"] if "load_share" in values else []),
         *(["cogging"] if "cogging_cos" in values else []),
-        *([f"the added terms {', '.join(adopted)}"] if adopted else []),
+        *([f"the added terms {plain(', '.join(adopted))}"] if adopted else []),
     ]
     facts = [
         f"Identified from {', '.join(recording.source for recording in joint.recordings)}: "
@@ -239,7 +240,9 @@ def result_of(joint: Identified) -> dict[str, Any]:
         "law": fit.candidate,
         "position_unit": fit.position_unit,
         "effort_unit": fit.effort_unit,
-        "parameters": [parameter.as_dict() for parameter in fit.parameters],
+        "parameters": [
+            parameter.as_dict() | {"name": plain(parameter.name)} for parameter in fit.parameters
+        ],
         "rms": joint.rms,
         "relative_rms": joint.relative_rms,
         "delay_s": asdict(joint.delay) if joint.delay else None,

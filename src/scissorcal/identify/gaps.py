@@ -7,6 +7,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.result import PRIOR_ONLY, FitResult
 from scissorcal.identify.simple import law_of
+from scissorcal.identify.words import plain
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction_terms import PARAMETERS, side_of
 from scissorcal.model.terms import LOG
@@ -65,7 +66,7 @@ def _of_parameter(fit: FitResult, name: str) -> Gap | None:
         why = f"not identified ({lies}, {parameter.identifiability:.0%} of the prior's width)."
     else:
         why = f"known roughly ({lies})."
-    return Gap(name, why, _motion(fit, stem))
+    return Gap(plain(name), why, _motion(fit, stem))
 
 
 def _motion(fit: FitResult, stem: str) -> str:
@@ -114,7 +115,7 @@ def _undecided(fit: FitResult) -> list[Gap]:
     if not rivals:
         return []
     apart = max(_apart(fit, entry["values"]) for entry in rivals)
-    names = ", ".join(f'"{entry["name"]}"' for entry in rivals)
+    names = plain(", ".join(f'"{entry["name"]}"' for entry in rivals))
     return [
         Gap(
             "form of the law",
