@@ -48,7 +48,16 @@ def _facts(joint: Identified, constant: bool) -> list[str]:
         f"{unit}) over the motion of the log, and leaves {law.measured_rms:.3g} {unit} rms of the "
         f"measured effort, where the fitted law leaves {joint.rms:.3g}.",
         *([f"Not expressed: {', '.join(lacking)}."] if lacking else []),
+        *_unsized(joint),
     ]
+
+
+def _unsized(joint: Identified) -> list[str]:
+    """A sentence on what the figures of an export leave out: no series of a fit has it."""
+    values = joint.fit.best
+    named = (("load_share", "what the load adds"), ("cogging_cos", "cogging"))
+    lacking = [words for name, words in named if name in values]
+    return [f"These figures are without {' and '.join(lacking)}."] if lacking else []
 
 
 def _lacking(joint: Identified, constant: bool) -> list[str]:
@@ -62,6 +71,7 @@ def _lacking(joint: Identified, constant: bool) -> list[str]:
         ("cogging_cos", "cogging"),
     )
     lacking = [words for name, words in named if name in values]
+    lacking += [f"the term {plain(name)}" for name in joint.fit.structure.get("adopt", ())]
     if not constant and ("offset" in values or "coulomb_pos" in values):
         lacking.append("a constant effort")
     return lacking
@@ -192,6 +202,7 @@ def _c(joint: Identified) -> str:
         f"{fit.candidate}.",
         f"Off the fitted law by {left:.3g} {unit} rms over the motion of the log"
         + (f": not expressed is {', '.join(lacking)}." if lacking else "."),
+        *_unsized(joint),
         f"Position in {fit.position_unit}, effort in {unit}.",
     ]
     comment = "\n".join(f" * {fact}" for fact in facts)

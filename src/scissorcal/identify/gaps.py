@@ -60,7 +60,8 @@ def _of_parameter(fit: FitResult, name: str) -> Gap | None:
     if verdict == "yes":
         return None
     parameter = fit.parameter(name)
-    lies = f"90 % between {parameter.q05:.3g} and {parameter.q95:.3g} {parameter.unit}"
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    lies = f"90 % between {parameter.q05:.3g} and {parameter.q95:.3g}{unit}"
     stem = side_of(name, PARAMETERS) or name
     if verdict == "no":
         why = f"not identified ({lies}, {parameter.identifiability:.0%} of the prior's width)."
