@@ -1,5 +1,6 @@
 """A made joint is found again, gaps are named, a delay is told, real logs are as published."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -164,3 +165,26 @@ def test_emps_is_as_published() -> None:
     assert abs(mass.mean - 95.11) < 3 * np.hypot(mass.sd, 0.11)
     assert found.rms < 1.5
     assert simple_law(found.fit, constant=False).rms == pytest.approx(3.6, abs=0.3)
+
+
+@pytest.mark.slow
+def test_a_tool_is_predicted_by_two_other_logs_of_it() -> None:
+    """Load and speed lie between those of the fitted logs; the first second, in which the tool is
+    brought under its load, is left out.
+    """
+    folder = EMPS.parents[1] / "mis_tool_friction"
+    if not folder.is_dir():
+        pytest.skip(f"real data absent: {folder.name} is not beside the project")
+    options = LogOptions(
+        {"time": 0, "position": 1, "effort": 2, "load": 5},
+        {"time": "s", "position": "rad", "effort": "N m", "load": "N m"},
+        {"position": -2 * np.pi / 8192, "effort": 3.9811e-5, "load": -3.9811e-5},
+    )
+    logs = []
+    for number in ("03", "40", "00"):
+        log = read_log(folder / f"Tool_4_Maryland_L_2_{number}.TXT", options)
+        logs.append(dataclasses.replace(log, samples=log.samples[log.device_time_s >= 1.2]))
+    terms = ("position", "position^2")
+    held = compare(identify(logs[:2], adopt=terms, cutoff_Hz=20.0), logs[2])
+    assert held.rms < 2.5e-3
+    assert held.beyond < 0.05
