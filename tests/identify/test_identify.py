@@ -87,6 +87,8 @@ def test_one_speed_keeps_viscous_friction_and_names_the_motion(folder: Path) -> 
     assert {"friction at other speeds", "viscous"} <= stems
     (gap,) = [gap for gap in found.gaps if gap.what == "friction at other speeds"]
     assert "several constant speeds" in gap.motion
+    (sums, *_) = [gap for gap in found.gaps if gap.what.startswith("coulomb")]
+    assert "in sum with viscous" in sums.why
 
 
 def test_several_logs_are_fitted_together(folder: Path) -> None:
