@@ -96,6 +96,7 @@ def test_a_constant_position_or_effort_is_named(here: Path, cli: Cli) -> None:
         (("--gain", "effort=two"), "give a number"),
         (("--delay", "torque=0.1"), "there is no such sensor"),
         (("-c", "opening=1"), "is not a channel"),
+        (("--term", "sine(position)"), "Did you mean 'sin(position)'"),
         (("--export", "x.xml"), "needs --to"),
         (("--output", "page.txt"), "ends in .html"),
     ],

@@ -135,3 +135,15 @@ def test_json_and_csv_hold_parameters_and_curve_with_band(joint) -> None:
     assert np.all(values[:, 2] <= values[:, 1])
     assert np.all(values[:, 1] <= values[:, 3])
     assert set(TARGETS) == {"mujoco", "urdf", "sdf", "c", "json", "csv"}
+
+
+def test_an_added_term_counts_in_what_the_header_leaves(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    """A spring of 30 mN m/rad over 1 rad: 30 mN m / sqrt(3) rms about the place 0, or nearly."""
+    rows = MadeJoint().log((0.1, 0.3, 1.0, 3.0), 4)
+    rows[:, 2] += 0.03 * rows[:, 1]
+    log = read_log(write(tmp_path_factory.mktemp("logs") / "spring.csv", rows))
+    joint = identify([log], adopt=("position",))
+    assert off_by(joint, "c") == pytest.approx(0.03 / np.sqrt(3.0), rel=0.1)
+    assert "the added terms position" in export_text(joint, "c")

@@ -1,5 +1,6 @@
 """A made joint is found again, gaps are named, a delay is told, real logs are as published."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,23 @@ def test_a_log_that_was_not_fitted_is_predicted_within_the_band(joint, folder: P
     assert held.rms < 1.2 * joint.rms
     assert 0.85 < held.share_inside <= 1.0
     assert held.beyond < 0.01
+    assert not held.differs
+
+
+def test_a_log_of_a_joint_that_has_changed_is_told(joint, folder: Path) -> None:
+    rows = MadeJoint(coulomb=0.06).log((0.2, 0.5, 2.0), 2)
+    held = compare(joint, read_log(write(folder / "changed.csv", rows)))
+    assert held.differs
+
+
+def test_weight_is_a_term_by_the_name_of_the_position(folder: Path) -> None:
+    rows = MadeJoint().log((0.1, 0.3, 1.0, 3.0), 4)
+    rows[:, 2] += 0.03 * np.sin(rows[:, 1])
+    log = read_log(write(folder / "arm.csv", rows))
+    found = identify([log], adopt=("sin(position)",))
+    weight = found.fit.parameter("sin(opening)")
+    assert abs(weight.mean - 0.03) < 5 * weight.sd
+    assert "sin(position)" in found.fit.candidate
 
 
 def test_motion_beyond_the_fitted_one_is_said(joint, folder: Path) -> None:
@@ -69,6 +87,8 @@ def test_one_speed_keeps_viscous_friction_and_names_the_motion(folder: Path) -> 
     assert {"friction at other speeds", "viscous"} <= stems
     (gap,) = [gap for gap in found.gaps if gap.what == "friction at other speeds"]
     assert "several constant speeds" in gap.motion
+    (sums, *_) = [gap for gap in found.gaps if gap.what.startswith("coulomb")]
+    assert "in sum with viscous" in sums.why
 
 
 def test_several_logs_are_fitted_together(folder: Path) -> None:
@@ -147,3 +167,26 @@ def test_emps_is_as_published() -> None:
     assert abs(mass.mean - 95.11) < 3 * np.hypot(mass.sd, 0.11)
     assert found.rms < 1.5
     assert simple_law(found.fit, constant=False).rms == pytest.approx(3.6, abs=0.3)
+
+
+@pytest.mark.slow
+def test_a_tool_is_predicted_by_two_other_logs_of_it() -> None:
+    """Load and speed lie between those of the fitted logs; the first second, in which the tool is
+    brought under its load, is left out.
+    """
+    folder = EMPS.parents[1] / "mis_tool_friction"
+    if not folder.is_dir():
+        pytest.skip(f"real data absent: {folder.name} is not beside the project")
+    options = LogOptions(
+        {"time": 0, "position": 1, "effort": 2, "load": 5},
+        {"time": "s", "position": "rad", "effort": "N m", "load": "N m"},
+        {"position": -2 * np.pi / 8192, "effort": 3.9811e-5, "load": -3.9811e-5},
+    )
+    logs = []
+    for number in ("03", "40", "00"):
+        log = read_log(folder / f"Tool_4_Maryland_L_2_{number}.TXT", options)
+        logs.append(dataclasses.replace(log, samples=log.samples[log.device_time_s >= 1.2]))
+    terms = ("position", "position^2")
+    held = compare(identify(logs[:2], adopt=terms, cutoff_Hz=20.0), logs[2])
+    assert held.rms < 2.5e-3
+    assert held.beyond < 0.05

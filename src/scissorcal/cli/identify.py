@@ -99,7 +99,7 @@ _WORDS = {
     ),
     "gain": typer.Option("--gain", metavar=_CHANNEL, help="Gain of a sensor: reading per unit."),
     "offset": typer.Option("--offset", metavar=_CHANNEL, help="Offset of a sensor, in SI."),
-    "term": typer.Option("--term", help="A term that the law has besides: 'sin(opening)', ..."),
+    "term": typer.Option("--term", help="A term that the law has besides: 'sin(position)', ..."),
     "cutoff_Hz": typer.Option("--cutoff-hz", min=0.1, help="Where the windows pass half."),
 }
 
@@ -201,6 +201,7 @@ def identify(
             "relative_rms": log.relative_rms,
             "share_inside": log.share_inside,
             "beyond": log.beyond,
+            "differs": log.differs,
         }
         for log in held
     ]

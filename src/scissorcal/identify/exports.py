@@ -14,6 +14,7 @@ import numpy as np
 from scissorcal.calibration import friction_curve
 from scissorcal.identify.joint import Identified
 from scissorcal.identify.simple import full_friction, law_of, simple_law, stateless_friction
+from scissorcal.identify.words import plain
 
 TIMESTEP_S = 0.001
 INTEGRATOR = "implicitfast"
@@ -47,7 +48,16 @@ def _facts(joint: Identified, constant: bool) -> list[str]:
         f"{unit}) over the motion of the log, and leaves {law.measured_rms:.3g} {unit} rms of the "
         f"measured effort, where the fitted law leaves {joint.rms:.3g}.",
         *([f"Not expressed: {', '.join(lacking)}."] if lacking else []),
+        *_unsized(joint),
     ]
+
+
+def _unsized(joint: Identified) -> list[str]:
+    """A sentence on what the figures of an export leave out: no series of a fit has it."""
+    values = joint.fit.best
+    named = (("load_share", "what the load adds"), ("cogging_cos", "cogging"))
+    lacking = [words for name, words in named if name in values]
+    return [f"These figures are without {' and '.join(lacking)}."] if lacking else []
 
 
 def _lacking(joint: Identified, constant: bool) -> list[str]:
@@ -61,6 +71,7 @@ def _lacking(joint: Identified, constant: bool) -> list[str]:
         ("cogging_cos", "cogging"),
     )
     lacking = [words for name, words in named if name in values]
+    lacking += [f"the term {plain(name)}" for name in joint.fit.structure.get("adopt", ())]
     if not constant and ("offset" in values or "coulomb_pos" in values):
         lacking.append("a constant effort")
     return lacking
@@ -184,13 +195,14 @@ def _c(joint: Identified) -> str:
         *(["build-up of friction after reversals"] if "presliding_share" in values else []),
         *(["friction by load"] if "load_share" in values else []),
         *(["cogging"] if "cogging_cos" in values else []),
-        *([f"the added terms {', '.join(adopted)}"] if adopted else []),
+        *([f"the added terms {plain(', '.join(adopted))}"] if adopted else []),
     ]
     facts = [
         f"Identified from {', '.join(recording.source for recording in joint.recordings)}: "
         f"{fit.candidate}.",
         f"Off the fitted law by {left:.3g} {unit} rms over the motion of the log"
         + (f": not expressed is {', '.join(lacking)}." if lacking else "."),
+        *_unsized(joint),
         f"Position in {fit.position_unit}, effort in {unit}.",
     ]
     comment = "\n".join(f" * {fact}" for fact in facts)
@@ -239,7 +251,9 @@ def result_of(joint: Identified) -> dict[str, Any]:
         "law": fit.candidate,
         "position_unit": fit.position_unit,
         "effort_unit": fit.effort_unit,
-        "parameters": [parameter.as_dict() for parameter in fit.parameters],
+        "parameters": [
+            parameter.as_dict() | {"name": plain(parameter.name)} for parameter in fit.parameters
+        ],
         "rms": joint.rms,
         "relative_rms": joint.relative_rms,
         "delay_s": asdict(joint.delay) if joint.delay else None,

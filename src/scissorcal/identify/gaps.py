@@ -7,6 +7,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration.result import PRIOR_ONLY, FitResult
 from scissorcal.identify.simple import law_of
+from scissorcal.identify.words import plain
 from scissorcal.model import FrictionLaw, friction_torque
 from scissorcal.model.friction_terms import PARAMETERS, side_of
 from scissorcal.model.terms import LOG
@@ -39,13 +40,14 @@ def identified(fit: FitResult, name: str) -> str:
     """How well a parameter is known: "yes", "roughly" or "no".
 
     No: its posterior is at least 0.9 as wide as its prior, or the ends of its 90 % interval differ
-    by a factor of 10. Roughly: the interval is wider than its middle. Else yes. A term of either
+    by a factor of 10; or, of Coulomb friction, viscous friction may take more of it than that
+    interval has. Roughly: the interval is wider than its middle. Else yes. A term of either
     sign is known where its interval is narrower than half of its prior's sd.
     """
     parameter = fit.parameter(name)
     width = parameter.q95 - parameter.q05
     row = PARAMETERS.get(side_of(name, PARAMETERS) or "")
-    if parameter.identifiability >= PRIOR_ONLY:
+    if parameter.identifiability >= PRIOR_ONLY or _taken(fit, name):
         return "no"
     if row is None or row.transform != LOG:
         return "yes" if parameter.identifiability < 0.5 else "roughly"
@@ -59,13 +61,48 @@ def _of_parameter(fit: FitResult, name: str) -> Gap | None:
     if verdict == "yes":
         return None
     parameter = fit.parameter(name)
-    lies = f"90 % between {parameter.q05:.3g} and {parameter.q95:.3g} {parameter.unit}"
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    lies = f"90 % between {parameter.q05:.3g} and {parameter.q95:.3g}{unit}"
     stem = side_of(name, PARAMETERS) or name
+    if _taken(fit, name):
+        return _in_sum(fit, name)
     if verdict == "no":
         why = f"not identified ({lies}, {parameter.identifiability:.0%} of the prior's width)."
     else:
         why = f"known roughly ({lies})."
-    return Gap(name, why, _motion(fit, stem))
+    return Gap(plain(name), why, _motion(fit, stem))
+
+
+def _taken(fit: FitResult, name: str) -> bool:
+    """Whether viscous friction, which is not identified, may take a part of Coulomb friction.
+
+    In logarithms the posterior of draft effort is straight, and does not show by how much: what the
+    95 % of the viscous part have at the usual speed is compared with Coulomb's own interval.
+    """
+    viscous = name.replace("coulomb", "viscous")
+    if viscous == name or viscous not in [parameter.name for parameter in fit.parameters]:
+        return False
+    if identified(fit, viscous) != "no":
+        return False
+    coulomb = fit.parameter(name)
+    return fit.parameter(viscous).q95 * _usual_speed(fit) > coulomb.q95 - coulomb.q05
+
+
+def _usual_speed(fit: FitResult) -> float:
+    return float(np.median(np.abs(fit.series.opening_rate)))
+
+
+def _in_sum(fit: FitResult, name: str) -> Gap:
+    """Coulomb and viscous friction of which the log tells the sum alone."""
+    viscous, speed = name.replace("coulomb", "viscous"), _usual_speed(fit)
+    total = fit.best[name] + fit.best[viscous] * speed
+    return Gap(
+        name,
+        f"known in sum with {viscous} alone: together {total:.3g} {fit.effort_unit} at "
+        f"{speed:.2g} {fit.position_unit}/s, of which {name} may be anything from 0 on, below "
+        "its interval too.",
+        _motion(fit, "coulomb"),
+    )
 
 
 def _motion(fit: FitResult, stem: str) -> str:
@@ -114,7 +151,7 @@ def _undecided(fit: FitResult) -> list[Gap]:
     if not rivals:
         return []
     apart = max(_apart(fit, entry["values"]) for entry in rivals)
-    names = ", ".join(f'"{entry["name"]}"' for entry in rivals)
+    names = plain(", ".join(f'"{entry["name"]}"' for entry in rivals))
     return [
         Gap(
             "form of the law",

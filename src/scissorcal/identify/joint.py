@@ -1,5 +1,6 @@
 """Identify a joint from its logs, and predict another log."""
 
+import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -22,13 +23,15 @@ from scissorcal.identify.sensors import (
     mean_square,
 )
 from scissorcal.identify.words import as_of_a_joint, plain
-from scissorcal.model.friction_terms import CANDIDATES, PARAMETERS, parts_of
+from scissorcal.model.friction_terms import CANDIDATES, PARAMETERS, TERMS, parts_of
 from scissorcal.recipe.friction import FitFriction
 from scissorcal.recipe.priors import JointPriors, LogNormalPrior, NormalPrior
 from scissorcal.recording import Recording
 
 USUAL_EFFORT = {"rotary": 0.05, "linear": 50.0}
 """Drive (rms; N m, N) of the joints that the priors of a friction fit are stated for."""
+FEWEST_STROKES = 3
+"""Strokes from which their scatter shows."""
 LAWS = tuple(law for law in CANDIDATES if "viscous" in parts_of(law))
 """All have viscous friction: where one speed alone was recorded it keeps its prior's width, and
 what Coulomb friction loses to it stands in the intervals of both."""
@@ -83,7 +86,8 @@ class Held:
 
     ``beyond`` is the share of its motion that is faster than all of the fitted logs, or outside
     their positions or loads: the prediction there rests on the form of the law. The band is that of
-    a new recording where several were fitted, else that of a new stroke; `promise` is in words.
+    a new recording where several were fitted, else that of a new stroke; ``promise`` has it in
+    words. ``differs`` says that it holds fewer samples than promised, beyond chance.
     """
 
     source: str
@@ -91,6 +95,7 @@ class Held:
     relative_rms: float
     share_inside: float
     beyond: float
+    differs: bool
     promise: str
     prediction: Prediction
 
@@ -110,7 +115,7 @@ def identify(
     All laws are compared at every effort. ``effort`` "draft" takes intervals from the posterior's
     curvature, widened for autocorrelated residuals; "standard" samples the posterior, and searches
     the residuals for terms that the law lacks. ``adopt`` adds terms to the law by name, such as
-    "sin(opening)" for weight. ``fit_delay`` estimates by how much the effort is read late.
+    "sin(position)" for weight. ``fit_delay`` estimates by how much the effort is read late.
 
     Raises InputError where the logs cannot determine friction, with what to record instead.
     """
@@ -119,7 +124,9 @@ def identify(
         raise InputError("The logs are of a turning and of a sliding joint: fit logs of one joint.")
     as_read = tuple(corrected(recording, sensors) for recording in recordings)
     priors = _scaled_priors(as_read)
-    settings = _Settings(adopt=adopt, cutoff_Hz=cutoff_Hz, critic=effort != "draft", priors=priors)
+    settings = _Settings(
+        adopt=_terms(adopt), cutoff_Hz=cutoff_Hz, critic=effort != "draft", priors=priors
+    )
 
     def fitted(logs: tuple[Recording, ...], law: FitFriction, how: Effort) -> FitResult:
         with as_of_a_joint():
@@ -132,7 +139,8 @@ def identify(
         delay = _delay(as_read, draft, settings, partial(fitted, how="draft"))
         as_read = tuple(_shifted(recording, delay.value_s) for recording in as_read)
     fit = fitted(as_read, settings, effort)
-    fit = replace(fit, notes=tuple(said for note in fit.notes if (said := plain(note))))
+    said = (plain(note) for note in fit.notes)
+    fit = replace(fit, candidate=plain(fit.candidate), notes=tuple(note for note in said if note))
     notes = (delay.sentence,) if delay else ()
     return Identified(fit, settings, as_read, sensors, delay, gaps_of(fit), (*notes, *fit.notes))
 
@@ -162,9 +170,43 @@ def compare(joint: Identified, recording: Recording) -> Held:
         relative_rms=found.rms_error / float(np.sqrt(mean_square(measured))),
         share_inside=found.share_inside,
         beyond=_beyond(joint, found, seen),
+        differs=_differs(found, band.level),
         promise=_promise(band),
         prediction=found,
     )
+
+
+def _terms(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names that a fit has for added terms; InputError for one that is none."""
+    known = tuple(name for name, term in TERMS.items() if term.adoptable)
+    terms = tuple(name.replace("position", "opening") for name in names)
+    for stated, term in zip(names, terms, strict=True):
+        if term not in known:
+            listed = ", ".join(plain(name) for name in known)
+            near = difflib.get_close_matches(plain(term), [plain(name) for name in known], 1)
+            hint = f" Did you mean {near[0]!r}?" if near else ""
+            raise InputError(f"--term {stated}: there is no such term.{hint} Terms are {listed}.")
+    return terms
+
+
+def _differs(found: Prediction, level: float) -> bool:
+    """Whether fewer samples than promised are in the band, by more than strokes scatter.
+
+    Each run of one direction is a stroke; the 97.5 % upper limit of their mean share, by Student's
+    t, is below the promised one.
+    """
+    from scipy.special import stdtrit
+
+    known = found.moving & np.isfinite(found.low) & np.isfinite(found.measured)
+    inside = ((found.measured >= found.low) & (found.measured <= found.high))[known]
+    way = np.sign(found.rate[known])
+    strokes = np.cumsum(np.diff(way, prepend=way[:1]) != 0)
+    counts = np.bincount(strokes)
+    if len(counts) < FEWEST_STROKES:
+        return False
+    shares = np.bincount(strokes, inside) / counts
+    reach = float(stdtrit(len(shares) - 1, 0.975)) * float(np.std(shares, ddof=1))
+    return float(np.mean(shares)) + reach / float(np.sqrt(len(shares))) < level
 
 
 def _promise(band: Band) -> str:

@@ -53,7 +53,7 @@ def _parameters(joint: Identified) -> Panel:
     fit = joint.fit
     rows = [
         Row(
-            parameter.name,
+            plain(parameter.name),
             (
                 number(
                     "median", parameter.q50, parameter.unit, low=parameter.q05, high=parameter.q95
@@ -233,7 +233,7 @@ def _promise(log: Held) -> str:
             "positions or loads: the prediction there rests on the form of the law and on what is "
             "not identified, and the band does not hold. Fit a log with such motion as well."
         )
-    if log.share_inside < 0.5:
+    if log.differs:
         return (
             "The log differs from the fitted ones by more than those do among themselves, as after "
             "another set-up or at another temperature: fit several logs that differ so. "

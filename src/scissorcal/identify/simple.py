@@ -6,7 +6,7 @@ import numpy as np
 
 from scissorcal.aliases import Array
 from scissorcal.calibration.result import FitResult
-from scissorcal.model import FrictionLaw, friction_torque, presliding_state
+from scissorcal.model import TERMS, FrictionLaw, friction_torque, presliding_state
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,12 @@ def full_friction(fit: FitResult) -> Array:
 
 
 def stateless_friction(fit: FitResult) -> Array:
-    """As `full_friction`, fully built up at once: what a law without memory gives, (n,)."""
-    series = fit.series
-    friction = friction_torque(law_of(fit), series.opening, series.opening_rate)
+    """As `full_friction`, fully built up at once and without added terms, (n,)."""
+    series, law = fit.series, law_of(fit)
+    plain = FrictionLaw(
+        {name: value for name, value in law.values.items() if name not in TERMS}, law.angle_center
+    )
+    friction = friction_torque(plain, series.opening, series.opening_rate)
     return np.asarray(friction + fit.best.get("offset", 0.0))
 
 

@@ -8,6 +8,8 @@ from scissorcal.errors import InputError
 
 _WORDS = (
     (r"^Imported from", "Read from"),
+    (r"(State it, for example )(?!-u)", r"\1-u "),
+    (r"Set the joint to (\w+)", r"Give --joint \1"),
     (r"'scissorcal import'", "'scissorcal identify'"),
     (r"handle_force needs the handle radius.*", "load needs a column."),
     (r"(\d+) closing and (\d+) opening strokes", r"\1 backward and \2 forward strokes"),
