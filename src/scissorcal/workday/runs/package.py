@@ -12,6 +12,7 @@ from scissorcal.verdicts import Check, Verdict
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.runs.fit import load_result
 from scissorcal.workday.runs.sign import standing_review
+from scissorcal.workday.states import WAITING
 from scissorcal.workday.steps import BY_NAME
 
 if TYPE_CHECKING:
@@ -136,22 +137,22 @@ def built_package(workspace: "Workspace", purpose: str) -> Path:
 
 def current_verdict(engine: Engine) -> Verdict:
     """Whether the workspace's package is of its fits; not evaluated where one of them is gone."""
-    state = engine.state("package build")
-    gone = [
-        item
-        for item in BY_NAME["package build"].inputs
-        if engine.needed(item) and not engine.file(item).is_file()
-    ]
+    fits = [item for item in BY_NAME["package build"].inputs if engine.needed(item)]
+    gone = [item for item in fits if not engine.file(item).is_file()]
     if gone:
         return CURRENT.not_evaluated(
             f"{' and '.join(gone)} of the workspace {'is' if len(gone) == 1 else 'are'} missing, "
             "so whether the package is of its fits is not known: run "
             f"'{engine.leads_to('package build')}', or 'scissorcal fit restore' if it was kept."
         )
-    command = engine.leads_to("package build")
-    stale = f"The package is {state.state}: {state.found}. Run '{command}'."
+    same = engine.facts("package build")["inputs"] == engine.identity("package build")
+    current = same and not any(engine.state(item).state in WAITING for item in fits)
+    stale = (
+        "The package was built from other fits or settings than there are now. Run "
+        f"'{engine.leads_to('package build')}'."
+    )
     why = "The package was built from the workspace's fits as they are now."
-    return CURRENT.judge(float(state.state != "stale"), why, stale)
+    return CURRENT.judge(float(current), why, stale)
 
 
 def _fits(engine: Engine) -> dict[str, Any]:
