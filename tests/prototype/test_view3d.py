@@ -43,7 +43,7 @@ def differ(one: Picture, other: Picture) -> int:
 
 def greenish(shown: Picture) -> int:
     """Pixels of the plate: its colour is the only green one."""
-    return int(np.count_nonzero(shown[..., 1] - shown[..., 0] > 40))
+    return int(np.count_nonzero(shown[..., 1] - shown[..., 0] > 20))
 
 
 def test_blades_sheet_and_crack_are_seen(bed: Bed) -> None:
