@@ -266,7 +266,10 @@ def public_names(room: str) -> dict[str, str]:
     names = sorted((name for name in names if not name.startswith("_")), key=str.lower)
     modules = {path.stem for path in PACKAGE.joinpath(*room.split(".")[1:]).glob("*")}
     # a module of the same name hides the function that the room gives
-    return {name: homes[name] if name in modules else f"{room}.{name}" for name in names}
+    return {
+        name: homes[name] if name in modules and name in homes else f"{room}.{name}"
+        for name in names
+    }
 
 
 def _source(name: str, contract: str) -> str:

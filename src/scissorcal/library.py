@@ -142,7 +142,7 @@ def fit_friction(
     from scissorcal.workday.runs.friction import STREAM
 
     check_effort(effort)
-    settings, run = FitFriction(), FrictionRun(progress=_told(progress))
+    settings, run = FitFriction(), FrictionRun(progress=_with_log(progress))
     if recipe is not None:
         chosen = _recipe(recipe)
         tolerance = 0.01 * chosen.scene.tolerance_percent
@@ -187,7 +187,7 @@ def fit_cut(
             "the fit of fit_friction(), or fits/friction.nc."
         )
     rng = np.random.default_rng([seed, STREAM])
-    run = CutRun(progress=_told(progress))
+    run = CutRun(progress=_with_log(progress))
     return fitted(used, chosen, known, effort=effort, rng=rng, run=run)
 
 
@@ -217,7 +217,7 @@ def _recipe(given: "Recipe | Path | str") -> "Recipe":
     return given if isinstance(given, Recipe) else load_recipe(recipe_file(str(given)))
 
 
-def _told(progress: "Progress | None") -> "Progress":
+def _with_log(progress: "Progress | None") -> "Progress":
     """Tell each new stage to the log, and everything to who follows."""
     last = ""
 

@@ -36,8 +36,10 @@ from .fit_model import Experiment as Experiment
 from .fit_model import FrictionRun as FrictionRun
 from .fit_plots import FitPlots as FitPlots
 from .fit_predict import TorqueBand as TorqueBand
+from .fit_predict import predict_torque as predict_torque
 from .fit_table import FitSummary as FitSummary
 from .fit_table import SummaryRow as SummaryRow
+from .fit_table import summary_of as summary_of
 from .fit_views import check_effort as check_effort
 from .friction.curve import FrictionCurve as FrictionCurve
 from .friction.curve import friction_curve as friction_curve

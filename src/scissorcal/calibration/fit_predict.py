@@ -35,7 +35,7 @@ class TorqueBand:
     probability: float
 
 
-def predict(
+def predict_torque(
     fit: "FitResult", motion: tuple[ArrayLike, ArrayLike, ArrayLike], probability: float
 ) -> TorqueBand:
     """Torque of a ``motion`` (opening, rate, acceleration, which broadcast) with its band.

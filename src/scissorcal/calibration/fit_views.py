@@ -10,10 +10,13 @@ if TYPE_CHECKING:
     import numpy as np
     import xarray
 
-    from scissorcal.calibration import FitResult, FittedParameter
-    from scissorcal.calibration.fit_plots import FitPlots
-    from scissorcal.calibration.fit_predict import TorqueBand
-    from scissorcal.calibration.fit_table import FitSummary
+    from scissorcal.calibration import (
+        FitPlots,
+        FitResult,
+        FitSummary,
+        FittedParameter,
+        TorqueBand,
+    )
 
 
 class FitViews:
@@ -84,7 +87,7 @@ Did you mean "inertia"?
         something else than the quantiles do; the median is always there.
         Raises InputError for a probability outside 0 to 1.
         """
-        from scissorcal.calibration.fit_table import summary_of
+        from scissorcal.calibration import summary_of
 
         return summary_of(self._fit, probability)
 
@@ -104,14 +107,14 @@ Did you mean "inertia"?
         recording may differ by: `scissorcal predict` has a band for new recordings. Raises
         InputError for a cut, whose torque a package predicts.
         """
-        from scissorcal.calibration.fit_predict import predict
+        from scissorcal.calibration import predict_torque
 
-        return predict(self._fit, (opening, rate, acceleration), probability)
+        return predict_torque(self._fit, (opening, rate, acceleration), probability)
 
     @property
     def plot(self) -> "FitPlots":
         """Pictures of this fit: ``fit.plot.torque()`` and others; needs matplotlib."""
-        from scissorcal.calibration.fit_plots import FitPlots
+        from scissorcal.calibration import FitPlots
 
         return FitPlots(self._fit)
 
