@@ -1,6 +1,7 @@
 """Pictures of a fit, drawn with matplotlib into axes that are given or new ones."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,8 @@ MOST_PAIRED = 6
 """Parameters of a pair plot where none are named: the first ones."""
 DATA: dict[str, Any] = {"s": 3.0, "linewidths": 0.0, "color": "tab:gray", "alpha": 0.5}
 BINS = 40
+GAP = 5.0
+"""Steps of time from which on a line of the model is interrupted."""
 
 
 class FitPlots:
@@ -55,7 +58,7 @@ class FitPlots:
             axes.plot(curve.rate[way], curve.friction[way], color="tab:blue", label=label)
         axes.set_xlabel(f"rate ({fit.position_unit}/s)")
         axes.set_ylabel(f"friction ({fit.effort_unit})")
-        axes.legend(frameon=False)
+        axes.legend(frameon=False, markerscale=3.0)
         return axes
 
     def torque(self, axes: "Axes | None" = None) -> "Axes":
@@ -67,17 +70,15 @@ class FitPlots:
         axes = axes or _new_axes()
         opening, measured = _thinned(series.opening, series.measured)
         axes.scatter(opening, measured, label="measured", **DATA)
-        for index, (recording, stroke) in enumerate(self._strokes()):
-            inside = np.flatnonzero((series.recording == recording) & (series.stroke == stroke))
-            order = inside[np.argsort(series.opening[inside], kind="stable")]
-            place = series.opening[order]
-            low, high = series.band_low[order], series.band_high[order]
+        for index, way in enumerate(self._ways()):
+            place = series.opening[way]
+            low, high = series.band_low[way], series.band_high[way]
             axes.fill_between(place, low, high, color="tab:blue", alpha=0.2, linewidth=0.0)
             label = "model, 5 to 95 %" if index == 0 else None
-            axes.plot(place, series.predicted[order], color="tab:blue", linewidth=0.7, label=label)
+            axes.plot(place, series.predicted[way], color="tab:blue", linewidth=0.7, label=label)
         axes.set_xlabel(f"opening ({fit.position_unit})")
         axes.set_ylabel(self._effort)
-        axes.legend(frameon=False)
+        axes.legend(frameon=False, markerscale=3.0)
         return axes
 
     def residuals(self, axes: "Axes | None" = None) -> "Axes":
@@ -92,7 +93,7 @@ class FitPlots:
         axes.axhline(0.0, color="black", linewidth=0.8)
         axes.set_xlabel(f"opening ({fit.position_unit})")
         axes.set_ylabel(f"measured minus model ({fit.effort_unit})")
-        axes.legend(frameon=False)
+        axes.legend(frameon=False, markerscale=3.0)
         return axes
 
     def pairs(self, names: Sequence[str] = ()) -> Any:
@@ -104,7 +105,7 @@ class FitPlots:
         chosen = tuple(names) or tuple(p.name for p in fit.parameters[:MOST_PAIRED])
         draws = {name: fit.sample(name) for name in chosen}
         pyplot, count = _pyplot(), len(chosen)
-        side = 1.6 * count + 1.0
+        side = 2.0 * count + 1.0
         figure, grid = pyplot.subplots(
             count, count, figsize=(side, side), squeeze=False, layout="constrained"
         )
@@ -119,10 +120,11 @@ class FitPlots:
                 else:
                     axes.scatter(*_thinned(draws[other], draws[name]), **DATA)
                 axes.ticklabel_format(scilimits=(-2, 3))
+                axes.tick_params(labelsize="small")
                 if row == count - 1:
-                    axes.set_xlabel(f"{other} ({fit[other].unit})")
+                    axes.set_xlabel(f"{other}\n({fit[other].unit})")
                 if column == 0 and row > 0:
-                    axes.set_ylabel(f"{name} ({fit[name].unit})")
+                    axes.set_ylabel(f"{name}\n({fit[name].unit})")
         figure.align_labels()
         return grid
 
@@ -131,10 +133,16 @@ class FitPlots:
         quantity = "torque" if self._fit.effort_unit == "N m" else "force"
         return f"{quantity} ({self._fit.effort_unit})"
 
-    def _strokes(self) -> list[tuple[int, int]]:
+    def _ways(self) -> list[slice]:
+        """Runs of points that follow each other in time, in one stroke and one direction."""
         series = self._fit.series
-        pairs = np.unique(np.stack([series.recording, series.stroke], axis=1), axis=0)
-        return [(int(recording), int(stroke)) for recording, stroke in pairs]
+        step = np.diff(series.time_s)
+        usual = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else 0.0
+        ends = (np.diff(series.recording) != 0) | (np.diff(series.stroke) != 0)
+        ends |= np.diff(np.sign(series.opening_rate)) != 0
+        ends |= (step > GAP * usual) | (step < 0.0)
+        bounds = [0, *(np.flatnonzero(ends) + 1).tolist(), len(series.time_s)]
+        return [slice(start, end) for start, end in pairwise(bounds) if end - start > 1]
 
 
 def _pyplot() -> Any:
