@@ -34,6 +34,8 @@ ROOMS = (
     "scissorcal.vision",
     "scissorcal.calibration",
     "scissorcal.package",
+    "scissorcal.stated",
+    "scissorcal.examples",
     "scissorcal.identify",
     "scissorcal.tracking",
     "scissorcal.kernel",
