@@ -9,15 +9,16 @@ static const char *const SENTENCES[] = {
     "tick_us is outside 250 to 10,000 us: choose one that the loop and the line keep.",
     "torque_limit is not above 0: state the largest torque at the blades in N m.",
     "force_limit is above 0 exactly where the board has ADVANCE_MOTOR: correct one of the two.",
-    "A lower stop is not below its upper one: state them in rad and m (both advance stops 0 without "
-    "a carriage).",
-    "A resolution is not above 0 or wider than its range: state one encoder step in rad or m.",
+    "opening_min is not below opening_max, or advance_min not below advance_max: state them in rad and "
+    "m (both advance stops 0 without a carriage).",
+    "opening_resolution or advance_resolution is not above 0 or wider than its range: state one encoder "
+    "step in rad or m.",
     "handle_radius is not above 0: state the distance from the pivot to the hand in m.",
-    "A slew limit is not above 0: state how fast torque and force may change.",
+    "torque_slew or force_slew is not above 0: state how fast torque and force may change.",
     "overspeed is not above 0, or below the rate of one encoder step in a tick: raise it or take a "
     "finer encoder.",
-    "A leap is not farther than the blades move in a tick at overspeed plus an encoder step, or the "
-    "carriage's not above one step: raise it.",
+    "opening_leap is not farther than the blades move in a tick at overspeed plus an encoder step, or "
+    "advance_leap not above one step: raise it.",
     "torque_per_A or resistance is not above 0: take them from the motor's data, times or over the "
     "gear's ratio.",
     "torque_limit is above torque_per_A * supply_min / resistance, which is all that the supply can "

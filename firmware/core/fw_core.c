@@ -357,7 +357,7 @@ static void send_state(fw_core *core, const fw_inputs *inputs, const fw_outputs 
     sc_state state;
     state.opening = inputs->opening + core->opening_zero;
     state.cause = core->cause;
-    if (core->phase == FW_UNHOMED && core->home_result != FW_HOME_NOT_TRIED) {
+    if (core->phase == FW_UNHOMED && core->home_result > FW_HOME_FOUND) {
         state.cause = (uint8_t)(FW_CAUSE_HOME + core->home_result);
     }
     state.flags = state_flags(core, inputs, state.opening);

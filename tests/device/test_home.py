@@ -6,10 +6,18 @@ import numpy as np
 import pytest
 
 from scissorcal.device import Faults, LockstepLink, Operator, RigSession, SimProcess, open_link
-from scissorcal.device.home import home
+from scissorcal.device.home import WHY_GAVE_UP, home
 from scissorcal.device.probe.probe import probe
 from scissorcal.errors import DeviceError, InputError
-from scissorcal.kernel import ConfigKey, FaultCause, State, StateFlag, decode
+from scissorcal.kernel import (
+    HOME_CAUSE,
+    ConfigKey,
+    FaultCause,
+    HomeResult,
+    State,
+    StateFlag,
+    decode,
+)
 from scissorcal.recipe import builtin_recipe
 from tests.strange_device import Faults as StrangeFaults
 from tests.strange_device import StrangeDevice, VirtualPort, serve_on_pty
@@ -87,7 +95,9 @@ def test_an_interrupted_search_is_stopped() -> None:
 
 def test_a_search_without_a_zero_is_told() -> None:
     device = StrangeDevice(StrangeFaults(not_homed=True, home_finds=False), version=2)
-    with pytest.raises(DeviceError, match=r"gave up after 1.5 s without finding its zero"):
+    with pytest.raises(
+        DeviceError, match=r"gave up after 1.5 s without finding its zero: the blades moved, "
+    ):
         home(VirtualPort(device), Operator(lambda request: None))
 
 
@@ -151,3 +161,25 @@ def test_a_virtual_rig_on_a_port_is_homed() -> None:
         open_link(sim.port) as link,
     ):
         assert not home(link).was_homed
+
+
+@pytest.mark.parametrize(
+    ("result", "why"),
+    [
+        (HomeResult.STOPPED, "it was told to stop"),
+        (HomeResult.TIMED_OUT, "the blades moved, but did not meet it in time"),
+        (HomeResult.JAMMED, "its motor did not move the blades"),
+        (HomeResult.FAULT, "a fault ended the search"),
+    ],
+)
+def test_each_end_of_a_search_has_its_sentence(result: HomeResult, why: str) -> None:
+    assert WHY_GAVE_UP[HOME_CAUSE + result].startswith(why)
+
+
+def test_a_virtual_rig_states_why_it_gave_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("scissorcal.device.sim.homing.TIMEOUT_S", 0.2)
+    with (
+        rig(not_homed=True) as link,
+        pytest.raises(DeviceError, match=r"finding its zero: the blades moved, but did not meet"),
+    ):
+        home(link)

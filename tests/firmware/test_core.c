@@ -257,6 +257,54 @@ static void check_speed_and_leap(void)
     CHECK(r.state.cause == SC_CAUSE_NONE, "cleared");
 }
 
+/* One tick at this clock and place. */
+static void measured_at(rig *r, uint32_t us, float opening)
+{
+    r->in.inputs.device_us = us - r->board.tick_us; /* tick adds it again */
+    r->in.inputs.opening = opening;
+    commanded_ticks(r, 1, ENABLE, 0.0f);
+}
+
+/* A computer that is disturbed measures late, and then several times in a row; across the clock's end. */
+static void check_bursts(void)
+{
+    rig r;
+    const fw_board board = sound_board();
+    start_streaming(&r, &board);
+    const float rate = 8.0f; /* rad/s, of 25 */
+    uint32_t us = 0xFFFF0000u, passed = 0;
+    measured_at(&r, us, 0.1f);
+    commanded_ticks(&r, 40, ENABLE | CLEAR, 0.0f);
+    CHECK(r.state.cause == SC_CAUSE_NONE, "at rest");
+    us = r.in.inputs.device_us;
+    for (int i = 0; i < 60; i++) {
+        const uint32_t step = i % 12 == 0 ? 15000u : 20u; /* 15 ms late, then 11 measurements at once */
+        passed += step;
+        measured_at(&r, us + passed, 0.1f + rate * 1e-6f * (float)passed);
+        CHECK(r.state.cause == SC_CAUSE_NONE && has(&r, SC_STATE_MOTOR_ENABLED), "8 rad/s in bursts");
+    }
+    NEAR(r.core.rate, 8.0, 0.3, "rate", "by the clock");
+    const float last = r.in.inputs.opening;
+    measured_at(&r, us + passed + 20u, last + 0.11f);
+    CHECK(r.state.cause == SC_CAUSE_ENCODER, "a leap is one in a short tick, too");
+
+    start_streaming(&r, &board); /* a clock that stands: the table's tick */
+    us = r.in.inputs.device_us;
+    for (int i = 0; i < 12; i++) {
+        measured_at(&r, us, 0.5f - 0.03f * (float)i);
+    }
+    CHECK(r.state.cause == SC_CAUSE_SPEED, "30 rad/s by the tick");
+
+    start_streaming(&r, &board); /* too fast in bursts, too */
+    us = r.in.inputs.device_us;
+    passed = 0;
+    for (int i = 0; i < 72; i++) {
+        passed += i % 12 == 0 ? 2000u : 20u;
+        measured_at(&r, us + passed, 0.5f - 30e-6f * (float)passed);
+    }
+    CHECK(r.state.cause == SC_CAUSE_SPEED, "30 rad/s by the clock");
+}
+
 static void check_heat(void)
 {
     rig r;
@@ -351,6 +399,7 @@ static void check_homing(void)
         CHECK(has(&r, SC_STATE_NOT_HOMED) && r.state.cause == SC_CAUSE_ENCODER, "a leap: no zero");
         commanded_ticks(&r, 20, ENABLE | CLEAR, 0.1f);
         CHECK(r.out.phase == FW_UNHOMED && r.out.outputs.drive == FW_RELEASE, "home again first");
+        CHECK(r.state.cause == SC_CAUSE_NONE, "no search failed");
     }
     board.home_at_stop = 1;
     board.home_opening = 1.0f;
@@ -372,20 +421,25 @@ static void check_homing_that_fails(void)
     blades jammed = {0.3f, 0.0f, 0.0f, 0.06f};
     home(&r, &jammed, &board, 0.05f);
     CHECK(r.out.home_result == FW_HOME_JAMMED && r.out.phase == FW_UNHOMED, "jammed");
+    CHECK(r.state.cause == FW_CAUSE_HOME + FW_HOME_JAMMED, "the host reads why");
+    CHECK(!has(&r, SC_STATE_FAULT_LATCHED) && has(&r, SC_STATE_NOT_HOMED), "which is no fault");
     board.home_torque = -0.05f;
     blades wrong_way = {0.3f, 0.0f, 0.0f, 0.01f};
     home(&r, &wrong_way, &board, 0.05f);
     CHECK(r.out.home_result == FW_HOME_TIMED_OUT, "no switch that way");
     CHECK(has(&r, SC_STATE_NOT_HOMED) && !has(&r, SC_STATE_HOMING), "flags");
+    CHECK(r.state.cause == FW_CAUSE_HOME + FW_HOME_TIMED_OUT, "why");
     set(&r, SC_KEY_HOME, 1.0f);
     ticks(&r, 2);
     r.in.inputs.flags = FW_IN_STOP_BUTTON;
     tick(&r);
     CHECK(r.out.home_result == FW_HOME_FAULT && r.out.outputs.drive == FW_BRAKE, "stop button");
+    CHECK(r.state.cause == SC_CAUSE_STOP_BUTTON, "a fault's own cause comes first");
     r.in.inputs.flags = 0;
     command(&r, CLEAR, 0.0f);
     tick(&r);
     CHECK(r.out.phase == FW_UNHOMED, "cleared, still without a zero");
+    CHECK(r.state.cause == FW_CAUSE_HOME + FW_HOME_FAULT, "why");
     set(&r, SC_KEY_HOME, 1.0f);
     ticks(&r, 2);
     set(&r, SC_KEY_HOME, 0.0f);
@@ -541,6 +595,7 @@ int main(void)
     check_causes();
     check_numbers_that_are_none();
     check_speed_and_leap();
+    check_bursts();
     check_heat();
     check_homing();
     check_homing_that_fails();

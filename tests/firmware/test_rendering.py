@@ -176,13 +176,43 @@ def test_a_hosts_silence_is_not_felt_for_two_seconds_and_then_it_brakes() -> Non
     assert [state.motor_torque for state in silent[:braked]] == step["torque"][1:].tolist()
 
 
+def braked_after(bench: Bench, ticks: int) -> int:
+    """Ticks of silence until the fault."""
+    silent = closing(bench, ticks)
+    return next(i for i, state in enumerate(silent) if state.flags & StateFlag.FAULT_LATCHED)
+
+
+def test_after_the_silence_only_render_renders_again_and_bears_two_seconds() -> None:
+    bench = loaded()
+    bench.tick(ENABLE)
+    assert braked_after(bench, RENDER_SILENCE_TICKS + 10) == RENDER_SILENCE_TICKS - 1
+    assert not rendering(bench.state(CLEAR))
+    assert braked_after(bench, 20) <= 10
+    bench.tick(CLEAR)
+    assert bench.configure(ConfigKey.RENDER, 1.0).status == ConfigStatus.OK
+    bench.tick(ENABLE)
+    assert braked_after(bench, RENDER_SILENCE_TICKS + 10) == RENDER_SILENCE_TICKS - 1
+
+
+def test_five_seconds_without_a_frame_end_render_and_keep_the_package() -> None:
+    bench = loaded()
+    bench.tick(ENABLE._replace(flags=0))
+    for _ in range(5000):
+        bench.tick()
+    bench.configure(ConfigKey.STREAM, 1.0)
+    state = bench.state(ENABLE)
+    assert state.flags & StateFlag.MOTOR_ENABLED
+    assert not rendering(state)
+    bench.tick(ENABLE._replace(flags=0))
+    assert bench.load(LoadCommit(0)).crc32 != 0
+    assert bench.configure(ConfigKey.RENDER, 1.0).status == ConfigStatus.OK
+
+
 def test_without_render_the_same_silence_brakes_within_ten_milliseconds() -> None:
     bench = loaded()
     bench.configure(ConfigKey.RENDER, 0.0)
     bench.tick(ENABLE)
-    silent = closing(bench, 20)
-    braked = next(i for i, state in enumerate(silent) if state.flags & StateFlag.FAULT_LATCHED)
-    assert braked <= 10
+    assert braked_after(bench, 20) <= 10
 
 
 @pytest.mark.parametrize(
@@ -204,9 +234,16 @@ def test_what_stops_the_motors_stops_a_rendering_in_its_tick(
     for _ in range(20):
         bench.tick(ENABLE)
     assert bench.out.drive is Drive.BRAKE
+    assert bench.configure(ConfigKey.RENDER, 1.0).status == ConfigStatus.VALUE_REFUSED
     first = bench.state(CLEAR)
-    assert 0.0 < first.motor_torque < 0.02 * before
-    assert rendering(first)
+    assert first.flags & StateFlag.MOTOR_ENABLED
+    assert (first.motor_torque, rendering(first)) == (0.0, False)
+    bench.tick(ENABLE)
+    assert not rendering(bench.state(ENABLE))
+    assert bench.configure(ConfigKey.RENDER, 1.0).value == 1.0
+    again = bench.state(ENABLE)
+    assert 0.0 < again.motor_torque < 0.05 * before
+    assert rendering(again)
 
 
 def test_a_device_that_lost_power_while_rendering_has_no_package_and_says_so_when_asked() -> None:
@@ -230,10 +267,13 @@ def test_the_boards_limits_bound_what_is_rendered() -> None:
 
 def test_an_encoder_that_is_no_number_gives_no_torque_and_no_damage() -> None:
     bench = loaded()
-    before = torque_of(bench)
+    assert torque_of(bench) > 0.01
+    bench.configure(ConfigKey.RENDER, 1.0)  # a fresh sheet, as the one below
+    before = bench.state(ENABLE).motor_torque
     good, bench.opening = bench.opening, math.nan
     assert bench.tick(ENABLE)[1].torque == 0.0
     bench.opening = good
     for _ in range(300):
         bench.tick(CLEAR)
+    bench.configure(ConfigKey.RENDER, 1.0)
     assert bench.state(ENABLE).motor_torque == pytest.approx(before, rel=1e-6)

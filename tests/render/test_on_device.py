@@ -267,6 +267,26 @@ def test_a_loss_of_power_while_rendering_ends_it_and_is_named(
     assert in_force(link) == 0
 
 
+def test_a_fault_that_the_host_clears_ends_the_rendering_and_is_named(
+    paper: ModelPackage, tmp_path: Path
+) -> None:
+    """The loop clears the watchdog's fault; the package's torque does not come back by itself."""
+    link, side = device()
+    blocks = 0
+
+    def progress(done: float, sentence: str, *_: object) -> None:
+        nonlocal blocks
+        blocks += "rendering" in sentence
+        if blocks == 4:
+            for _ in range(2100):  # without a COMMAND
+                side.tick()
+
+    session = RigSession(link, paper.recipe, Operator(progress=progress))
+    with pytest.raises(DeviceError, match="ended its rendering"):
+        render(session, paper, Rendering(20.0, TWO, on_device=True))
+    assert side.drawn.torque[-1] == 0.0
+
+
 def test_a_rendering_that_was_cut_off_adds_nothing_to_what_runs_next(
     silent_paper: ModelPackage,
 ) -> None:

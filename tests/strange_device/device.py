@@ -91,6 +91,7 @@ class StrangeDevice:
         self._fault_given = False
         self._cause = self._hold = 0
         self._homed, self._homing_s = not self.faults.not_homed, 0.0
+        self._home_ended = 0
         self._silence_s = 0.0
         self._brake_after_ms = self.faults.brake_after_ms
         self._streaming = False
@@ -126,7 +127,15 @@ class StrangeDevice:
     def _latch(self, cause: int) -> None:
         self._cause = self._cause if self._fault else cause
         self._fault = True
+        self._end_search(wire.HOME_FAULT)
+
+    def _end_search(self, why: int) -> None:
+        self._home_ended = why if self._homing_s > 0.0 else self._home_ended
         self._homing_s = 0.0
+
+    def _stated_cause(self) -> int:
+        without_zero = not (self._homed or self._homing_s > 0.0)
+        return self._cause or (self._home_ended if without_zero else 0)
 
     def _configured(self, key: int, nonce: int, value: float) -> bytes:
         status, in_force = 1, 0.0
@@ -143,7 +152,9 @@ class StrangeDevice:
             fits = value == 0.0 or (value == 1.0 and not self._fault and not self._enabled)
             status = 0 if fits else 2
             if fits:
+                self._end_search(wire.HOME_STOPPED)
                 self._homing_s = HOMING_S if value else 0.0
+                self._home_ended = 0 if value else self._home_ended
                 self._homed = self._homed and not value
             in_force = float(self._homing_s > 0.0)
         return struct.pack("<BBHIf", wire.CONFIG_ECHO, status, key, nonce, in_force)
@@ -174,6 +185,7 @@ class StrangeDevice:
         if self._homing_s > 0.0:
             self._homing_s -= self.tick_s
             self._homed = self._homing_s <= 0.0 and f.home_finds
+            self._home_ended = wire.HOME_TIMED_OUT if self._homing_s <= 0.0 else 0
         silent = 1e3 * self._silence_s >= self._brake_after_ms - 1e-9
         if self._enabled and silent and not f.watchdog_deaf:
             self._lost = True
@@ -262,7 +274,7 @@ class StrangeDevice:
         state = struct.pack(
             "<BBHIIffff",
             wire.STATE,
-            self._cause if self.version >= 2 else 0,
+            self._stated_cause() if self.version >= 2 else 0,
             flags,
             self._sequence & 0xFFFFFFFF,
             clock,

@@ -9,7 +9,15 @@ from scissorcal.device.link import Link
 from scissorcal.device.probe.talk import RELEASE, Bounds, Stage, Talk
 from scissorcal.device.session import Operator, is_simulator, refuse_nobody
 from scissorcal.errors import DeviceError
-from scissorcal.kernel import Capability, ConfigKey, Identity, State, StateFlag
+from scissorcal.kernel import (
+    HOME_CAUSE,
+    Capability,
+    ConfigKey,
+    HomeResult,
+    Identity,
+    State,
+    StateFlag,
+)
 
 LONGEST_S = 60.0
 """A device ends its search by itself; what takes longer is stopped."""
@@ -24,6 +32,21 @@ REQUEST = (
 CARRIAGE = ", and the carriage may do the same"
 RANGE_RAD = 0.05
 """Openings may lie so far beyond the stops that the device states (docs/protocol.md)."""
+WHY_GAVE_UP = {
+    HOME_CAUSE + HomeResult.STOPPED: "it was told to stop, or heard nothing of this computer for "
+    "5 s. Check the cable, and that no other program uses the port",
+    HOME_CAUSE + HomeResult.TIMED_OUT: "the blades moved, but did not meet it in time. Check its "
+    "home switch where it has one, and that home lies the way they moved",
+    HOME_CAUSE + HomeResult.JAMMED: "its motor did not move the blades. Check that nothing blocks "
+    "them, that the motor has its supply, and that its torque for homing exceeds friction",
+    HOME_CAUSE + HomeResult.FAULT: "a fault ended the search. Look for what the device was stopped "
+    "by",
+}
+"""By the ``cause`` of a STATE after a search without a zero; other devices state none."""
+GAVE_UP = (
+    "Check that nothing blocks the blades on their way to the stop, that the motor turns them, and "
+    "its home switch where it has one"
+)
 
 
 @dataclass(frozen=True)
@@ -107,10 +130,10 @@ def _check(last: State, identity: Identity, seconds: float) -> None:
             "that the blades can reach their stop, and its home switch where it has one."
         )
     if last.flags & StateFlag.NOT_HOMED:
+        why = WHY_GAVE_UP.get(last.cause)
         raise DeviceError(
-            f"The device gave up after {seconds:.1f} s without finding its zero. Check that "
-            "nothing blocks the blades on their way to the stop, that the motor turns them, and "
-            "its home switch where it has one; then run 'scissorcal device home' again."
+            f"The device gave up after {seconds:.1f} s without finding its zero"
+            f"{f': {why}' if why else f'. {GAVE_UP}'}; then run 'scissorcal device home' again."
         )
     low, high = identity.opening_min - RANGE_RAD, identity.opening_max + RANGE_RAD
     if not low <= last.opening <= high:

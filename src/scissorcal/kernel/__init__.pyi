@@ -15,6 +15,7 @@ from .cut_fit import CutFitParameters as CutFitParameters
 from .cut_fit import cut_log_likelihood as cut_log_likelihood
 from .cut_fit import cut_log_likelihoods as cut_log_likelihoods
 from .cut_fit import walk_crack as walk_crack
+from .firmware import HOME_CAUSE as HOME_CAUSE
 from .firmware import RECORD_BYTES as RECORD_BYTES
 from .firmware import Drive as Drive
 from .firmware import FirmwareBoard as FirmwareBoard

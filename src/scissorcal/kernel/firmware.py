@@ -39,6 +39,10 @@ class HomeResult(IntEnum):
     FAULT = 5
 
 
+HOME_CAUSE = 64
+"""Added to a `HomeResult`: ``cause`` of a STATE without a zero and without a fault."""
+
+
 class InputFlag(IntFlag):
     """What a board reports beside numbers."""
 

@@ -158,7 +158,10 @@ def render(
             for samples in rendered:
                 if follower:
                     follower.follow(motion, samples)
-                if watch.take(samples):
+                done = watch.take(samples)
+                if by_device:
+                    on_device.check_renders(samples)
+                if done:
                     break
         for samples in motion.idle(LOOK_EVERY_S):
             watch.record(samples)

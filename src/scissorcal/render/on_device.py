@@ -3,10 +3,13 @@
 from dataclasses import replace
 from typing import NamedTuple
 
-from scissorcal.device.motion import DEADLINE
+import numpy as np
+
+from scissorcal.device.motion import DEADLINE, Samples
 from scissorcal.device.session import RigSession
 from scissorcal.device.upload import load_image
-from scissorcal.kernel import ModelTables, ServoConfig
+from scissorcal.errors import DeviceError
+from scissorcal.kernel import ModelTables, ServoConfig, StateFlag
 from scissorcal.package import ModelPackage, image_of
 from scissorcal.render.result import PASSIVITY
 from scissorcal.verdicts import Verdict
@@ -46,6 +49,17 @@ def watching(config: ServoConfig) -> ServoConfig:
     """Configure a servo that watches: work is that of the torque that the device states."""
     energy = replace(config.passivity, is_measured=True, most_damping=0.0)
     return replace(config, supervisor_ms=SUPERVISOR_MS, passivity=energy)
+
+
+def check_renders(samples: Samples) -> None:
+    """Raise DeviceError where the device's motors are on and it renders no more."""
+    flags = samples["flags"]
+    driven = (flags & int(StateFlag.MOTOR_ENABLED)) != 0
+    if np.any(driven & ((flags & int(StateFlag.RENDERING)) == 0)):
+        raise DeviceError(
+            "The device ended its rendering: it latched a fault, as it does after 2 s without a "
+            "command of this computer. Close other programs, and start the rendering again."
+        )
 
 
 def watched_verdicts(verdicts: tuple[Verdict, ...]) -> tuple[Verdict, ...]:

@@ -3,6 +3,7 @@
 import math
 
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
+from scissorcal.kernel import HOME_CAUSE, HomeResult
 
 SPEED_rad_per_s = 0.3
 TORQUE_SHARE = 0.3
@@ -20,6 +21,7 @@ class Homing:
     """
 
     _last: float
+    _began: float
     _held: float
     _still_s: float
     _passed_s: float
@@ -28,9 +30,11 @@ class Homing:
         self._rig = rig
         self.homed = homed
         self.active = False
+        self._result = HomeResult.NOT_TRIED
         self._zero = 0.0 if homed else rig.opening
         mechanism = rig.specimen.mechanism
         self._low = math.radians(mechanism.opening_range_deg[0])
+        self._step = rig.specimen.sensors.opening_step_rad
         self._largest = TORQUE_SHARE * rig.specimen.motor.torque_limit_Nm
         # a quarter of what brakes the blades within one tick: stable with a delay of a tick or two
         self._damping = mechanism.inertia_kg_m2 / (4.0 * TICK_S)
@@ -39,11 +43,19 @@ class Homing:
     def start(self) -> None:
         """Begin to look for the zero; the old one counts no more."""
         self.homed, self.active = False, True
+        self._result = HomeResult.NOT_TRIED
         self._begin_at(self._rig.opening)
 
-    def stop(self) -> None:
-        """Stop looking."""
+    def stop(self, result: HomeResult = HomeResult.STOPPED) -> None:
+        """Stop looking, for this reason."""
+        self._result = result if self.active else self._result
         self.active = False
+
+    @property
+    def cause(self) -> int:
+        """What a STATE says of a search that ended without a zero, 0 without one."""
+        ended = not (self.homed or self.active) and self._result is not HomeResult.NOT_TRIED
+        return HOME_CAUSE + self._result if ended else 0
 
     def opening(self, measured: float) -> float:
         """The opening (rad) as the device states it, of a measured place of the blades."""
@@ -65,9 +77,10 @@ class Homing:
             self.homed, self.active = True, False
             self._zero = place - self._low
         elif self._passed_s >= TIMEOUT_S:
-            self.active = False
+            moved = abs(place - self._began) > self._step
+            self.stop(HomeResult.TIMED_OUT if moved else HomeResult.JAMMED)
         return min(max(self._held + self._damping * error, -most), most) if self.active else 0.0
 
     def _begin_at(self, place: float) -> None:
-        self._last = place
+        self._last = self._began = place
         self._held = self._still_s = self._passed_s = 0.0

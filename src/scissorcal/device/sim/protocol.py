@@ -48,6 +48,7 @@ from scissorcal.kernel import (
     FaultCause,
     FrameDecoder,
     Hello,
+    HomeResult,
     Identity,
     LoadBegin,
     LoadChunk,
@@ -181,7 +182,7 @@ class RigProtocol:
                 measured.advance,
                 given if self.faults.unmeasured_torque else measured.motor_torque,
                 measured.handle_force,
-                cause=int(self._cause or 0) if self._version >= PROTOCOL_VERSION else 0,
+                cause=int(self._cause or homing.cause) if self._version >= PROTOCOL_VERSION else 0,
             )
         )
 
@@ -280,7 +281,7 @@ class RigProtocol:
     def _latch(self, cause: FaultCause) -> None:
         """The first cause stands until the fault is cleared."""
         self._cause = self._cause or cause
-        self._homing.stop()
+        self._homing.stop(HomeResult.FAULT)
 
     def _present_cause(self) -> FaultCause | None:
         """What would latch a fault now, apart from missing commands."""
