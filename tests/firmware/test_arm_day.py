@@ -1,8 +1,9 @@
-"""The flashed binary as the device of a day: probe, captures and fits, in lockstep."""
+"""The flashed binary as the device of a day in lockstep: probe, captures, fits, rendering."""
 
 import time
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,8 +48,11 @@ class EmulatedSide(FirmwareSide):
 def test_a_day_through_the_flashed_binary(
     stm32f405: Image, cli: Cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    through = partial(LockstepLink, device=partial(EmulatedSide, stm32f405))
-    monkeypatch.setattr(lockstep, "LockstepLink", through)
+    class Through(LockstepLink):
+        def __init__(self, *words: Any, **options: Any) -> None:
+            super().__init__(*words, device=partial(EmulatedSide, stm32f405), **options)
+
+    monkeypatch.setattr(lockstep, "LockstepLink", Through)
     workspace = Workspace(tmp_path / "paper")
     assert cli("init", workspace.root, "--recipe", "paper-80gsm").code == 0
     monkeypatch.chdir(workspace.root)
@@ -57,9 +61,17 @@ def test_a_day_through_the_flashed_binary(
         ("capture", "friction", "--device", "sim"),
         ("capture", "cut", "--device", "sim"),
         ("fit",),
+        ("report",),
+        ("package", "build"),
+        ("render", "--device", "sim", "--yes"),
     ):
+        before = EmulatedSide.ticks
         said = cli(*words)
         assert said.code == 0, (words, said.out, said.err)
+        if words[0] in ("device", "capture", "render"):
+            assert EmulatedSide.ticks > before + 1000, words
+    (rendered,) = workspace.recordings("render")
+    assert rendered.stat().st_size > 0
     assert EmulatedSide.ticks > 10_000
     print(f"{EmulatedSide.ticks} ticks, {EmulatedSide.ticks / EmulatedSide.spent_s:.0f} a second")
     specimen = load_specimen(SPECIMEN)

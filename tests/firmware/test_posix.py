@@ -62,9 +62,6 @@ class Person:
         time.sleep(1.0)
 
 
-@pytest.mark.skip(
-    reason="no run has passed yet: the one that reached the fit failed its check bandwidth"
-)
 def test_probe_friction_and_fit_through_the_process(
     board: subprocess.Popen[str], tmp_path: Path
 ) -> None:
