@@ -176,7 +176,7 @@ def test_before_the_first_step_nothing_has_moved(unpacked: Path, package: ModelP
         assert run.step(0, place)[2] == kernel.crack
 
 
-@pytest.mark.parametrize("draw", [0, 7])
+@pytest.mark.parametrize("draw", [0, 7, 200])
 def test_a_draw_is_simulated_by_its_index(unpacked: Path, package: ModelPackage, draw: int) -> None:
     tables = draw_tables(package)
     places = stroke(package)
@@ -188,6 +188,15 @@ def test_a_draw_is_simulated_by_its_index(unpacked: Path, package: ModelPackage,
     assert np.array_equal(found, kernel_steps(Kernel(tables.models[draw]), places))
     assert not np.array_equal(found, kernel_steps(package.kernel(), places))
     assert np.array_equal(stated, tables.parameters[1 + draw])
+
+
+def test_the_largest_index_holds_the_posterior_means(package: ModelPackage) -> None:
+    tables, record = draw_tables(package), package.manifest.provenance
+    assert record.friction is not None
+    fitted = (*record.cut.parameters, *record.friction.parameters)
+    wanted = [p.mean for p in fitted]
+    assert tables.parameters[-1] == pytest.approx(wanted, rel=1e-12)
+    assert not np.array_equal(tables.parameters[-1], tables.parameters[0])
 
 
 def test_draws_tables_follow_the_exact_law_of_their_draw(pad: PackageSummary) -> None:
@@ -259,10 +268,10 @@ def test_an_input_that_cannot_be_evaluated_is_a_warning(
 
 def test_parameters_are_set_before_a_run_and_draws_exist(unpacked: Path) -> None:
     with running(unpacked) as run:
-        for draw in (-2, 200):
+        for draw in (-2, 201):
             with pytest.raises(FMICallException):
                 run.slave.setInt32([NAMES.index("draw")], [draw])
-        run.start(draw=199)
+        run.start(draw=200)
         for name, setter in (("draw", "setInt32"), ("crack_start", "setFloat64")):
             with pytest.raises(FMICallException):
                 getattr(run.slave, setter)([NAMES.index(name)], [0])

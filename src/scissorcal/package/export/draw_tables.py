@@ -1,13 +1,16 @@
 """The tables of each posterior draw, on the knots of the package's own."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from scissorcal.aliases import Array
+from scissorcal.calibration.parameters import moments_agree
 from scissorcal.kernel import ModelTables, Table
 from scissorcal.package.model_package import ModelPackage
+from scissorcal.package.records import Parameter
 from scissorcal.package.variations import central_values, variations
 
 STEEPEST = 3.0
@@ -17,11 +20,12 @@ STEEPEST = 3.0
 
 @dataclass(frozen=True)
 class DrawTables:
-    """Models of a package's draws, and their parameters.
+    """Models of a package's draws and of its posterior means, and their parameters.
 
-    ``models`` has one for each draw, ``varied`` the tables that differ between them. ``parameters``
-    (1 + draws, parameters) begins with the package's own; ``limited`` counts the draws of which a
-    response's slope was held to what keeps it from falling.
+    ``models`` has one for each draw and then that of the means, ``varied`` the tables that differ
+    between them. ``parameters`` (1 + draws + 1, parameters) begins with the package's own;
+    ``limited`` counts the models of which a response's slope was held to what keeps it from
+    falling.
     """
 
     models: tuple[ModelTables, ...]
@@ -31,7 +35,7 @@ class DrawTables:
 
 
 def draw_tables(package: ModelPackage) -> DrawTables:
-    """The exact law of each draw where the package's tables have their knots.
+    """The exact law of each draw, and at the means, where the package's tables have their knots.
 
     The knots were chosen for the package's own parameters, so that the bound of its tables holds
     for these alone. Laws that no draw changes keep the package's tables.
@@ -41,6 +45,11 @@ def draw_tables(package: ModelPackage) -> DrawTables:
     if friction_draws is not None:
         cut = cut[: len(friction_draws)]
         friction_draws = friction_draws[: len(cut)]
+    record = package.manifest.provenance
+    cut = np.vstack([cut, _means(record.cut.parameters)])
+    if friction_draws is not None:
+        assert record.friction is not None
+        friction_draws = np.vstack([friction_draws, _means(record.friction.parameters)])
     law = variations(package, cut, friction_draws)
     own, limited = package.tables, 0
     varied = [
@@ -70,6 +79,13 @@ def draw_tables(package: ModelPackage) -> DrawTables:
     columns = cut if friction_draws is None else np.hstack([cut, friction_draws])
     return DrawTables(
         tuple(models), tuple(varied), np.vstack([np.concatenate(centre), columns]), limited
+    )
+
+
+def _means(parameters: Sequence[Parameter]) -> Array:
+    """Posterior means; the median where mean and sd do not say what the quantiles say."""
+    return np.array(
+        [p.mean if moments_agree(p.mean, p.sd, p.q05, p.q95) else p.q50 for p in parameters]
     )
 
 

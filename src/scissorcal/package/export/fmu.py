@@ -76,7 +76,7 @@ def build_fmu(package: ModelPackage, facts: ExportFacts) -> Fmu:
     files["documentation/index.html"] = _page(facts).encode()
     files["documentation/licenses/license.txt"] = (C_FILES / "LICENSE").read_bytes()
     return Fmu(
-        _zipped(files), tuple(binaries), len(draws.models), (*refused, *_notes(binaries, draws))
+        _zipped(files), tuple(binaries), len(draws.models) - 1, (*refused, *_notes(binaries, draws))
     )
 
 
@@ -89,8 +89,8 @@ def _notes(binaries: Mapping[str, object], draws: DrawTables) -> tuple[str, ...]
         )
     if draws.limited:
         notes.append(
-            f"The response of {draws.limited} of {len(draws.models)} draws was held to slopes with "
-            "which it never falls between the package's knots."
+            f"The response of {draws.limited} of {len(draws.models)} models was held to slopes "
+            "with which it never falls between the package's knots."
         )
     return tuple(notes)
 

@@ -54,7 +54,7 @@ def start_values(facts: ExportFacts) -> tuple[float, float]:
 
 
 def model_description(facts: ExportFacts, draws: int) -> bytes:
-    """modelDescription.xml of an FMU with that many draws."""
+    """modelDescription.xml of an FMU with that many draws, that of the means among them."""
     manifest, own = facts.manifest, parameters(facts)
     root = Xml.Element(
         "fmiModelDescription",
@@ -108,7 +108,10 @@ def _units(parent: Xml.Element) -> None:
 _FIXED = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
 _CALCULATED = {"causality": "output", "initial": "calculated"}
 _FLAGS = "1 invalid, 2 touching, 4 advanced, 8 out of range, 16 beyond tip, 32 not cutting"
-_DRAW = "index of the posterior draw that is simulated; -1: the package's own parameters"
+_DRAW = (
+    "index of the posterior draw that is simulated; -1: the package's own parameters; the largest: "
+    "the posterior means (medians where a mean and an sd do not describe the posterior)"
+)
 
 
 def _variables(
