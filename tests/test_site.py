@@ -127,6 +127,27 @@ def test_what_a_class_inherits_stands_on_its_page(site: Path) -> None:
         assert f"scissorcal.recording.RecordingWriter.{member}" in page.anchors, member
 
 
+ANSWERS = {
+    "which friction law": "faq.html",
+    "it buzzes": "how-to/troubleshoot.html",
+    "intervals are wide": "how-to/troubleshoot.html",
+}
+
+
+def test_the_search_answers_a_newcomer_without_a_server(site: Path) -> None:
+    from tests.browser import open_browser
+
+    with open_browser() as chromium:
+        for question, answer in ANSWERS.items():
+            page = chromium.new_context(offline=True).new_page()
+            page.goto((site / "index.html").as_uri())
+            page.locator(".md-search__input").click()
+            page.keyboard.type(question)
+            first = page.locator(".md-search-result__item a").first
+            first.wait_for(state="attached")
+            assert answer in str(first.get_attribute("href")), question
+
+
 DEAD = {
     "[a page](missing.md)": "missing.md",
     "[a heading](index.md#nothing-here)": "nothing-here",
@@ -141,7 +162,7 @@ def test_a_dead_link_stops_the_build(tmp_path: Path) -> None:
         shutil.copytree(ROOT / name, tmp_path / name)
     for name in ("src", "benchmarks", "tests", "recipes", ".ci"):
         (tmp_path / name).symlink_to(ROOT / name)
-    for path in [*ROOT.glob("*.md"), ROOT / "mkdocs.yml", ROOT / "LICENSE"]:
+    for path in [p for p in ROOT.iterdir() if p.is_file()]:
         shutil.copy(path, tmp_path / path.name)
     *inside, outside = DEAD
     page = tmp_path / "docs" / "bridge.md"
