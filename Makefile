@@ -69,7 +69,7 @@ schemas-check: $(STAMP)
 
 # The documentation as a site, in site/: it opens from a file, with search. A dead link fails.
 docs: $(STAMP)
-	NO_MKDOCS_2_WARNING=1 $(RUN)/mkdocs build --quiet
+	NO_MKDOCS_2_WARNING=1 $(RUN)/mkdocs build
 
 # Every picture of README and documentation, from the tutorials' own commands; needs Chromium.
 pictures: $(STAMP) page
