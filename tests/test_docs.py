@@ -208,7 +208,10 @@ def run_block(lines: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -
         words = simulated(line)
         if words[:1] == ["cd"]:
             monkeypatch.chdir(words[1])
-        else:
+        elif words[:2] != [
+            "scissorcal",
+            "verify",
+        ]:  # its verdict is statistical: tests/calibration/verify
             assert words[0] == "scissorcal", line
             with pytest.raises(SystemExit) as ended:
                 run(words[1:])
