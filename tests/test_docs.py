@@ -211,7 +211,7 @@ def run_block(lines: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -
         elif words[:2] != [
             "scissorcal",
             "verify",
-        ]:  # its verdict is statistical: tests/calibration/verify
+        ]:  # statistics
             assert words[0] == "scissorcal", line
             with pytest.raises(SystemExit) as ended:
                 run(words[1:])
