@@ -69,8 +69,8 @@ void loop_tick(void)
         return;
     }
     board_measure(&in);
-    /* Three bytes in 10 us are the fastest line of docs/protocol.md, 3,000,000 baud at ten bits a byte.
-     * What USB brings beyond that waits for the next tick. */
+    /* A tick's bytes of the fastest line in docs/protocol.md: 3,000,000 baud and ten bits a byte are
+     * three in 10 us. What USB brings beyond that waits for the next tick. */
     const size_t most = board_table.tick_us * 3u / 10u + 1u;
     for (size_t got = 0, size = 1; got < most && size > 0; got += size) {
         size = board_receive(&data);

@@ -160,4 +160,4 @@ def test_a_rig_that_does_not_render_by_itself_is_refused_before_it_is_probed(
     assert ran.code == 4
     assert "does not render by itself" in ran.err
     assert "leave --on-device out" in ran.err
-    assert not Workspace(workspace).recordings("probe")
+    assert not Workspace(workspace).probe_path.exists()

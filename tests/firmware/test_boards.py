@@ -40,3 +40,11 @@ def test_a_board_is_short_and_states_that_it_never_ran(board: str) -> None:
     readme = (FIRMWARE / "arm" / "README.md").read_text(encoding="utf-8")
     (row,) = re.findall(rf"^\| `{board}`.*$", readme, re.MULTILINE)
     assert "*not yet run on hardware*" in row
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_a_board_starts_a_watchdog_and_feeds_it_in_each_tick(board: str) -> None:
+    text = COMMENT.sub("", (FIRMWARE / "boards" / f"{board}.c").read_text(encoding="utf-8"))
+    for function in ("board_start_watchdog", "board_wait"):
+        (body,) = re.findall(rf"^void {function}\(void\)\n{{\n(.*?)^}}", text, re.M | re.S)
+        assert re.search(r"REG\((IWDG|WDOG3) \+ 0x0[04]u\) = ", body), function

@@ -61,7 +61,7 @@ class StepOnArm:
             "-fdata-sections",
             "-Ifreestanding",
         )
-        sources += ["calls.c", "freestanding/string.c"]
+        sources += ["calls.c", "freestanding/library.c"]
         run(*ZIG, *CORTEX_M4F, *WARNINGS, *flags, *link, "-o", "step.elf", *sources, cwd=folder)
         image = (folder / "step.elf").read_bytes()
         entry, segments = struct.unpack_from("<2I", image, 24)

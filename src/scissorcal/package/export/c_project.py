@@ -6,14 +6,14 @@ from string import Template
 
 from scissorcal.errors import InputError
 from scissorcal.files import replacing
-from scissorcal.kernel.compiled_step import step_sources
+from scissorcal.kernel.compiled_step import c_sources, step_sources
 from scissorcal.package.export.facts import ExportFacts
 from scissorcal.package.export.header import HEADER_FILE, header_text
 from scissorcal.package.model_package import ModelPackage
 
 C_FILES = Path(__file__).parent / "c_files"
 PROGRAM_FILES = ("main.c", "CMakeLists.txt", "scissorcal-model.pc.in", "LICENSE")
-FREESTANDING = ("math.h", "string.h", "string.c")
+FREESTANDING = ("math.h", "string.h", "library.c")
 
 
 def c_project(package: ModelPackage, facts: ExportFacts) -> dict[str, bytes]:
@@ -21,7 +21,7 @@ def c_project(package: ModelPackage, facts: ExportFacts) -> dict[str, bytes]:
     files = {path.name: path.read_bytes() for path in step_sources()}
     files |= {name: (C_FILES / name).read_bytes() for name in PROGRAM_FILES}
     for name in FREESTANDING:
-        files[f"freestanding/{name}"] = (C_FILES / "freestanding" / name).read_bytes()
+        files[f"freestanding/{name}"] = (c_sources() / "freestanding" / name).read_bytes()
     files[HEADER_FILE] = header_text(package, facts).encode()
     files["README.md"] = _readme(facts).encode()
     return files

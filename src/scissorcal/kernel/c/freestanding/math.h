@@ -1,7 +1,7 @@
-/* What the core uses of the C library's mathematics. The processor has
- * the rest; library.c defines the last three. */
-#ifndef FW_MATH_H
-#define FW_MATH_H
+/* What the C core uses of <math.h>, for a compiler without a C library. The processor has the rest;
+ * library.c defines the last three. */
+#ifndef SC_FREESTANDING_MATH_H
+#define SC_FREESTANDING_MATH_H
 
 #define NAN __builtin_nanf("")
 #define INFINITY __builtin_inff()

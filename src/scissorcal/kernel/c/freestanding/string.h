@@ -1,6 +1,7 @@
-/* What the core uses of the C library's string functions; library.c defines them. */
-#ifndef FW_STRING_H
-#define FW_STRING_H
+/* What the C core and a compiler use of <string.h>, for a compiler without a C library; library.c
+ * defines them. */
+#ifndef SC_FREESTANDING_STRING_H
+#define SC_FREESTANDING_STRING_H
 
 #include <stddef.h>
 
