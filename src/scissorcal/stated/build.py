@@ -10,7 +10,7 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult, FitSeries, FittedParameter
 from scissorcal.errors import InputError
-from scissorcal.model import spline_of
+from scissorcal.model import as_pair, spline_of
 from scissorcal.package import STATED_SOURCE, ModelPackage, open_package, scene_depth
 from scissorcal.package import build_package as build_from_fits
 from scissorcal.recipe import Recipe, Scene, checked_recipe, stated_curve
@@ -50,8 +50,8 @@ def build_package(
     from a log-normal of its mean and standard deviation, independently, by ``seed``.
 
     Raises InputError for numbers that make no recipe or a scene that presses deeper than a law
-    of one's own was asked for, ModelError for a law that gives no number or
-    falls, and VerdictError where the tables are further from the model than the scene allows.
+    of one's own was asked for, ModelError for a law that gives no number or falls, and VerdictError
+    where the tables are further from the model than the scene allows.
 
     >>> from scissorcal import Blades, Friction, Material, build_package
     >>> paper = Material(force_N=(2.0, 0.1), exponent=1.4, toughness_J_per_m2=4000.0, kappa=0.8)
@@ -116,11 +116,11 @@ def _cut(material: Material, recipe: Recipe, rng: np.random.Generator) -> FitRes
     structure = geometry_of(recipe, stated_curve(recipe.rig.edge).edge)
     structure |= {"rate_damping": False, "fracture": "none", **response.structure}
     if material.toughness_J_per_m2 is not None:
-        toughness = _drawn({"fracture_energy": _pair(material.toughness_J_per_m2)}, rng)
-        columns["fracture_energy"] = toughness["fracture_energy"] * material.thickness_mm * 1e-3
+        toughness = _drawn({"J": as_pair("toughness", material.toughness_J_per_m2)}, rng)["J"]
+        columns["fracture_energy"] = toughness * material.thickness_mm * 1e-3
         structure["fracture"] = "smooth"
     if material.kappa is not None:
-        columns |= _drawn({"kappa": _pair(material.kappa)}, rng)
+        columns |= _drawn({"kappa": as_pair("kappa", material.kappa)}, rng)
         structure["fracture"] = "rippled"
     return _as_fit("cut", response.words, columns, structure)
 
@@ -166,10 +166,6 @@ def _drawn(stated: dict[str, tuple[float, float]], rng: np.random.Generator) -> 
     centre = np.array([value for value, _ in stated.values()])
     rows = np.concatenate([centre[None, :], cloud])
     return {name: rows[:, column] for column, name in enumerate(stated)}
-
-
-def _pair(value: float | tuple[float, float]) -> tuple[float, float]:
-    return value if isinstance(value, tuple) else (float(value), 0.0)
 
 
 def _as_fit(

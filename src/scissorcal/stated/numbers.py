@@ -20,8 +20,8 @@ class Material:
     The force at the edge is ``force_N`` at ``reference_mm`` of indentation and grows with the power
     ``exponent``; or it is that of a ``law`` of one's own over the indentations ``depths_mm``.
     ``kappa`` is the share of the fracture energy at which a running crack stops; without it cracks
-    run evenly. Each number may be
-    a pair of value and standard deviation: a package's band holds what is stated, and no more.
+    run evenly. Each number may be a pair of value and standard deviation: a package's band holds
+    what is stated, and no more.
 
     >>> Material(force_N=(2.0, 0.1), exponent=1.4, toughness_J_per_m2=4000.0).stated
     {'force_N': (2.0, 0.1), 'exponent': (1.4, 0.0)}
