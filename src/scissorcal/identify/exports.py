@@ -115,12 +115,17 @@ def _mujoco(joint: Identified) -> str:
 """
 
 
+def _link(joint: Identified) -> tuple[bool, float, float]:
+    """Whether the joint is linear; mass and inertia of a link, of which the joint shows one."""
+    inertia = joint.fit.best["inertia"]
+    linear = joint.fit.position_unit == "m"
+    return (True, inertia, 1e-6) if linear else (False, 1e-3, inertia)
+
+
 def _urdf(joint: Identified) -> str:
     fit, law = joint.fit, simple_law(joint.fit, constant=False)
-    linear = fit.position_unit == "m"
-    inertia = fit.best["inertia"]
+    linear, mass, turned = _link(joint)
     low, high = _range(joint)
-    mass, turned = (inertia, 1e-6) if linear else (1e-3, inertia)
     facts = [
         *_facts(joint, constant=False),
         "The inertia is that of the link below, about the joint's axis; limits are what was "
@@ -150,11 +155,9 @@ def _urdf(joint: Identified) -> str:
 
 
 def _sdf(joint: Identified) -> str:
-    fit, law = joint.fit, simple_law(joint.fit, constant=False)
-    linear = fit.position_unit == "m"
-    inertia = fit.best["inertia"]
+    law = simple_law(joint.fit, constant=False)
+    linear, mass, turned = _link(joint)
     low, high = _range(joint)
-    mass, turned = (inertia, 1e-6) if linear else (1e-3, inertia)
     return f"""<?xml version="1.0"?>
 <sdf version="1.9">
 {_xml_comment(_facts(joint, constant=False))}
