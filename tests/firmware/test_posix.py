@@ -62,10 +62,6 @@ class Person:
         time.sleep(1.0)
 
 
-@pytest.mark.skip(
-    reason="not repaired: with no hold-up above 5 ms and 0.2 mN m of torque noise the fit fails "
-    "its check bandwidth at 9 sds; the inertia is 0.19 % (2.9 sds) too low, its interval too narrow"
-)
 def test_probe_friction_and_fit_through_the_process(
     board: subprocess.Popen[str], tmp_path: Path
 ) -> None:
