@@ -45,14 +45,15 @@ static const fw_board BOARD = {
     .supply_max = 13.0f,
 };
 
-/* One axis: speed and place, SI. */
+/* One axis, SI; a hand takes it to a goal at 6 rad/s or less, or lets go (a goal below 0). */
 typedef struct {
-    double place, speed, inertia, dry, viscous, braking, low, high, push;
+    double place, speed, inertia, dry, viscous, braking, low, high, goal;
 } axis;
 
 static void plant_step(axis *a, double effort, int brakes, double dt)
 {
-    const double damped = effort + a->push - (a->viscous + (brakes ? a->braking : 0.0)) * a->speed;
+    const double hand = a->goal < 0.0 ? 0.0 : 6.0 * (a->goal - a->place) - a->speed;
+    const double damped = effort + hand - (a->viscous + (brakes ? a->braking : 0.0)) * a->speed;
     const double free = a->speed + damped / a->inertia * dt;
     const double grip = a->dry / a->inertia * dt; /* what dry friction can take away in a step */
     a->speed = free > grip ? free - grip : free < -grip ? free + grip : 0.0;
@@ -95,10 +96,9 @@ static void plant_tick(axis axes[2], const fw_outputs *drive, fw_inputs *inputs)
 
 static void serve(fw_core *core, fw_record_in *in, fw_record_out *out, int port)
 {
-    axis axes[2] = {{0.5, 0.0, 3e-4, 0.012, 2e-3, 0.05, 0.05, 1.0, 0.0},
-                    {-0.05, 0.0, 0.35, 0.6, 3.0, 40.0, -0.12, 0.25, 0.0}};
+    axis axes[2] = {{0.5, 0.0, 3e-4, 0.012, 2e-3, 0.05, 0.05, 1.0, -1.0},
+                    {-0.05, 0.0, 0.35, 0.6, 3.0, 40.0, -0.12, 0.25, -1.0}};
     struct timespec due;
-    double hand = -1.0;
     struct pollfd parent = {STDIN_FILENO, POLLIN, 0};
     in->inputs.supply = 12.0f;
     clock_gettime(CLOCK_MONOTONIC, &due);
@@ -115,9 +115,8 @@ static void serve(fw_core *core, fw_record_in *in, fw_record_out *out, int port)
             if (read(STDIN_FILENO, &byte, 1) <= 0) {
                 return;
             }
-            hand = byte == 'c' ? 0.0 : byte == 'o' ? 2.0 : byte == 'h' ? 0.5 : -1.0;
+            axes[0].goal = byte == 'c' ? 0.0 : byte == 'o' ? 1.05 : byte == 'h' ? 0.5 : -1.0;
         }
-        axes[0].push = hand < 0.0 ? 0.0 : 2.0 * (hand - axes[0].place) - 0.1 * axes[0].speed;
         due.tv_nsec += 1000L * (long)BOARD.tick_us;
         due.tv_sec += due.tv_nsec / 1000000000L;
         due.tv_nsec %= 1000000000L;
