@@ -147,7 +147,7 @@ def photographed(
         off = shape.edge_at(shape.length_m) * np.array([-np.sin(bearing), np.cos(bearing)]) * side
         tips[name] = lens.sees((tip + off)[None], pose)[0]
     return Pair(
-        Photo(read, width, height, 1, (0, 0), 1, "", "rendered.jpg"),
+        Photo.from_array(read, "rendered.jpg"),
         {"left": left, "right": right},
         lens.sees(np.zeros((1, 2)), pose)[0],
         tips,

@@ -117,7 +117,7 @@ def test_a_rig_that_stood_still_is_refused(cli: Cli, workspace: Path, album: Pat
     assert cli("capture", "plate", "-i", one, "--positions", album / "positions.csv").code == 0
     said = cli("fit", "plate", "--json")
     assert said.code == 3
-    assert "the rig has the same position in all pictures" in said.envelope["result"]["error"]
+    assert "The rig has the same position in all pictures" in said.envelope["result"]["error"]
     assert not (workspace / "fits" / "plate.nc").exists()
 
 

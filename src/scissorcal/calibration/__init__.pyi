@@ -1,4 +1,3 @@
-from .camera.fit import CameraPhoto as CameraPhoto
 from .camera.fit import fit_camera as fit_camera
 from .camera.result import CameraFit as CameraFit
 from .camera.result import CrossValidation as CrossValidation

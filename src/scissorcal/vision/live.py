@@ -249,8 +249,7 @@ def _picked(
 
 def look(image: Any, boards: Sequence[Board], name: str) -> Detection | None:
     """Find the first of several boards that a picture shows, or None."""
-    height, width = image.shape[:2]
-    photo = Photo(image, width, height, 1, (0, 0), 1, "", name)
+    photo = Photo.from_array(image, name)
     try:
         return find_any_board(photo, boards, explain=False)
     except InputError:

@@ -10,7 +10,7 @@ import numpy as np
 from scissorcal.bench.trade.case import Case, Photographed
 from scissorcal.calibration.edge.fit import Blade, fit_blade
 from scissorcal.calibration.edge.result import BladeFit
-from scissorcal.calibration.plate.fit import PosePhoto, fit_plate, plate_target
+from scissorcal.calibration.plate.fit import fit_plate, plate_target
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.errors import InputError, MissingError
 from scissorcal.vision.blade.photo import Laid, by_blade, photograph_laid
@@ -92,7 +92,7 @@ def locate_plate(
     _load_libraries()
     began = time.process_time()
     boards = (PLATE_BOARD, PLATE_STRIP)
-    found = [PosePhoto(photo.source, find_any_board(photo, boards)) for photo in photos]
+    found = [find_any_board(photo, boards) for photo in photos]
     fit = fit_plate(
         found,
         case.camera,

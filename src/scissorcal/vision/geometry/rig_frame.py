@@ -3,11 +3,12 @@
 With it, the plate's pose in one picture: what is new in that picture, and what all pictures share.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.recipe.priors import PlatePriors
@@ -15,6 +16,7 @@ from scissorcal.vision.geometry.board_pose import (
     LEAST_SD_PX,
     BoardPose,
     Corners,
+    UndeterminedPoseError,
     locate_board,
     near,
     print_slopes,
@@ -22,6 +24,7 @@ from scissorcal.vision.geometry.board_pose import (
 )
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, between, left_jacobian
+from scissorcal.vision.targets.boards import RIG_MARKERS
 from scissorcal.vision.targets.detect import Detection
 
 
@@ -66,10 +69,18 @@ class CardView(NamedTuple):
     blade_angle_rad: float
 
 
-def card_view(detection: Detection, position: tuple[float, float], moving_blades: int) -> CardView:
-    """The card as detected in one photograph; ``position`` is advance (mm) and opening (deg)."""
-    corners = Corners.of(detection)
-    return CardView(corners, 1e-3 * position[0], float(np.radians(position[1]) / moving_blades))
+CARD_MIDDLE_M = (0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0)
+"""The middle of the printed rig card in its own frame."""
+
+
+def card_view(
+    detection: Detection, advance_m: float, opening_rad: float, moving_blades: int
+) -> CardView:
+    """The rig card as detected in one photograph, and where the rig stood.
+
+    ``opening_rad`` is the angle between the blades, shared by ``moving_blades`` (1 or 2) of them.
+    """
+    return CardView(Corners.of(detection), advance_m, opening_rad / moving_blades)
 
 
 @dataclass(frozen=True)
@@ -98,9 +109,9 @@ class RigPose:
 
 
 def locate_rig(
-    views: tuple[CardView, ...],
+    views: Sequence[CardView],
     camera: Camera,
-    middle_m: Array,
+    middle_m: ArrayLike = CARD_MIDDLE_M,
     priors: PlatePriors = PlatePriors(),
 ) -> RigPose:
     """Find the rig's frame from pictures of a card that moves in a known way.
@@ -110,14 +121,17 @@ def locate_rig(
     (a blade's edge taken for one of a marker's) are left out. Advances determine the x axis, turns
     the pivot's axis and place; with one of them only, ``undetermined`` names the undetermined
     directions. The covariance includes the camera's and that of the card's print.
-    ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
-    be located at all, or where fewer than two different positions were seen.
+    ``views`` are from `card_view`; ``middle_m`` (3,) is the card's middle in its own frame, that of
+    the printed rig card where none is given. Raises UndeterminedPoseError (a
+    VerdictError) where a card cannot be located at all, or where fewer than two different positions
+    were seen, InputError where a picture has another size than the camera's.
     """
+    views, middle_m = tuple(views), np.asarray(middle_m, dtype=np.float64)
     positions = {(round(v.advance_m, 6), round(v.blade_angle_rad, 6)) for v in views}
     if len(positions) < 2:
-        raise ValueError(
-            "the rig has the same position in all pictures: take pictures at several advances and "
-            "several openings"
+        raise UndeterminedPoseError(
+            "The rig has the same position in all pictures: take pictures at several advances and "
+            "several openings."
         )
     located = [locate_board(view.corners, camera) for view in views]
     start = _start(views, tuple(board.pose for board in located), middle_m)
@@ -217,7 +231,10 @@ def _start(views: tuple[CardView, ...], poses: tuple[Pose, ...], middle_m: Array
 def _unit(vector: Array) -> Array:
     length = float(np.linalg.norm(vector))
     if length == 0.0:
-        raise ValueError("the card did not move with the rig: fix it to the moving part")
+        raise UndeterminedPoseError(
+            "The card did not move with the rig: fix it to the moving part, and take the pictures "
+            "again."
+        )
     return np.asarray(vector / length)
 
 
