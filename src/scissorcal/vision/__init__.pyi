@@ -1,5 +1,8 @@
 from .blade.borders import BorderPoints as BorderPoints
 from .blade.measure import BladeMeasurement as BladeMeasurement
+from .blade.photo import BladeLayout as BladeLayout
+from .blade.photo import BladePhoto as BladePhoto
+from .blade.photo import measure_edge as measure_edge
 from .blade.silhouette import BladeParts as BladeParts
 from .camera_files.keys import matrix_of as matrix_of
 from .camera_files.keys import number_of as number_of
@@ -31,6 +34,8 @@ from .sim.optics import Looks as Looks
 from .sim.optics import SimPose as SimPose
 from .sim.optics import as_jpeg as as_jpeg
 from .sim.photograph import render as render
+from .sim.scenes import BladeShape as BladeShape
+from .sim.scenes import blade_layer as blade_layer
 from .sim.scenes import chained as chained
 from .sim.scenes import target_layers as target_layers
 from .sim.sim_camera import OPENINGS_DEG as OPENINGS_DEG

@@ -92,7 +92,7 @@ def located_frames(
     """
     for frame in frames:
         height, width = frame.image.shape[:2]
-        if (width, height) != (camera.width, camera.height):
+        if not camera.takes(width, height):
             raise InputError(
                 f"The pictures are {width} x {height} pixels, the camera was fitted at "
                 f"{camera.width} x {camera.height}: use the same camera, size, focus and zoom."

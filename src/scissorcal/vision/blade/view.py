@@ -152,7 +152,7 @@ def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePrio
     printed = (0.01 * priors.print_scale_sd_percent) ** 2 * np.eye(2)
     if camera is None:
         return _homography_view(detection, (width, height), printed, photo.source)
-    if (camera.width, camera.height) != (photo.width, photo.height):
+    if not camera.takes(photo.width, photo.height):
         raise other_size(photo.source, (photo.width, photo.height), camera)
     if photo.reduction > 1:
         camera = camera.scaled(width, height)

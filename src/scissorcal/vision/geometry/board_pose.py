@@ -102,8 +102,7 @@ class Corners:
 
     def check_camera(self, camera: Camera) -> None:
         """InputError where the pictures have another size than the camera's."""
-        if self.size_px not in (None, (camera.width, camera.height)):
-            assert self.size_px is not None
+        if self.size_px is not None and not camera.takes(*self.size_px):
             raise other_size(self.sources[0], self.size_px, camera)
 
 
