@@ -168,7 +168,7 @@ def test_a_camera_file_of_ones_own_is_imported_with_the_model_that_was_taken(
 @pytest.mark.parametrize(
     ("names", "words", "code"),
     [
-        (["nothing.jpg"], "nothing.jpg is too blurred", 2),
+        (["nothing.jpg"], "nothing.jpg is of one shade", 2),
         (["mat.jpg"], "shows the blade mat, not the camera board", 2),
         (["none.jpg"], "does not exist", 2),
     ],
