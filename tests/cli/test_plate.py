@@ -16,9 +16,8 @@ from scissorcal.vision import (
     card_view,
     difference,
     find_board,
-    locate_board,
+    locate_plate,
     locate_rig,
-    picture_pose,
     read_camera_file,
     read_photo,
     sim_plate_scene,
@@ -116,9 +115,9 @@ def assert_arrays_give_the_fit(workspace: Path, album: Path, recipe: Recipe) -> 
         assert pose.translation_m == of_file.translation_m
         assert np.array_equal(pose.covariance, of_file.covariance)  # type: ignore[arg-type]
     assert [v.status for v in fit.verdicts] == [v.status for v in stored.verdicts]
-    target = plate_target(recipe).inverse()
-    board = locate_board(seen, camera, priors)
-    assert picture_pose(board, camera, target, rig).pose.quaternion == fit.rig_plate.quaternion  # type: ignore[union-attr]
+    plate = locate_plate(seen, camera, plate_target(recipe), rig, priors)
+    assert plate.pose.quaternion == stored.rig_plate.quaternion  # type: ignore[union-attr]
+    assert plate.odds == stored.odds
 
 
 def test_nothing_is_kept_of_what_is_wrong(

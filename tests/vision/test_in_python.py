@@ -19,7 +19,7 @@ from scissorcal.vision.blade.photo import BladeLayout, measure_edge
 from scissorcal.vision.geometry.board_pose import UndeterminedPoseError, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference
-from scissorcal.vision.geometry.rig_frame import card_view, locate_rig
+from scissorcal.vision.geometry.rig_frame import card_view, locate_plate, locate_rig
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import (
     BladeShape,
@@ -194,6 +194,9 @@ def test_several_pictures_know_a_pose_better_than_one(plate_picture: Picture) ->
     assert np.trace(four.noise) < np.trace(one.noise)
     fit = fit_plate(seen, CAMERA)
     assert np.array_equal(fit.camera_plate.matrix, four.pose.matrix)
+    plate = locate_plate(seen, CAMERA)
+    assert np.array_equal(plate.pose.covariance, fit.camera_plate.covariance)  # type: ignore[arg-type]
+    assert plate.odds == fit.odds > 20.0
 
 
 # --------------------------------------------------------------------------------- bad input
@@ -332,6 +335,21 @@ def test_detections_that_do_not_belong_together_are_refused(plate_picture: Pictu
         fit_blade([], effort="drafty", rng=np.random.default_rng(0))  # type: ignore[arg-type]
 
 
+def test_a_picture_in_place_of_what_was_found_in_it_is_refused(
+    plate_picture: Picture, edge_picture: Picture
+) -> None:
+    for call in (
+        lambda: locate_board(plate_picture, CAMERA),  # type: ignore[arg-type]
+        lambda: locate_plate([plate_picture], CAMERA),  # type: ignore[list-item]
+        lambda: fit_camera([plate_picture] * 3, rng=np.random.default_rng(0)),  # type: ignore[list-item]
+    ):
+        with pytest.raises(InputError, match="ndarray is not what was found in a picture"):
+            call()
+    photo = measure_edge(edge_picture, CAMERA)
+    with pytest.raises(InputError, match="BladePhoto is no measurement of one blade"):
+        fit_blade([photo], rng=np.random.default_rng(0))  # type: ignore[list-item]
+
+
 def test_corners_that_leave_a_pose_open_are_refused_by_name(plate_picture: Picture) -> None:
     seen = find_board(Photo.from_array(plate_picture, "thin.png"), "plate board")
     line = seen.points[:, 1] == seen.points[0, 1]
@@ -380,5 +398,5 @@ def test_the_code_of_the_page_runs(
     assert np.allclose(plate.translation_m, scene.rig_plate.shift_m, atol=2e-3)
     printed = capsys.readouterr().out.splitlines()
     assert printed[:3] == ["(48, 2) (48, 3)", "(203,) (203,) (203,)", "line (41,) (41,)"]
-    assert printed[3].endswith(" True")
+    assert printed[-3].endswith("(6, 6) True")
     assert printed[-2] == "[]", "no verdict fails"

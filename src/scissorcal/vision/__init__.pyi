@@ -10,6 +10,7 @@ from .camera_files.reading import CameraFile as CameraFile
 from .camera_files.reading import read_camera_file as read_camera_file
 from .camera_files.reading import write_camera_file as write_camera_file
 from .geometry.board_pose import BoardPose as BoardPose
+from .geometry.board_pose import Corners as Corners
 from .geometry.board_pose import UndeterminedPoseError as UndeterminedPoseError
 from .geometry.board_pose import locate_board as locate_board
 from .geometry.camera import Camera as Camera
@@ -20,8 +21,8 @@ from .geometry.rig_frame import CardView as CardView
 from .geometry.rig_frame import PicturePose as PicturePose
 from .geometry.rig_frame import RigPose as RigPose
 from .geometry.rig_frame import card_view as card_view
+from .geometry.rig_frame import locate_plate as locate_plate
 from .geometry.rig_frame import locate_rig as locate_rig
-from .geometry.rig_frame import picture_pose as picture_pose
 from .live import Frame as Frame
 from .live import LocatedFrame as LocatedFrame
 from .live import frames_of as frames_of
@@ -55,5 +56,6 @@ from .targets.boards import Chessboard as Chessboard
 from .targets.boards import MarkedBoard as MarkedBoard
 from .targets.boards import MarkerBoard as MarkerBoard
 from .targets.detect import Detection as Detection
+from .targets.detect import Markers as Markers
 from .targets.detect import find_board as find_board
 from .targets.detect import find_markers as find_markers

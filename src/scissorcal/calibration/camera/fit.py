@@ -38,7 +38,7 @@ from scissorcal.recipe.priors import CameraPriors
 from scissorcal.verdicts import Check
 from scissorcal.vision.camera_files import CameraFile
 from scissorcal.vision.geometry.camera import PARAMETERS, Camera, usual_camera
-from scissorcal.vision.targets.detect import Detection, check_sizes
+from scissorcal.vision.targets.detect import Detection, check_detections
 
 _DRAWS = 500
 
@@ -66,7 +66,7 @@ def fit_camera(
     tell = progress or (lambda _share, _sentence: None)
     if len(seen) < FEWEST_VIEWS:
         raise MissingError(_too_few(len(seen)))
-    check_sizes(seen)
+    check_detections(seen)
     width, height = seen[0].width, seen[0].height
     views = [seen_board(detection, priors) for detection in seen]
     start = usual_camera(width, height).parameters

@@ -90,6 +90,12 @@ def fit_blade(
     check_known("effort of a fit", effort, _COUNT)
     if not measured:
         raise InputError("No photograph of a blade could be measured, so there is nothing to fit.")
+    for measurement in measured:
+        if not isinstance(measurement, BladeMeasurement):
+            raise InputError(
+                f"{type(measurement).__name__} is no measurement of one blade: give one of "
+                "``measured`` of what scissorcal.vision.measure_edge returns."
+            )
     sized = tuple(_sized(measurement, blade.length_m) for measurement in measured)
     if len({measurement.metric for measurement in sized}) > 1:
         raise InputError(

@@ -14,11 +14,10 @@ from scissorcal.recipe.priors import PlatePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose, difference
+from scissorcal.vision.geometry.pose import UNMOVED, Pose, difference
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.targets.detect import Detection
 
-UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _EXACT_PRINT = {"print_scale_sd_percent": 0.0}
 
 

@@ -13,7 +13,7 @@ from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
-from scissorcal.vision.targets.detect import Detection, check_sizes
+from scissorcal.vision.targets.detect import Detection, check_detections
 
 LEAST_SD_PX = 0.02
 """Least standard deviation of a corner."""
@@ -63,7 +63,7 @@ class Corners:
                 "No picture of a target was given, so there is no pose to find: give what "
                 "find_board found in one."
             )
-        check_sizes(detections)
+        check_detections(detections)
         first = detections[0]
         for detection in detections:
             if detection.board != first.board:

@@ -3,6 +3,7 @@
 With it, the plate's pose in one picture: what is new in that picture, and what all pictures share.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -23,7 +24,7 @@ from scissorcal.vision.geometry.board_pose import (
     project_pose,
 )
 from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose, between, left_jacobian
+from scissorcal.vision.geometry.pose import UNMOVED, Pose, between, left_jacobian
 from scissorcal.vision.targets.boards import RIG_MARKERS
 from scissorcal.vision.targets.detect import Detection
 
@@ -35,13 +36,15 @@ class PicturePose:
     The covariance of ``pose`` is the whole one. It is the sum of ``noise`` (6, 6), from the errors
     of corners, which are new in each picture, and ``shared`` (6, 6), from the errors of camera,
     print and rig card, which are the same in all of them. ``other`` is the second pose that a plane
-    allows.
+    allows, None where there is none, ``odds`` those of the first against it, NaN where unknown:
+    below 20 they leave it open which of both is true.
     """
 
     pose: Pose
     other: Pose | None
     noise: Array
     shared: Array
+    odds: float = math.nan
 
 
 OPEN = 3.0
@@ -317,13 +320,44 @@ def _card(poses: tuple[Pose, Pose], view: CardView) -> Array:
     return np.concatenate([in_camera.rotation_vector, in_camera.translation_m])
 
 
-def picture_pose(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | None) -> PicturePose:
-    """The plate of a target that was found; ``back`` is T_target_plate.
+def locate_plate(
+    seen: Detection | Sequence[Detection] | BoardPose,
+    camera: Camera,
+    plate_target: Pose = UNMOVED,
+    rig: RigPose | None = None,
+    priors: PlatePriors = PlatePriors(),
+) -> PicturePose:
+    """Find the plate of a target that was found, before the camera or in the rig's frame.
 
-    ``rig`` takes it into the rig's frame, with the errors of the camera that both share. A filter
-    over many pictures takes ``noise`` for each and ``shared`` once, as its bias: counted in each
-    picture, the shared errors would seem to average out.
+    ``seen`` is what `scissorcal.vision.find_board` found in one picture, or in several where camera
+    and plate are at rest, or what `locate_board` made of it. ``plate_target`` is T_plate_target:
+    how the target lies on the plate, whose frame has x along the cut from its near edge and z out
+    of its upper face. ``rig`` (`locate_rig`) takes the pose into the rig's frame, with the errors
+    of the camera that both share. A filter over many pictures takes ``noise`` for each and
+    ``shared`` once, as its bias: counted in each picture, the shared errors would seem to average
+    out. `scissorcal.calibration.fit_plate` gives the same pose with verdicts. Raises as
+    `locate_board` does.
+
+    A target whose upper left corner lies 40 mm behind the plate's near edge; printed y runs down,
+    hence the half turn:
+
+    >>> import numpy as np
+    >>> from scissorcal.vision import (
+    ...     PLATE_BOARD, Camera, Lens, Looks, Pose, SimPose, find_board, locate_plate, render,
+    ...     target_layers,
+    ... )
+    >>> camera = Camera(600.0, 600.0, 319.5, 239.5, (0.0,) * 5, 640, 480)
+    >>> lens = Lens(600.0, (319.5, 239.5), 640, 480)
+    >>> truth = SimPose.looking_at((0.07, 0.05), 0.25, tilt=0.4)
+    >>> picture = render(target_layers(PLATE_BOARD, truth), lens, Looks(), np.random.default_rng(0))
+    >>> target = Pose.from_rotation_vector([np.pi, 0.0, 0.0], [0.04, 0.0, 0.0])
+    >>> plate = locate_plate(find_board(picture, "plate board"), camera, target)
+    >>> near_edge_m = truth.shift_m - 0.04 * truth.rotation[:, 0]
+    >>> bool(np.abs(plate.pose.translation_m - near_edge_m).max() < 0.3e-3), plate.odds > 20.0
+    (True, True)
     """
+    board = seen if isinstance(seen, BoardPose) else locate_board(seen, camera, priors)
+    back = plate_target.inverse()
     pose = (rig.holds(board, camera) if rig else board.pose).after(back)
     exact = replace(rig.camera_rig, covariance=None).inverse() if rig else None
 
@@ -335,4 +369,4 @@ def picture_pose(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | No
     assert alone.covariance is not None
     shared = pose.covariance - alone.covariance
     other = placed(board.other) if board.other else None
-    return PicturePose(pose, other, alone.covariance, 0.5 * (shared + shared.T))
+    return PicturePose(pose, other, alone.covariance, 0.5 * (shared + shared.T), board.odds)

@@ -141,10 +141,15 @@ def find_board(
     return Detection(board, ids, whole, side_px, photo.source, photo.width, photo.height)
 
 
-def check_sizes(detections: Sequence[Detection]) -> None:
-    """InputError where detections are of pictures of different sizes: of two cameras or zooms."""
+def check_detections(detections: Sequence[Detection]) -> None:
+    """InputError where one is no detection, or their pictures have different sizes."""
     first = detections[0]
     for other in detections:
+        if not isinstance(other, Detection):
+            raise InputError(
+                f"{type(other).__name__} is not what was found in a picture: give what "
+                "scissorcal.vision.find_board returns for it."
+            )
         if (other.width, other.height) != (first.width, first.height):
             raise InputError(
                 f"{other.source} has {other.width} x {other.height} pixels, {first.source} "
