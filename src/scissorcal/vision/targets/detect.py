@@ -180,6 +180,15 @@ def find_markers(
     cell; corners are then measured from the markers' sides. ``picture`` is as in `find_board`, and
     corners are pixels of the array. Raises UnknownNameError, which lists the
     dictionaries, where OpenCV has none of that name, InputError where the array is no picture.
+
+    >>> import numpy as np
+    >>> from scissorcal.vision import PLATE_STRIP, Lens, Looks, SimPose, render, target_layers
+    >>> lens = Lens(600.0, (319.5, 239.5), 640, 480)
+    >>> layers = target_layers(PLATE_STRIP, SimPose.looking_at((0.114, 0.014), 0.3))
+    >>> picture = render(layers, lens, Looks(), np.random.default_rng(0))
+    >>> found = find_markers(picture, "DICT_5X5_250", PLATE_STRIP)
+    >>> sorted(found.ids.tolist()), found.corners.shape, bool(found.sharp.all())
+    ([80, 81, 82, 83, 84, 85], (6, 4, 2), True)
     """
     grey = as_photo(picture).grey
     detector = cv2.aruco.ArucoDetector(dictionary(dictionary_name), _reading())
