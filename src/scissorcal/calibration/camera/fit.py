@@ -37,8 +37,9 @@ from scissorcal.identity import file_digest
 from scissorcal.recipe.priors import CameraPriors
 from scissorcal.verdicts import Check
 from scissorcal.vision.camera_files import CameraFile
+from scissorcal.vision.geometry.board_pose import check_detections
 from scissorcal.vision.geometry.camera import PARAMETERS, Camera, usual_camera
-from scissorcal.vision.targets.detect import Detection, check_detections
+from scissorcal.vision.targets.detect import Detection
 
 _DRAWS = 500
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from scissorcal.aliases import Array, Progress
 from scissorcal.calibration.candidates import Account, compare
-from scissorcal.calibration.edge.cells import EdgeCells, cells_each, edge_cells
+from scissorcal.calibration.edge.cells import EdgeCells, cells_each, edge_cells, merged_nicks
 from scissorcal.calibration.edge.checks import blade_verdicts
 from scissorcal.calibration.edge.model import (
     FAMILIES,
@@ -22,7 +22,6 @@ from scissorcal.calibration.edge.result import (
     Band,
     BladeFit,
     EdgeCandidate,
-    FoundNick,
     PhotographRow,
 )
 from scissorcal.errors import InputError, check_known
@@ -145,30 +144,6 @@ def fit_blade(
     )
     verdicts = blade_verdicts(fit, best.best, best.status, best.sentence, effort)
     return replace(fit, verdicts=verdicts)
-
-
-def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
-    """Nicks as all photographs show them: one row each, those of one place averaged."""
-    every = sorted((n for cells in photographs for n in cells.nicks), key=lambda n: n.station_m)
-    groups: list[list[FoundNick]] = []
-    for nick in every:
-        last = groups[-1][-1] if groups else None
-        near = last is not None and nick.station_m - last.station_m < 0.5 * (
-            nick.width_m + last.width_m
-        )
-        if near:
-            groups[-1].append(nick)
-        else:
-            groups.append([nick])
-    return tuple(
-        FoundNick(
-            float(np.mean([n.station_m for n in group])),
-            float(np.mean([n.width_m for n in group])),
-            float(np.mean([n.depth_m for n in group])),
-            ", ".join(dict.fromkeys(n.source for n in group)),
-        )
-        for group in groups
-    )
 
 
 def _sized(measurement: BladeMeasurement, length_m: float | None) -> BladeMeasurement:

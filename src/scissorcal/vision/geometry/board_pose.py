@@ -13,7 +13,7 @@ from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
-from scissorcal.vision.targets.detect import Detection, check_detections
+from scissorcal.vision.targets.detect import Detection
 
 LEAST_SD_PX = 0.02
 """Least standard deviation of a corner."""
@@ -104,6 +104,23 @@ class Corners:
         """InputError where the pictures have another size than the camera's."""
         if self.size_px is not None and not camera.takes(*self.size_px):
             raise other_size(self.sources[0], self.size_px, camera)
+
+
+def check_detections(detections: Sequence[Detection]) -> None:
+    """InputError where one is no detection, or their pictures have different sizes."""
+    first = detections[0]
+    for other in detections:
+        if not isinstance(other, Detection):
+            raise InputError(
+                f"{type(other).__name__} is not what was found in a picture: give what "
+                "scissorcal.vision.find_board returns for it."
+            )
+        if (other.width, other.height) != (first.width, first.height):
+            raise InputError(
+                f"{other.source} has {other.width} x {other.height} pixels, {first.source} "
+                f"{first.width} x {first.height}: one fit takes pictures of one camera at one size "
+                "and zoom; leave one of them out."
+            )
 
 
 def other_size(source: str, size_px: tuple[int, int], camera: Camera) -> InputError:

@@ -141,23 +141,6 @@ def find_board(
     return Detection(board, ids, whole, side_px, photo.source, photo.width, photo.height)
 
 
-def check_detections(detections: Sequence[Detection]) -> None:
-    """InputError where one is no detection, or their pictures have different sizes."""
-    first = detections[0]
-    for other in detections:
-        if not isinstance(other, Detection):
-            raise InputError(
-                f"{type(other).__name__} is not what was found in a picture: give what "
-                "scissorcal.vision.find_board returns for it."
-            )
-        if (other.width, other.height) != (first.width, first.height):
-            raise InputError(
-                f"{other.source} has {other.width} x {other.height} pixels, {first.source} "
-                f"{first.width} x {first.height}: one fit takes pictures of one camera at one size "
-                "and zoom; leave one of them out."
-            )
-
-
 def find_any_board(photo: Photo, boards: Sequence[Board], *, explain: bool = True) -> Detection:
     """Find the first of several boards that a photograph shows.
 
