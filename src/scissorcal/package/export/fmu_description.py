@@ -146,8 +146,8 @@ def _variables(
     parts = {"cut": record.cut, "friction": record.friction}
     stated = {what for what, part in parts.items() if part and part.stated}
     for name, item in own:
-        source = "stated" if name.partition(".")[0] in stated else "posterior"
-        words = f"{item.unit}; {source} mean {item.mean:.6g}, sd {item.sd:.2g}; value of the draw"
+        mean = "mean of the draws" if name.partition(".")[0] in stated else "posterior mean"
+        words = f"{item.unit}; {mean} {item.mean:.6g}, sd {item.sd:.2g}; value of the draw"
         add("Float64", name, words, initial="calculated", **calculated)
 
 
