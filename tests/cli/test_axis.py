@@ -54,7 +54,8 @@ def test_a_carriage_is_captured_fitted_and_reported(quick: Path, cli: Cli) -> No
     assert "fit friction-advance" in plan.out
     assert "on request: the scene does not need it" in plan.out
     assert cli("report").code == 0
-    assert "friction-advance-2" in cli("fit", "log", "friction-advance").out
+    logged = cli("fit", "log", "friction-advance", "--json").envelope["result"]["versions"]
+    assert [version["what"] for version in logged] == ["friction-advance"]
 
 
 @pytest.mark.parametrize(
