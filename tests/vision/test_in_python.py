@@ -14,6 +14,7 @@ from scipy.stats import chi2
 
 from scissorcal.calibration import fit_blade, fit_camera, fit_plate
 from scissorcal.errors import InputError, MissingError, UnknownNameError, VerdictError
+from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.blade.photo import BladeLayout, measure_edge
 from scissorcal.vision.geometry.board_pose import UndeterminedPoseError, locate_board
 from scissorcal.vision.geometry.camera import Camera
@@ -144,29 +145,39 @@ def test_an_edge_in_grey_and_without_a_camera(edge_picture: Picture) -> None:
 
 
 @pytest.mark.parametrize(
-    ("board", "bend"),
-    [(PLATE_BOARD, LENS.distortion), (PLATE_STRIP, (0.0,) * 5)],
-    ids=["plate board", "plate strip, no distortion"],
+    ("board", "bend", "print_sd_percent", "seed"),
+    [
+        (PLATE_BOARD, LENS.distortion, 0.1, 2029),
+        (PLATE_STRIP, (0.0,) * 5, 0.1, 2029),
+        (PLATE_STRIP, LENS.distortion, 0.0, 213_001),
+        (PLATE_STRIP, (-0.2, 0.05, 8e-4, -5e-4, 0.0), 0.1, 213_002),
+    ],
+    ids=[
+        "plate board",
+        "plate strip, no distortion",
+        "plate strip, exact print",
+        "plate strip, strong distortion",
+    ],
 )
 def test_poses_are_within_their_own_intervals(
-    board: MarkedBoard, bend: tuple[float, float, float, float, float]
+    board: MarkedBoard,
+    bend: tuple[float, float, float, float, float],
+    print_sd_percent: float,
+    seed: int,
 ) -> None:
-    """Sixteen views, six numbers each, printed off by 0.1 % as the priors have it.
-
-    Distortion bends the sides of markers, which detection takes for straight: the page has by how
-    much the strip's errors exceed their covariance then.
-    """
+    """Sixteen views, six numbers each, printed off by the error that the priors have."""
     lens, camera = replace(LENS, distortion=bend), replace(CAMERA, distortion=bend)
-    rng = np.random.default_rng(2029)
+    priors = PlatePriors(print_scale_sd_percent=print_sd_percent)
+    rng = np.random.default_rng(seed)
     square = 0.0
-    for seed in range(16):
+    for view in range(16):
         tilt, azimuth = rng.uniform(0.2, 0.9), rng.uniform(0.0, 6.28)
-        across, down = 1.0 + 1e-3 * rng.standard_normal(2)
+        across, down = 1.0 + 0.01 * print_sd_percent * rng.standard_normal(2)
         middle = (0.5 * board.width_m, 0.5 * board.height_m)
         truth = SimPose.looking_at(middle, 1.4 * board.width_m, tilt=tilt, azimuth=azimuth)
         layers = target_layers(board, truth, print_scale=(across, down))
-        picture = render(layers, lens, LOOKS, np.random.default_rng([2029, seed]))
-        pose = locate_board(find_board(picture, board.name), camera).pose
+        picture = render(layers, lens, LOOKS, np.random.default_rng([seed, view]))
+        pose = locate_board(find_board(picture, board.name), camera, priors).pose
         off = difference(pose, Pose.from_matrix(truth.rotation, truth.shift_m))
         assert pose.covariance is not None
         square += float(off @ np.linalg.solve(pose.covariance, off))

@@ -41,7 +41,7 @@ class Corners:
     ``corner`` (n,) say in which picture, and which corner of the target it is: a corner's
     errors by print and light repeat from picture to picture. ``target`` and ``sources`` name the
     target and the pictures in messages; ``size_px`` is the pictures' width and height, None where
-    it is unknown. ``by_sides`` says that corners ``4 k`` to ``4 k + 3`` are those of a marker, where
+    it is unknown. ``by_sides`` says that corners 4 k to 4 k + 3 are those of a marker, where
     straight lines along its sides cross: a lens bends these, which `unbent` corrects.
     """
 

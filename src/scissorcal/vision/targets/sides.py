@@ -58,18 +58,18 @@ def unbent_corners(corners: Array, camera: Camera) -> Array:
     """
     unbent = corners
     for _ in range(_ROUNDS):
-        unbent = corners - (_straight_crossings(unbent, camera) - unbent)
-    held = np.isfinite(unbent).all(axis=(1, 2))
-    return np.where(held[:, None, None], unbent, corners)
+        unbent = corners - np.nan_to_num(_straight_crossings(unbent, camera) - unbent)
+    return unbent
 
 
 def _straight_crossings(corners: Array, camera: Camera) -> Array:
-    """What `corners_by_sides` finds of markers whose corners (n, 4, 2) are these."""
+    """What `corners_by_sides` finds of markers whose corners (n, 4, 2) are these, or NaN."""
     start = camera.rays(corners.reshape(-1, 2)).reshape(-1, 4, 1, 2)
     rays = start + _ALONG[:, None] * (np.roll(start, -1, axis=1) - start)
     ahead = np.insert(rays.reshape(-1, 2), 2, 1.0, axis=1)
     lines, spread = _fitted_lines(camera.project(ahead).reshape(rays.shape), _outward(corners))
-    return np.where(np.isfinite(spread).all(axis=1)[:, None, None], _crossings(lines), np.nan)
+    held: Flags = np.asarray(np.isfinite(spread).all(axis=1))
+    return np.where(held[:, None, None], _crossings(lines), np.nan)
 
 
 def linear_light(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -95,7 +95,7 @@ def _outward(corners: Array) -> Array:
     """Unit normals (n, 4, 2) of the sides of markers, away from their middle."""
     along = np.roll(corners, -1, axis=1) - corners
     length = np.maximum(np.linalg.norm(along, axis=2), 1e-9)
-    return np.stack([along[..., 1], -along[..., 0]], axis=2) / length[..., None]
+    return np.asarray(np.stack([along[..., 1], -along[..., 0]], axis=2) / length[..., None])
 
 
 def _half_way(linear: NDArray[np.float32], places: Array, outward: Array, reach: Array) -> Array:
