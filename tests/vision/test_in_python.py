@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from scissorcal.calibration import fit_blade, fit_camera, fit_plate
 from scissorcal.errors import InputError, MissingError, UnknownNameError, VerdictError
-from scissorcal.recipe.priors import PlatePriors
+from scissorcal.recipe import PlatePriors
 from scissorcal.vision.blade.photo import BladeLayout, measure_edge
 from scissorcal.vision.geometry.board_pose import UndeterminedPoseError, locate_board
 from scissorcal.vision.geometry.camera import Camera
@@ -50,6 +50,8 @@ Picture = NDArray[np.uint8]
 PAGE = Path(__file__).parents[2] / "docs" / "vision.md"
 LENS = Lens(900.0, (503.2, 371.9), 1000, 750, (-0.08, 0.03, 4e-4, -3e-4, 0.0))
 CAMERA = Camera(900.0, 900.0, *LENS.centre_px, LENS.distortion, 1000, 750)
+STRONG = (-0.2, 0.05, 8e-4, -5e-4, 0.0)
+"""A distortion with which the sides of a marker bend by more than corners err."""
 LOOKS = Looks(exposure=0.85, softness_px=0.6, noise=0.008)
 SHAPE = BladeShape(back_slope=-float(np.tan(0.035)))
 """Its centreline is its x axis, so that ``edge_at`` is e(s) in the frame of a measurement."""
@@ -150,7 +152,7 @@ def test_an_edge_in_grey_and_without_a_camera(edge_picture: Picture) -> None:
         (PLATE_BOARD, LENS.distortion, 0.1, 2029),
         (PLATE_STRIP, (0.0,) * 5, 0.1, 2029),
         (PLATE_STRIP, LENS.distortion, 0.0, 213_001),
-        (PLATE_STRIP, (-0.2, 0.05, 8e-4, -5e-4, 0.0), 0.1, 213_002),
+        (PLATE_STRIP, STRONG, 0.1, 213_002),
     ],
     ids=[
         "plate board",
@@ -182,6 +184,21 @@ def test_poses_are_within_their_own_intervals(
         assert pose.covariance is not None
         square += float(off @ np.linalg.solve(pose.covariance, off))
     assert square < chi2.isf(CHANCE, 16 * 6)
+
+
+def test_a_camera_fitted_to_markers_knows_its_focal_length() -> None:
+    lens = replace(LENS, distortion=STRONG)
+    seen = []
+    for view in range(10):
+        azimuth = 0.2 * np.pi * view
+        aside = (0.126 + 0.04 * np.cos(3.0 * azimuth), 0.09 + 0.03 * np.sin(azimuth))
+        pose = SimPose.looking_at(aside, 0.3 + 0.02 * (view % 3), tilt=0.45, azimuth=azimuth)
+        rng = np.random.default_rng([213_004, view])
+        seen.append(find_board(render(target_layers(BLADE_MAT, pose), lens, LOOKS, rng), BLADE_MAT))
+    camera = fit_camera(seen, rng=np.random.default_rng(0)).camera
+    assert camera.covariance is not None
+    sd_px = np.sqrt(camera.covariance[0, 0])
+    assert abs(camera.fx - 900.0) < norm.isf(0.5 * CHANCE) * sd_px
 
 
 def test_a_plate_in_the_rigs_frame_is_within_its_own_intervals() -> None:

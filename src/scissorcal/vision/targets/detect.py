@@ -52,7 +52,9 @@ class Markers:
 class Detection:
     """A target as one photograph shows it.
 
-    Row k of ``pixels`` (n, 2), in the whole photograph, is ``board.points[ids[k]]``. ``square_px``
+    Row k of ``pixels`` (n, 2), in the whole photograph, is ``board.points[ids[k]]``. Corners of a
+    board of markers are where straight lines along their sides cross: a lens bends these, and who
+    knows the camera takes off by how much (`Corners.unbent`). ``square_px``
     is the median length of a square's (or a marker's) side there. ``source`` is the photograph's
     name, ``width`` and ``height`` its size in pixels.
     """
