@@ -139,11 +139,6 @@ def test_a_prediction_follows_what_was_measured(fit: FitResult) -> None:
     assert error < 0.02 * np.median(np.abs(series.measured[swept]))
 
 
-def test_a_cut_is_predicted_by_its_package() -> None:
-    with pytest.raises(InputError, match="package build"):
-        cut_fit(recipe()).predict(0.5, -0.2)
-
-
 def test_places_that_are_no_numbers_are_refused(fit: FitResult) -> None:
     with pytest.raises(InputError, match="not finite"):
         fit.predict([0.5, np.nan], 0.3)
