@@ -260,6 +260,8 @@ def test_a_table_becomes_the_recording_it_was_made_of() -> None:
     again = Recording.from_pandas(made.to_pandas())
     assert np.array_equal(again.samples, made.samples)
     assert again.strokes == made.strokes
+    cut = Recording.from_pandas(made.to_pandas().assign(sheet=1), kind="cut")
+    assert {stroke.sheet for stroke in cut.strokes} == {1}
     table = made.to_pandas()[["time_s", "motor_torque_Nm"]].assign(
         angle=np.degrees(made.samples["opening"])
     )
@@ -280,6 +282,8 @@ def test_a_table_becomes_the_recording_it_was_made_of() -> None:
         ({"opening_m": [0.0, 1.0, 2.0, 3.0]}, "give one of them"),
         ({"torque_Nm": None, "force_N": [0.0] * 4}, "not measured at a rotary joint"),
         ({"kind": "cutt"}, 'Did you mean "cut"'),
+        ({"sheet": 0.5}, "0.5 counts no sheet"),
+        ({"sheet": [0, 1]}, r"sheet has shape \(2,\)"),
     ],
 )
 def test_arrays_that_are_no_motion_are_refused(changes: dict, sentence: str) -> None:
