@@ -2,7 +2,6 @@
 
 import logging
 import re
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -314,32 +313,3 @@ def test_progress_and_the_log_are_told_the_stages(caplog: pytest.LogCaptureFixtu
     assert all(0.0 <= done <= 1.0 for done, _ in told)
     assert caplog.messages[0] == told[0][1]
     assert {record.name for record in caplog.records} == {"scissorcal"}
-
-
-# ------------------------------------------------------------------------------------ a workspace
-
-
-def command(folder: Path, *words: str) -> None:
-    run = "from scissorcal.cli import main; main()"
-    subprocess.run([sys.executable, "-c", run, *words], cwd=folder, check=True, capture_output=True)
-
-
-@pytest.mark.slow
-def test_a_workspaces_functions_do_what_the_commands_do(tmp_path: Path) -> None:
-    here = create_workspace(tmp_path / "here", "paper-80gsm")
-    there = create_workspace(tmp_path / "there", "paper-80gsm")
-    captured = here.capture("friction", seed=3)
-    assert here.recordings("friction") == (captured.path,)
-    command(there.root, "capture", "friction", "--device", "sim", "--seed", "3", "--yes")
-    recordings = [scissorcal.open_recording(w.recordings("friction")[0]) for w in (here, there)]
-    for field in ("opening", "motor_torque", "device_time_us", "stroke"):
-        assert np.array_equal(recordings[0].samples[field], recordings[1].samples[field])
-    (outcome,) = here.fit("friction", effort="draft")
-    command(there.root, "fit", "friction", "--effort", "draft")
-    assert np.array_equal(outcome.result.draws, there.fits["friction"].draws)
-    assert list(here.fits) == ["friction"]
-    assert here.fit("friction", effort="draft")[0].cached
-    alone = scissorcal.fit_friction(recordings[0], recipe=here.recipe(), effort="draft")
-    assert np.array_equal(alone.draws, outcome.result.draws)
-    assert here.report().fits == ("friction",)
-    assert here.report_html.is_file()

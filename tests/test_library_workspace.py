@@ -13,7 +13,8 @@ import scissorcal
 from scissorcal.calibration import FitResult
 from scissorcal.package import open_package
 from scissorcal.recording import Recording
-from scissorcal.workday import Workspace
+from scissorcal.workday import Workspace, create_workspace
+from tests.calibration.cut.test_predict import Straight
 from tests.workday.made import fitted_copy, quick_workspace, record_cut, record_friction
 
 ARGUMENTS = {
@@ -58,7 +59,28 @@ def assert_equal(fit: FitResult, other: FitResult) -> None:
     ]
 
 
-# ------------------------------------------------------------------------------------ fits
+# --------------------------------------------------------------------------- captures, fits
+
+
+@pytest.mark.slow
+def test_a_workspaces_functions_do_what_the_commands_do(tmp_path: Path) -> None:
+    here = create_workspace(tmp_path / "here", "paper-80gsm")
+    there = create_workspace(tmp_path / "there", "paper-80gsm")
+    captured = here.capture("friction", seed=3)
+    assert here.recordings("friction") == (captured.path,)
+    command(there.root, "capture", "friction", "--device", "sim", "--seed", "3", "--yes")
+    recordings = [scissorcal.open_recording(w.recordings("friction")[0]) for w in (here, there)]
+    for field in ("opening", "motor_torque", "device_time_us", "stroke"):
+        assert np.array_equal(recordings[0].samples[field], recordings[1].samples[field])
+    (outcome,) = here.fit("friction", effort="draft")
+    command(there.root, "fit", "friction", "--effort", "draft")
+    assert np.array_equal(outcome.result.draws, there.fits["friction"].draws)
+    assert list(here.fits) == ["friction"]
+    assert here.fit("friction", effort="draft")[0].cached
+    alone = scissorcal.fit_friction(recordings[0], recipe=here.recipe(), effort="draft")
+    assert np.array_equal(alone.draws, outcome.result.draws)
+    assert here.report().fits == ("friction",)
+    assert here.report_html.is_file()
 
 
 @pytest.mark.slow
@@ -70,6 +92,24 @@ def test_fits_of_files_are_those_of_the_command(here: Workspace) -> None:
     for known in (friction, here.fit_path("friction")):
         cut = scissorcal.fit_cut(cuts, here.recipe(), known, effort="draft")
         assert_equal(cut, here.fits["cut"])
+
+
+@pytest.mark.slow
+def test_a_cut_is_predicted_as_its_fit_expects_it(here: Workspace) -> None:
+    """Over its own segments, within 1 % of the largest torque; the fit has a delay and an offset.
+
+    Segments of a running crack have the contact at which the indentation is the reference's.
+    """
+    cut, edge = here.fits["cut"], Straight()
+    series = cut.series
+    depth = edge.top - edge.height_of(series.opening, series.contact)
+    runs = np.isclose(depth, cut.structure["reference_indentation_m"], rtol=1e-6)
+    assert 0.5 < runs.mean() < 0.95
+    rests = {"contact": series.contact[~runs]}
+    for places, where in ((runs, {}), (~runs, rests)):
+        band = cut.predict(series.opening[places], series.opening_rate[places], **where)
+        off = np.abs(band.torque - series.predicted[places])
+        assert off.max() < 0.01 * series.predicted.max()
 
 
 @pytest.mark.slow
