@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 
 import scissorcal
-from scissorcal.calibration import FitResult
+from scissorcal.calibration import FitResult, VerifyResult
+from scissorcal.errors import InputError
 from scissorcal.package import open_package
 from scissorcal.recording import Recording
 from scissorcal.workday import Workspace, create_workspace
@@ -150,16 +152,40 @@ def test_fits_of_arrays_are_those_of_the_command_from_the_same_table(tmp_path: P
 
 @pytest.mark.slow
 def test_verify_writes_the_file_that_the_command_writes(here: Workspace, there: Workspace) -> None:
-    (outcome,) = here.verify("friction", fits=2, seed=3, workers=1)
+    outcomes = here.verify("friction", "cut", fits=2, seed=3, workers=1)
     options = ("--fits", "2", "--seed", "3", "--workers", "1")
-    command(there.root, "verify", "friction", *options)
-    files = [w.root / "fits" / "friction.verify.json" for w in (here, there)]
-    assert outcome.path == files[0]
-    texts = [json.loads(file.read_text(encoding="utf-8")) for file in files]
-    for text in texts:
-        assert text["calibration"].pop("seconds") > 0.0
-    assert texts[0] == texts[1]
-    assert texts[0]["calibration"]["fits"] == 2
+    command(there.root, "verify", *options)
+    for what, outcome in zip(("friction", "cut"), outcomes, strict=True):
+        files = [w.root / "fits" / f"{what}.verify.json" for w in (here, there)]
+        assert outcome.path == files[0]
+        texts = [json.loads(file.read_text(encoding="utf-8")) for file in files]
+        for text in texts:
+            assert text["calibration"].pop("seconds") > 0.0
+        assert texts[0] == texts[1]
+        assert texts[0]["calibration"]["fits"] == 2
+
+
+@pytest.mark.slow
+def test_verify_fit_finds_what_the_workspace_finds(here: Workspace) -> None:
+    """Also from files; all but what names the workspace's fit, and the time that it took."""
+    outcomes = here.verify("friction", "cut", fits=2, seed=3, workers=1)
+    (empty,), (cuts,) = here.recordings("friction"), here.recordings("cut")
+    friction, cut = here.fit_path("friction"), here.fits["cut"]
+    recipe = here.recipe()
+    found = [
+        scissorcal.verify_fit(friction, empty, recipe, fits=2, seed=3),
+        scissorcal.verify_fit(cut, cuts, recipe, friction, fits=2, seed=3),
+    ]
+    for outcome, result in zip(outcomes, found, strict=True):
+        assert as_in_a_workspace(result) == as_in_a_workspace(outcome.result)
+    with pytest.raises(InputError, match="with its recipe and its fit of friction"):
+        scissorcal.verify_fit(cut, cuts)
+
+
+def as_in_a_workspace(result: VerifyResult) -> VerifyResult:
+    assert result.calibration is not None
+    timeless = replace(result.calibration, seconds=0.0)
+    return replace(result, calibration=timeless, fit_content="")
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         open_package,
         open_recording,
         open_workspace,
+        verify_fit,
     )
     from scissorcal.model import ResponseLaw
     from scissorcal.package import OutsideCoverageWarning
@@ -47,6 +48,7 @@ __all__ = [
     "open_package",
     "open_recording",
     "open_workspace",
+    "verify_fit",
 ]
 
 

@@ -229,6 +229,7 @@ class CutLaw:
             bool(structure.get("rate_damping", False)),
             bool(structure.get("load_share", False)),
             tuple(knots),
+            structure.get("response_law"),
         )
 
     @property
