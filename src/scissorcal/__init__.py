@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from scissorcal import examples
     from scissorcal.aliases import Progress
     from scissorcal.library import (
+        create_workspace,
         fit_cut,
         fit_friction,
         open_fit,
@@ -41,6 +42,7 @@ __all__ = [
     "ResponseLaw",
     "__version__",
     "build_package",
+    "create_workspace",
     "examples",
     "fit_cut",
     "fit_friction",

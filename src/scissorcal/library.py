@@ -27,6 +27,20 @@ Effort = Literal["draft", "standard", "thorough"]
 LOG = logging.getLogger("scissorcal")
 
 
+def create_workspace(path: Path | str, recipe: Path | str = "paper-80gsm") -> "Workspace":
+    """Make a workspace: the folder ``path`` with a copy of a recipe, as 'scissorcal init' does.
+
+    ``recipe`` is a built-in one's name or a file. Raises InputError where the folder has a recipe
+    already, or the recipe is wrong.
+
+    >>> create_workspace("my-paper").recipe().name
+    'paper-80gsm'
+    """
+    from scissorcal.workday.workspace import create_workspace as created
+
+    return created(Path(path), str(recipe))
+
+
 def open_workspace(path: Path | str = ".") -> "Workspace":
     """Open the workspace that the folder ``path`` lies in.
 
