@@ -45,27 +45,28 @@ static const fw_board BOARD = {
     .supply_max = 13.0f,
 };
 
-/* One axis: speed and place, SI. */
+/* One axis, SI; a hand takes it to a goal at 6 rad/s or less, or lets go (a goal below 0). */
 typedef struct {
-    float place, speed, inertia, dry, viscous, braking, low, high, push;
+    double place, speed, inertia, dry, viscous, braking, low, high, goal;
 } axis;
 
-static void plant_step(axis *a, float effort, int brakes, float dt)
+static void plant_step(axis *a, double effort, int brakes, double dt)
 {
-    const float damped = effort + a->push - (a->viscous + (brakes ? a->braking : 0.0f)) * a->speed;
-    const float free = a->speed + damped / a->inertia * dt;
-    const float grip = a->dry / a->inertia * dt; /* what dry friction can take away in a step */
-    a->speed = free > grip ? free - grip : free < -grip ? free + grip : 0.0f;
+    const double hand = a->goal < 0.0 ? 0.0 : 6.0 * (a->goal - a->place) - a->speed;
+    const double damped = effort + hand - (a->viscous + (brakes ? a->braking : 0.0)) * a->speed;
+    const double free = a->speed + damped / a->inertia * dt;
+    const double grip = a->dry / a->inertia * dt; /* what dry friction can take away in a step */
+    a->speed = free > grip ? free - grip : free < -grip ? free + grip : 0.0;
     a->place += a->speed * dt;
     if (a->place < a->low || a->place > a->high) {
         a->place = a->place < a->low ? a->low : a->high;
-        a->speed = 0.0f;
+        a->speed = 0.0;
     }
 }
 
-static float measured(float value, float step)
+static float measured(double value, float step)
 {
-    return (float)(long)(value / step) * step; /* towards zero, as a counter does */
+    return (float)(long)(value / (double)step) * step; /* towards zero, as a counter does */
 }
 
 /* A torque sensor's noise, uniform, with the 0.2 mN m (rms) of the course build's averaged readings:
@@ -81,10 +82,10 @@ static void plant_tick(axis axes[2], const fw_outputs *drive, fw_inputs *inputs)
 {
     /* A step takes viscous dt / 2 off the inertia that motion shows: 0.02 % of the blades'. */
     enum { STEPS = 16 };
-    const float dt = 1e-6f * (float)BOARD.tick_us / (float)STEPS;
+    const double dt = 1e-6 * (double)BOARD.tick_us / (double)STEPS;
     for (int i = 0; i < STEPS; i++) {
-        plant_step(&axes[0], drive->torque, drive->drive == FW_BRAKE, dt);
-        plant_step(&axes[1], drive->force, drive->drive == FW_BRAKE, dt);
+        plant_step(&axes[0], (double)drive->torque, drive->drive == FW_BRAKE, dt);
+        plant_step(&axes[1], (double)drive->force, drive->drive == FW_BRAKE, dt);
     }
     inputs->device_us += BOARD.tick_us;
     inputs->opening = measured(axes[0].place, BOARD.opening_resolution);
@@ -95,10 +96,9 @@ static void plant_tick(axis axes[2], const fw_outputs *drive, fw_inputs *inputs)
 
 static void serve(fw_core *core, fw_record_in *in, fw_record_out *out, int port)
 {
-    axis axes[2] = {{0.5f, 0.0f, 3e-4f, 0.012f, 2e-3f, 0.05f, 0.05f, 1.0f, 0.0f},
-                    {-0.05f, 0.0f, 0.35f, 0.6f, 3.0f, 40.0f, -0.12f, 0.25f, 0.0f}};
+    axis axes[2] = {{0.5, 0.0, 3e-4, 0.012, 2e-3, 0.05, 0.05, 1.0, -1.0},
+                    {-0.05, 0.0, 0.35, 0.6, 3.0, 40.0, -0.12, 0.25, -1.0}};
     struct timespec due;
-    float hand = -1.0f;
     struct pollfd parent = {STDIN_FILENO, POLLIN, 0};
     in->inputs.supply = 12.0f;
     clock_gettime(CLOCK_MONOTONIC, &due);
@@ -115,9 +115,8 @@ static void serve(fw_core *core, fw_record_in *in, fw_record_out *out, int port)
             if (read(STDIN_FILENO, &byte, 1) <= 0) {
                 return;
             }
-            hand = byte == 'c' ? 0.0f : byte == 'o' ? 2.0f : byte == 'h' ? 0.5f : -1.0f;
+            axes[0].goal = byte == 'c' ? 0.0 : byte == 'o' ? 1.05 : byte == 'h' ? 0.5 : -1.0;
         }
-        axes[0].push = hand < 0.0f ? 0.0f : 2.0f * (hand - axes[0].place) - 0.1f * axes[0].speed;
         due.tv_nsec += 1000L * (long)BOARD.tick_us;
         due.tv_sec += due.tv_nsec / 1000000000L;
         due.tv_nsec %= 1000000000L;

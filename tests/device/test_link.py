@@ -16,7 +16,8 @@ import pytest
 
 from scissorcal.device import link as room
 from scissorcal.device import ports
-from scissorcal.device.link import DEFAULT_BAUD, PortLink, check_identity, open_link
+from scissorcal.device.answers import check_identity
+from scissorcal.device.link import DEFAULT_BAUD, PortLink, open_link
 from scissorcal.device.ports import modem_manager_runs, open_port
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from scissorcal.device.motion import loop_verdicts
+from scissorcal.device.loop_verdicts import loop_verdicts
 from scissorcal.device.timing import Percentiles
 
 

@@ -17,7 +17,7 @@ from scissorcal.device import (
     open_motion,
 )
 from scissorcal.device.faults import fault_sentence, stop_sentence
-from scissorcal.device.motion import loop_verdicts
+from scissorcal.device.loop_verdicts import loop_verdicts
 from scissorcal.device.probe.idle import idle
 from scissorcal.device.probe.judge import judge_idle
 from scissorcal.device.probe.probe import probe

@@ -27,7 +27,7 @@ from scissorcal.recording.layout import (
     TelemetryChannel,
     frame_rows,
 )
-from scissorcal.recording.table_file import channel_columns
+from scissorcal.recording.table_export import channel_columns
 from tests.recording.made import EPOCH_NS, made_samples
 
 COUNT = 60

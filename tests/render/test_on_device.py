@@ -1,6 +1,7 @@
 """A package that the device renders by itself: loaded, watched, recorded, and felt in a tick."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -248,43 +249,39 @@ def test_a_package_that_is_held_already_is_not_sent_again(paper: ModelPackage) -
     assert load_image(link, other, lambda *_: None) != checksum
 
 
-def test_a_loss_of_power_while_rendering_ends_it_and_is_named(
-    paper: ModelPackage, tmp_path: Path
-) -> None:
+def end_by(
+    disturb: Callable[[RenderingSide], None], package: ModelPackage, sentence: str
+) -> LockstepLink:
+    """Disturb the device in the fourth block of a rendering; it must end with the sentence."""
     link, side = device()
     blocks = 0
 
-    def progress(done: float, sentence: str, *_: object) -> None:
+    def progress(done: float, told: str, *_: object) -> None:
         nonlocal blocks
-        blocks += "rendering" in sentence
+        blocks += "rendering" in told
         if blocks == 4:
-            side.power_on()
+            disturb(side)
 
-    session = RigSession(link, paper.recipe, Operator(progress=progress))
-    with pytest.raises(DeviceError, match="check the device's power"):
-        render(session, paper, Rendering(20.0, TWO, on_device=True))
+    session = RigSession(link, package.recipe, Operator(progress=progress))
+    with pytest.raises(DeviceError, match=sentence):
+        render(session, package, Rendering(20.0, TWO, on_device=True))
     assert side.drawn.torque[-1] == 0.0
+    return link
+
+
+def test_a_loss_of_power_while_rendering_ends_it_and_is_named(paper: ModelPackage) -> None:
+    link = end_by(RenderingSide.power_on, paper, "check the device's power")
     assert in_force(link) == 0
 
 
-def test_a_fault_that_the_host_clears_ends_the_rendering_and_is_named(
-    paper: ModelPackage, tmp_path: Path
-) -> None:
+def test_a_fault_that_the_host_clears_ends_the_rendering_and_is_named(paper: ModelPackage) -> None:
     """The loop clears the watchdog's fault; the package's torque does not come back by itself."""
-    link, side = device()
-    blocks = 0
 
-    def progress(done: float, sentence: str, *_: object) -> None:
-        nonlocal blocks
-        blocks += "rendering" in sentence
-        if blocks == 4:
-            for _ in range(2100):  # without a COMMAND
-                side.tick()
+    def without_commands(side: RenderingSide) -> None:
+        for _ in range(2100):
+            side.tick()
 
-    session = RigSession(link, paper.recipe, Operator(progress=progress))
-    with pytest.raises(DeviceError, match="ended its rendering"):
-        render(session, paper, Rendering(20.0, TWO, on_device=True))
-    assert side.drawn.torque[-1] == 0.0
+    end_by(without_commands, paper, "ended its rendering")
 
 
 def test_a_rendering_that_was_cut_off_adds_nothing_to_what_runs_next(

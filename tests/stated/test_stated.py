@@ -92,6 +92,16 @@ def test_the_same_numbers_and_seed_give_the_same_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
 
+@pytest.mark.parametrize("kappa", [(0.97, 0.029), (0.9, 0.09), (0.1, 0.05)])
+def test_a_widely_stated_kappa_stays_a_share(kappa: tuple[float, float], tmp_path: Path) -> None:
+    """Of the 200 draws of (0.97, 0.029) about 30 of a log-normal would lie above 1."""
+    paper = Material(force_N=2.0, exponent=1.4, toughness_J_per_m2=4000.0, kappa=kappa)
+    package = build_package(paper, Blades(), None, tmp_path / "paper.zip", seed=3)
+    assert package.kernel() is not None
+    low, high = package.band(0.35, -0.3, 0.03)
+    assert 0.0 < low < high
+
+
 def test_a_law_of_ones_own_is_rendered_within_the_tolerance(tmp_path: Path) -> None:
     own = Material(law=Cubic(), thickness_mm=THICKNESS_MM, depths_mm=(0.05, 8.0))
     package = build_package(own, Blades(), None, tmp_path / "own.zip", scene=PRESSING)
@@ -130,7 +140,12 @@ class Step:
         (
             {"force_N": 2.0, "exponent": 1.5, "toughness_J_per_m2": 1e3, "kappa": (0.9, 0.1)},
             InputError,
-            "must lie below 1",
+            r"of mean 0.9 has a standard deviation of at most 0.0905",
+        ),
+        (
+            {"force_N": 2.0, "exponent": 1.5, "toughness_J_per_m2": 1e3, "kappa": 1.0},
+            InputError,
+            "leave kappa out",
         ),
         ({"law": Cubic(), "force_N": 2.0}, InputError, "leave out force_N"),
         ({"law": Step()}, ModelError, "cannot be rendered"),

@@ -123,6 +123,7 @@ def test_a_changed_drawing_makes_package_and_report_stale(workspace: Workspace) 
     drawing = workspace.root / DRAWING
     before = drawing.read_bytes()
     assert not any("stale" in one for one in package_warnings(workspace))
+    assert "stale" not in page_labels(workspace)
     states = {s["name"]: s["state"] for s in plan_steps(workspace)}
     assert "stale" not in states.values()
     try:
@@ -132,9 +133,14 @@ def test_a_changed_drawing_makes_package_and_report_stale(workspace: Workspace) 
         assert states["report"] == "stale"
         assert states["fit cut"] != "stale"
         assert any("The package is stale" in one for one in package_warnings(workspace))
+        assert {"stale", "unverified"} <= page_labels(workspace)
         assert reviewed_content(Engine.of(workspace))[DRAWING] == file_digest(drawing)
     finally:
         drawing.write_bytes(before)
+
+
+def page_labels(workspace: Workspace) -> set[str]:
+    return {state.label for state in workspace_scene(workspace).states}
 
 
 def plan_steps(workspace: Workspace) -> list[dict[str, str]]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import typer
 
@@ -13,9 +13,10 @@ from scissorcal.cli.progress import progress
 from scissorcal.errors import InputError
 
 if TYPE_CHECKING:
-    from scissorcal.identify import Identified, LogOptions, Sensors
+    from scissorcal.identify import Held, Identified, LogOptions, Sensors
 
-EXPORTS = ("mujoco", "urdf", "sdf", "c", "json", "csv")
+Target = Literal["mujoco", "urdf", "sdf", "c", "json", "csv"]
+Effort = Literal["draft", "standard"]
 
 
 @dataclass(frozen=True)
@@ -114,15 +115,13 @@ def identify(
         list[Path] | None, typer.Option(dir_okay=False, help="A log to predict, not fitted.")
     ] = None,
     to: Annotated[
-        Literal["mujoco", "urdf", "sdf", "c", "json", "csv"] | None,
+        Target | None,
         typer.Option(help="Print the joint for another program, or write it with --export."),
     ] = None,
     export: Annotated[
         Path | None, typer.Option(dir_okay=False, help="The file that --to writes.")
     ] = None,
-    effort: Annotated[
-        Literal["draft", "standard"], typer.Option(help="Intervals: by curvature, or sampled.")
-    ] = "draft",
+    effort: Annotated[Effort, typer.Option(help="Intervals: by curvature, or sampled.")] = "draft",
     output: Annotated[Path, typer.Option(dir_okay=False, help="The page.")] = Path("joint.html"),
 ) -> Answer:
     """Identify any joint from its log: inertia, friction, what is not known, exports.
@@ -146,33 +145,38 @@ def identify(
     """
     from datetime import UTC, datetime
 
-    from scissorcal.files import replacing
-    from scissorcal.identify import (
-        compare as predict,
-    )
-    from scissorcal.identify import (
-        export_text,
-        off_by,
-        page_of,
-        panels_of,
-        read_log,
-        result_of,
-    )
-    from scissorcal.identify import (
-        identify as identify_joint,
-    )
-    from scissorcal.identify.columns import named
+    from scissorcal.identify import export_text, page_of, panels_of
     from scissorcal.identity import VERSION
     from scissorcal.report.panel import panels_text
 
     _refuse(logs, compare or [], output, to, export)
+    joint, held = _identified(logs, compare or [], layout, declared, effort)
+    panels = panels_of(joint, held)
+    _write(output, page_of(joint, panels, (datetime.now(UTC), VERSION)))
+    text, files = f"{panels_text(panels)}\n\n{output}", [output]
+    if to and export:
+        _write(export, export_text(joint, to))
+        text += f"\n{export}: {_what_it_leaves(joint, to)}"
+        files.append(export)
+    elif to:
+        text = export_text(joint, to).rstrip("\n")
+    return Answer(_result(joint, held, to), text, files=files)
+
+
+def _identified(
+    logs: list[Path], compare: list[Path], layout: Layout, declared: Declared, effort: Effort
+) -> "tuple[Identified, list[Held]]":
+    """The joint of the logs, and how well it predicts each log to compare."""
+    from scissorcal import identify as joints
+    from scissorcal.identify.columns import named
+
     options, sensors = layout.options, declared.sensors
     with progress() as tell:
         tell(0.1, "reading")
-        recordings = [named(read_log(path, options)) for path in logs]
-        others = [named(read_log(path, options)) for path in compare or ()]
+        recordings = [named(joints.read_log(path, options)) for path in logs]
+        others = [named(joints.read_log(path, options)) for path in compare]
         tell(0.3, "fitting")
-        joint = identify_joint(
+        joint = joints.identify(
             recordings,
             effort=effort,
             sensors=sensors,
@@ -181,19 +185,20 @@ def identify(
             cutoff_Hz=declared.cutoff_Hz,
         )
         tell(0.8, "predicting")
-        held = [predict(joint, other) for other in others]
-    panels = panels_of(joint, held)
-    files = [output]
-    with replacing(output) as part:
-        part.write_text(page_of(joint, panels, (datetime.now(UTC), VERSION)), encoding="utf-8")
-    text = f"{panels_text(panels)}\n\n{output}"
-    if to and export:
-        with replacing(export) as part:
-            part.write_text(export_text(joint, to), encoding="utf-8")
-        files.append(export)
-        text += f"\n{export}: {_said(joint, to)}"
-    elif to:
-        text = export_text(joint, to).rstrip("\n")
+        return joint, [joints.compare(joint, other) for other in others]
+
+
+def _write(path: Path, text: str) -> None:
+    from scissorcal.files import replacing
+
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def _result(joint: "Identified", held: "list[Held]", to: Target | None) -> dict[str, Any]:
+    """What ``--json`` prints: the joint, each compared log, what the export leaves."""
+    from scissorcal.identify import off_by, result_of
+
     compared = [
         {
             "log": log.source,
@@ -205,15 +210,11 @@ def identify(
         }
         for log in held
     ]
-    result = {
-        **result_of(joint),
-        "compared": compared,
-        "export_off_by": off_by(joint, to) if to else None,
-    }
-    return Answer(result, text, files=files)
+    left = off_by(joint, to) if to else None
+    return {**result_of(joint), "compared": compared, "export_off_by": left}
 
 
-def _said(joint: "Identified", to: str) -> str:
+def _what_it_leaves(joint: "Identified", to: Target) -> str:
     """What an export leaves, in one sentence."""
     from scissorcal.identify import off_by
 
@@ -245,7 +246,7 @@ def _refuse(
 ) -> None:
     """Raise InputError for options that contradict each other."""
     if export and not to:
-        raise InputError(f"--export {export} needs --to: one of {', '.join(EXPORTS)}.")
+        raise InputError(f"--export {export} needs --to: one of {', '.join(get_args(Target))}.")
     if output.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"--output {output} is a page: give it a name that ends in .html.")
     for written in (output, *([export] if export else ())):

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.control.gains import HybridGains
-from scissorcal.device.motion import MotionReport, loop_verdicts
+from scissorcal.device.loop_verdicts import loop_verdicts
+from scissorcal.device.motion import MotionReport
 from scissorcal.kernel import ControlConfig, ControlFlag, HybridFlag
 from scissorcal.verdicts import STATED, Check, Verdict
 

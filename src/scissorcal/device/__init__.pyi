@@ -1,3 +1,5 @@
+from .answers import check_echo as check_echo
+from .answers import check_identity as check_identity
 from .capture import open_writer as open_writer
 from .control import Axis as Axis
 from .control import Gains as Gains
@@ -14,8 +16,6 @@ from .doctor import Examination as Examination
 from .doctor import diagnose as diagnose
 from .hand import hand_travel as hand_travel
 from .link import PortLink as PortLink
-from .link import check_echo as check_echo
-from .link import check_identity as check_identity
 from .link import open_link as open_link
 from .lockstep import LockstepLink as LockstepLink
 from .motion import Motion as Motion

@@ -11,7 +11,7 @@ import numpy as np
 
 from scissorcal.aliases import Array, Integers, Progress
 from scissorcal.device.link import PortLink
-from scissorcal.device.motion import LOOP
+from scissorcal.device.loop_verdicts import LOOP
 from scissorcal.device.ports import adapter_timer_ms, adapter_timer_path
 from scissorcal.device.timing import Percentiles
 from scissorcal.errors import DeviceError

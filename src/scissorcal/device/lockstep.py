@@ -10,7 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-from scissorcal.device.link import LoadMessage, check_echo, check_identity
+from scissorcal.device.answers import check_echo, check_identity
+from scissorcal.device.link import LoadMessage
 from scissorcal.device.sim.protocol import RigProtocol
 from scissorcal.device.sim.rig import TICK_S, VirtualRig
 from scissorcal.device.sim.sensors import Faults

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 from scissorcal.aliases import Array
-from scissorcal.device.link import Link, PortLink, check_echo
+from scissorcal.device.answers import check_echo
+from scissorcal.device.link import Link, PortLink
 from scissorcal.device.lockstep_motion import Exchanging, LockstepMotion
 from scissorcal.device.motion import BLOCK_S, IDLE, LoopTask, Motion, MotionReport, Samples, Stages
 from scissorcal.device.servo_process import ServoProcess

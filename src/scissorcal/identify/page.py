@@ -12,6 +12,7 @@ from scissorcal.identify.joint import Held, Identified
 from scissorcal.identify.simple import simple_law
 from scissorcal.identify.words import plain
 from scissorcal.report.html import panels_page
+from scissorcal.report.numbers import shown_place
 from scissorcal.report.panel import (
     Axis,
     Chart,
@@ -26,6 +27,7 @@ from scissorcal.report.panel import (
     points,
     words,
 )
+from scissorcal.report.strokes import thinned
 
 PART = "identify"
 LEAST_BEYOND = 0.05
@@ -91,7 +93,7 @@ def _of(joint: Identified, name: str) -> str:
 
 def _curve(joint: Identified) -> Panel:
     fit = joint.fit
-    factor, unit = _shown(fit.position_unit)
+    factor, unit = shown_place(fit.position_unit)
     found = friction_curve(fit)
     series: list[Series] = []
     if found is not None:
@@ -102,7 +104,7 @@ def _curve(joint: Identified) -> Panel:
         series.append(band("90 %", rate, low, high, "blue"))
         series.append(curve("law", rate, law, "blue"))
         measured = partial_residuals(fit)
-        kept = _thinned(len(measured))
+        kept = thinned(np.arange(len(measured)), MOST_POINTS)
         places = factor * fit.series.opening_rate[kept]
         series.insert(0, points("measured, less inertia", places, measured[kept], "muted"))
     chart = Chart(
@@ -120,9 +122,9 @@ def _curve(joint: Identified) -> Panel:
 def _residuals(joint: Identified) -> Panel:
     fit = joint.fit
     series = fit.series
-    factor, unit = _shown(fit.position_unit)
+    factor, unit = shown_place(fit.position_unit)
     left = series.measured - series.predicted
-    kept = _thinned(len(left))
+    kept = thinned(np.arange(len(left)), MOST_POINTS)
     over = (
         ("time", series.time_s, "s"),
         ("speed", factor * series.opening_rate, f"{unit}/s"),
@@ -157,7 +159,7 @@ def _residuals(joint: Identified) -> Panel:
 
 
 def _ripple(joint: Identified) -> Panel:
-    factor, unit = _shown(joint.fit.position_unit)
+    factor, unit = shown_place(joint.fit.position_unit)
     rows = []
     for ripple in joint.ripples:
         size = number(
@@ -201,7 +203,7 @@ def _held(joint: Identified, held: Sequence[Held]) -> Panel:
             )
         )
         seen = log.prediction
-        kept = _thinned(len(seen.time_s))
+        kept = thinned(np.arange(len(seen.time_s)), MOST_POINTS)
         time = seen.time_s[kept]
         charts.append(
             Chart(
@@ -287,12 +289,3 @@ def _checks(joint: Identified) -> Panel:
         for verdict in joint.fit.verdicts
     )
     return Panel("checks", PART, "Checks", rows=rows)
-
-
-def _thinned(count: int) -> slice:
-    return slice(None, None, max(1, -(-count // MOST_POINTS)))
-
-
-def _shown(unit: str) -> tuple[float, str]:
-    """Factor and unit by which people read positions."""
-    return (float(np.degrees(1.0)), "deg") if unit == "rad" else (1e3, "mm")

@@ -29,7 +29,6 @@ from .friction_terms import TERMS as TERMS
 from .friction_terms import law_names as law_names
 from .friction_terms import terms_of as terms_of
 from .own_law import ResponseLaw as ResponseLaw
-from .own_law import as_pair as as_pair
 from .own_law import fit_knots as fit_knots
 from .own_law import law_parameters as law_parameters
 from .own_law import refuse_falling as refuse_falling
@@ -39,6 +38,11 @@ from .plate_pieces import Layer as Layer
 from .plate_pieces import Outline as Outline
 from .plate_pieces import spans_on_line as spans_on_line
 from .response import Response as Response
+from .stated_numbers import as_pair as as_pair
+from .stated_numbers import as_share as as_share
+from .stated_numbers import draw_columns as draw_columns
+from .stated_numbers import draw_share as draw_share
+from .stated_numbers import log_normal as log_normal
 from .surface.height_field import HeightField as HeightField
 from .surface.protocol import Cylinder as Cylinder
 from .surface.protocol import Plane as Plane

@@ -12,6 +12,7 @@ from scissorcal.aliases import Array
 from scissorcal.errors import InputError, ModelError
 from scissorcal.model.checks import LARGEST, SMALLEST
 from scissorcal.model.response import Response
+from scissorcal.model.stated_numbers import as_pair
 
 MOST_KNOTS = 16
 """What a manifest stores of a spline."""
@@ -145,23 +146,6 @@ def law_parameters(law: ResponseLaw) -> dict[str, tuple[float, float]]:
     if not given:
         raise InputError(f"The law {type(law).__name__} has no parameters: give one at least.")
     return {name: as_pair(name, value) for name, value in given.items()}
-
-
-def as_pair(name: str, value: float | tuple[float, float]) -> tuple[float, float]:
-    """A stated number with its standard deviation, 0 where none is given.
-
-    >>> as_pair("force_N", 2.0), as_pair("force_N", (2.0, 0.1))
-    ((2.0, 0.0), (2.0, 0.1))
-    """
-    pair = value if isinstance(value, tuple) else (value, 0.0)
-    if len(pair) != 2 or not all(isinstance(part, int | float) for part in pair):
-        raise InputError(f"{name} = {value!r} is no number, and no (number, standard deviation).")
-    number, sd = (float(part) for part in pair)
-    if not (math.isfinite(number) and math.isfinite(sd)) or number <= 0.0 or sd < 0.0:
-        raise InputError(
-            f"{name} = {value!r} must be above 0, and its standard deviation not below 0."
-        )
-    return number, sd
 
 
 def refuse_falling(law: ResponseLaw, depths: Array, draws: Mapping[str, Array]) -> None:

@@ -51,8 +51,8 @@ from .strokes import label_strokes as label_strokes
 from .strokes import resolution_of as resolution_of
 from .table import size_note as size_note
 from .table import unit_in as unit_in
-from .table_file import export_channel as export_channel
-from .table_file import export_table as export_table
+from .table_export import export_channel as export_channel
+from .table_export import export_table as export_table
 from .table_file import read_headings as read_headings
 from .writer import RecordingWriter as RecordingWriter
 from .writer import create_locked as create_locked

@@ -12,14 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.recording.faulty_values import (
-    COUNTERS,
     continued,
-    continued_clock,
     jumps_in,
     lone_excursion,
     marks_in,
     overflows,
 )
+from scissorcal.recording.import_clock import continue_clock, set_clock, set_times
 from scissorcal.recording.layout import MEASURED, empty_samples
 from scissorcal.recording.reader import content_hash
 from scissorcal.recording.recording import Joint, Kind, Recording, Stroke, gap_cost, gap_note
@@ -34,21 +33,15 @@ from scissorcal.recording.strokes import (
 )
 from scissorcal.recording.table import (
     SHEET,
-    Column,
     Quantity,
     Table,
     describe,
     quantity,
     sheets_of,
-    shortened,
     size_note,
 )
 from scissorcal.recording.table_file import read_table, refuse_no_table
 
-MOST_PLACES = 3
-"""Places that a note lists."""
-LONGEST_S = 1e9
-"""31 years: no log lasts so long."""
 SHORT_SHARE, MANY = 0.25, 20
 """More strokes than MANY, half of them shorter than this share of the range, are worth a note."""
 NO_SHEET = (
@@ -155,11 +148,11 @@ def recording_of_table(
     sentences += _opening_goes_on(samples, table, joint)
     if rate_Hz is not None:
         samples["sequence"] = np.arange(table.length)
-        _set_times(samples, np.rint(samples["sequence"] * (1e6 / rate_Hz)).astype(np.int64))
+        set_times(samples, np.rint(samples["sequence"] * (1e6 / rate_Hz)).astype(np.int64))
     else:
-        table, wrapped = _clock_goes_on(table, quantities["time"].factor)
+        table, wrapped = continue_clock(table, quantities["time"].factor)
         sentences += wrapped
-        _set_clock(samples, table, quantities["time"].factor, allow_gaps=options.allow_gaps)
+        set_clock(samples, table, quantities["time"].factor, allow_gaps=options.allow_gaps)
     sentences += _note_on_jumps(samples, table, joint)
     strokes, stroke_sentence, odd = _label(samples, joint, options.min_travel, sheets_of(table))
     if options.kind == "cut" and SHEET not in table.columns:
@@ -217,77 +210,6 @@ def _check_request(
         raise InputError(f"A least travel of {min_travel} is not possible; give a positive number.")
 
 
-def _set_clock(samples: NDArray[np.void], table: Table, factor: float, *, allow_gaps: bool) -> None:
-    """Set clocks and sequence from the time column; InputError if it repeats, falls or has gaps."""
-    values = table.columns["time"].values
-    seconds = (values - values[0]) * factor
-    if not np.abs(seconds).max() < LONGEST_S:
-        heading = shortened(table.columns["time"].heading)
-        raise InputError(
-            f"{table.path}, column {heading!r} spans more than 30 years. Check the unit of time."
-        )
-    microseconds = np.rint(seconds * 1e6).astype(np.int64)
-    steps = np.diff(microseconds)
-    bad = np.flatnonzero(steps <= 0)
-    if len(bad):
-        raise InputError(_not_a_clock(table, values * factor, int(bad[0]) + 1))
-    usual = float(np.median(steps))
-    gaps = np.flatnonzero(steps > GAP_FACTOR * usual)
-    if len(gaps) and not allow_gaps:
-        row = int(gaps[0]) + 1
-        raise InputError(
-            f"{table.place(row, 'time')}: {steps[gaps[0]] * 1e-6:.6g} s since the row "
-            f"before, where {usual * 1e-6:.6g} s are usual ({len(gaps)} such gaps in all, the "
-            f"longest {steps.max() * 1e-6:.6g} s). Allow gaps (--allow-gaps) to keep them, "
-            "with a note, or export the log without gaps. "
-            f"{gap_cost(microseconds * 1e-6).sentence}"
-        )
-    counts = np.maximum(1, np.rint(steps / usual)).astype(np.int64)
-    samples["sequence"] = np.concatenate([[0], np.cumsum(counts)]) % 2**32
-    _set_times(samples, microseconds)
-
-
-def _not_a_clock(table: Table, seconds: NDArray[np.float64], row: int) -> str:
-    before, here = seconds[row - 1], seconds[row]
-    if 0.0 < here * len(seconds) < LONGEST_S and np.all(seconds == here):
-        return (
-            f"{table.place(row, 'time')}: {here:.9g} s stands in every row: the clock stands, or "
-            "the column has the time from one row to the next. If rows are that far apart, leave "
-            f"the column out and give the rate: --rate-hz {1.0 / here:.6g}."
-        )
-    if here < before:
-        return (
-            f"{table.place(row, 'time')}: time decreases from {before:.9g} s to {here:.9g} s. "
-            "Sort the rows by time, or split the table there."
-        )
-    return (
-        f"{table.place(row, 'time')}: the time {here:.9g} s is repeated. Remove the repeated "
-        "row; if time has too few digits (1 us is needed), give the rate instead."
-    )
-
-
-def _set_times(samples: NDArray[np.void], microseconds: NDArray[np.int64]) -> None:
-    samples["device_time_us"] = microseconds
-    samples["host_time_ns"] = microseconds * 1000
-
-
-def _clock_goes_on(table: Table, factor: float) -> tuple[Table, list[str]]:
-    """The table with a clock that goes on where its counter begins again, and a sentence on it."""
-    clock = table.columns["time"]
-    values, places, period = continued_clock(clock.values, factor)
-    if not len(places):
-        return table, []
-    begins = "0" if clock.values.min() >= 0.0 else f"{-0.5 * period:.10g}"
-    bits = math.log2(period)
-    length = f"2^{bits:.0f}" if bits in COUNTERS else f"{period * factor:.10g} s"
-    sentence = (
-        f"The clock begins at {begins} again at {_listed(table, places)}, after {length}: it was "
-        "continued."
-    )
-    continued_time = {"time": Column(clock.heading, values)}
-    return replace(table, columns={**table.columns, **continued_time}), [sentence]
-
-
 def _opening_goes_on(samples: NDArray[np.void], table: Table, joint: Joint) -> list[str]:
     """Continue a position that begins again; give a sentence on it. InputError for marks in it."""
     turn = 2.0 * math.pi if joint.kind == "rotary" else None
@@ -298,7 +220,7 @@ def _opening_goes_on(samples: NDArray[np.void], table: Table, joint: Joint) -> l
         _refuse_marks(counts, table)
         return []
     samples["opening"] = continued_position
-    where = _listed(table, places)
+    where = table.places(places)
     return [f"The opening begins again at {where}, after its period: it was continued."]
 
 
@@ -332,13 +254,13 @@ def _note_on_jumps(samples: NDArray[np.void], table: Table, joint: Joint) -> lis
         others = factor * float(np.delete(np.abs(np.diff(position)), jumps - 1).max())
         sentences.append(
             f"The opening jumps by {size:.4g} {unit} from one sample to the next at "
-            f"{_listed(table, jumps)}, and by {others:.3g} {unit} at most elsewhere. If this is no "
+            f"{table.places(jumps)}, and by {others:.3g} {unit} at most elsewhere. If this is no "
             "motion (a sensor of an unknown period, or one that lost its place), correct or remove "
             "those rows: strokes are found from it."
         )
     elif lone is not None and np.all(whole[max(lone - 1, 0) : lone + 1]):
         sentences.append(
-            f"The opening is {factor * position[lone]:.6g} {unit} at {_listed(table, [lone])} "
+            f"The opening is {factor * position[lone]:.6g} {unit} at {table.places([lone])} "
             "alone, farther from the samples before and after than it goes anywhere else. If this "
             "is no motion, remove that row: strokes are found from it."
         )
@@ -348,17 +270,10 @@ def _note_on_jumps(samples: NDArray[np.void], table: Table, joint: Joint) -> lis
             if bits:
                 sentences.append(
                     f"{channel} jumps between the ends of a counter of {bits} bits at "
-                    f"{_listed(table, places)}: negative numbers read without their sign, or "
+                    f"{table.places(places)}: negative numbers read without their sign, or "
                     "numbers too large for it. Export them as signed numbers, or of more bits."
                 )
     return sentences
-
-
-def _listed(table: Table, places: Sequence[int] | NDArray[np.int64]) -> str:
-    """The first rows of some, and how many more there are."""
-    listed = ", ".join(table.place(int(row)).rpartition(", ")[2] for row in places[:MOST_PLACES])
-    more = f" and {len(places) - MOST_PLACES} more" if len(places) > MOST_PLACES else ""
-    return listed + more
 
 
 def _label(

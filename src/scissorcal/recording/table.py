@@ -26,9 +26,11 @@ Wanted = Mapping[str, str | int]
 LONGEST_COLUMN_NUMBER = 9
 """Digits of a column's number; a longer one is a heading."""
 
-
 SHOWN = 60
 """Characters of a heading or a line that a sentence shows."""
+
+MOST_PLACES = 3
+"""Rows that a sentence lists."""
 
 
 class Column(NamedTuple):
@@ -61,6 +63,12 @@ class Table:
         where = f"line {self.lines[row]}" if self.lines is not None else f"row {row + 1}"
         column = f", column {shortened(self.columns[channel].heading)!r}" if channel else ""
         return f"{self.path}, {where}{column}"
+
+    def places(self, rows: Sequence[int] | NDArray[np.int64]) -> str:
+        """Name the first of some rows, without the file, and how many more there are."""
+        listed = ", ".join(self.place(int(row)).rpartition(", ")[2] for row in rows[:MOST_PLACES])
+        more = f" and {len(rows) - MOST_PLACES} more" if len(rows) > MOST_PLACES else ""
+        return listed + more
 
 
 def shortened(text: str) -> str:

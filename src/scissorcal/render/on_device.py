@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scissorcal.device.motion import DEADLINE, Samples
+from scissorcal.device.loop_verdicts import DEADLINE
+from scissorcal.device.motion import Samples
 from scissorcal.device.session import RigSession
 from scissorcal.device.upload import load_image
 from scissorcal.errors import DeviceError

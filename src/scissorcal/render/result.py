@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.aliases import Array
-from scissorcal.device.motion import MotionReport, Samples, loop_verdicts
+from scissorcal.device.loop_verdicts import loop_verdicts
+from scissorcal.device.motion import MotionReport, Samples
 from scissorcal.device.session import ShowProgress
 from scissorcal.device.timing import FeltLag, LoopRights, Percentiles, TimeHistogram
 from scissorcal.kernel import EnergyLedger, SampleFlag, StateFlag

@@ -11,12 +11,7 @@ from typing import TYPE_CHECKING
 from scissorcal.identity import bytes_digest
 from scissorcal.report.numbers import short, unit_text
 from scissorcal.report.panel import Chart, Panel, Picture, Row, columns, limit_text
-from scissorcal.report.pictures import (
-    PAGE_BYTES,
-    PICTURE_BYTES,
-    Image,
-    place_pictures,
-)
+from scissorcal.report.pictures import PAGE_BYTES, PICTURE_BYTES, Image, place_pictures
 from scissorcal.report.signature_block import SIGNATURE, signature_block
 from scissorcal.report.svg import svg
 from scissorcal.verdicts import Verdict

@@ -208,3 +208,12 @@ def _round(number: float, digits: int) -> float:
 def shown_unit(unit: str) -> tuple[float, str]:
     """Factor and unit in which a parameter is shown: angles in degrees."""
     return (math.degrees(1.0), "°") if unit == "rad" else (1.0, unit)
+
+
+def shown_place(unit: str) -> tuple[float, str]:
+    """Factor and unit in which places of a motion are shown that is stored in rad, or in m.
+
+    >>> shown_place("m")
+    (1000.0, 'mm')
+    """
+    return (math.degrees(1.0), "deg") if unit == "rad" else (1e3, "mm")

@@ -11,6 +11,7 @@ import numpy as np
 
 from scissorcal.calibration.stroke_intervals import LEAST_PLATEAU, Interval, Plateau
 from scissorcal.report.html import panels_page
+from scissorcal.report.numbers import shown_place
 from scissorcal.report.panel import (
     Axis,
     Chart,
@@ -349,12 +350,12 @@ def _times(found: Interval, factor: float) -> Interval:
 
 
 def _place_unit(shown: Shown) -> str:
-    return "deg" if shown.place == "rad" else "mm"
+    return shown_place(shown.place)[1]
 
 
 def _per(shown: Shown) -> float:
     """From a slope per rad (or m) to one per deg (or mm)."""
-    return float(np.pi / 180.0) if shown.place == "rad" else 1e-3
+    return 1.0 / shown_place(shown.place)[0]
 
 
 def _in_shown(shown: Shown, value: float) -> float:

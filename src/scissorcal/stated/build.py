@@ -10,11 +10,11 @@ import numpy as np
 from scissorcal.aliases import Array
 from scissorcal.calibration import FitResult, FitSeries, FittedParameter
 from scissorcal.errors import InputError
-from scissorcal.model import as_pair, spline_of
+from scissorcal.model import as_pair, as_share, draw_columns, draw_share, spline_of
 from scissorcal.package import STATED_SOURCE, ModelPackage, open_package, scene_depth
 from scissorcal.package import build_package as build_from_fits
 from scissorcal.recipe import Recipe, Scene, checked_recipe, stated_curve
-from scissorcal.stated.numbers import Blades, Friction, Material, draw
+from scissorcal.stated.numbers import Blades, Friction, Material
 
 DRAWS = 200
 """What a package keeps of the stated spread."""
@@ -47,7 +47,8 @@ def build_package(
     The package is rendered, exported and opened like any other; its warnings say that its numbers
     were stated. ``scene`` is what is rendered: by default openings of 12 to 50 degrees at 0.05 to
     1 rad/s, with the material from 20 to 80 % of the blades' length. Each stated number is drawn
-    from a log-normal of its mean and standard deviation, independently, by ``seed``.
+    from a log-normal of its mean and standard deviation, and ``kappa``, a share, from a beta
+    distribution; independently, by ``seed``.
 
     Raises InputError for numbers that make no recipe or a scene that presses deeper than a law
     of one's own was asked for, ModelError for a law that gives no number or falls, and VerdictError
@@ -116,11 +117,12 @@ def _cut(material: Material, recipe: Recipe, rng: np.random.Generator) -> FitRes
     structure = geometry_of(recipe, stated_curve(recipe.rig.edge).edge)
     structure |= {"rate_damping": False, "fracture": "none", **response.structure}
     if material.toughness_J_per_m2 is not None:
-        toughness = _drawn({"J": as_pair("toughness", material.toughness_J_per_m2)}, rng)["J"]
-        columns["fracture_energy"] = toughness * material.thickness_mm * 1e-3
+        toughness = {"J": as_pair("toughness", material.toughness_J_per_m2)}
+        thickness_m = material.thickness_mm * 1e-3
+        columns["fracture_energy"] = draw_columns(toughness, rng, DRAWS)["J"] * thickness_m
         structure["fracture"] = "smooth"
     if material.kappa is not None:
-        columns |= _drawn({"kappa": as_pair("kappa", material.kappa)}, rng)
+        columns["kappa"] = draw_share(*as_share("kappa", material.kappa), rng, DRAWS)
         structure["fracture"] = "rippled"
     return _as_fit("cut", response.words, columns, structure)
 
@@ -135,8 +137,8 @@ class _Response:
 
 
 def _power(material: Material, rng: np.random.Generator) -> _Response:
-    drawn = _drawn(material.stated, rng)
-    columns = {"response_force": drawn["force_N"], "response_exponent": drawn["exponent"]}
+    values = draw_columns(material.stated, rng, DRAWS)
+    columns = {"response_force": values["force_N"], "response_exponent": values["exponent"]}
     return _Response("power response, stated", columns, {"response": "power"})
 
 
@@ -144,8 +146,8 @@ def _law(material: Material, recipe: Recipe, rng: np.random.Generator) -> _Respo
     assert material.law is not None
     low, high = (1e-3 * depth for depth in material.depths_mm)
     allowed = SHARE_OF_TOLERANCE * 0.01 * recipe.scene.tolerance_percent
-    drawn = _drawn(material.stated, rng)
-    force, exponent, shape, knots, _ = spline_of(material.law, drawn, (low, high), allowed)
+    values = draw_columns(material.stated, rng, DRAWS)
+    force, exponent, shape, knots, _ = spline_of(material.law, values, (low, high), allowed)
     columns = {"response_force": force, "response_exponent": exponent}
     columns |= {f"response_shape_{k}": shape[:, k - 1] for k in range(1, len(knots) - 1)}
     words = f"{type(material.law).__name__} response, stated"
@@ -157,15 +159,8 @@ def _friction(friction: Friction, recipe: Recipe, rng: np.random.Generator) -> F
     law = "stribeck" if stribeck else "coulomb+viscous" if viscous else "coulomb"
     middle = float(np.mean(recipe.scene.opening_rad))
     structure = {"law": law, "symmetric": True, "joint": "rotary", "angle_center": middle}
-    return _as_fit("friction", f"{law}, stated", _drawn(friction.stated, rng), structure)
-
-
-def _drawn(stated: dict[str, tuple[float, float]], rng: np.random.Generator) -> dict[str, Array]:
-    """Columns by name: the stated numbers first, then draws."""
-    cloud = draw(stated, rng, DRAWS)
-    centre = np.array([value for value, _ in stated.values()])
-    rows = np.concatenate([centre[None, :], cloud])
-    return {name: rows[:, column] for column, name in enumerate(stated)}
+    columns = draw_columns(friction.stated, rng, DRAWS)
+    return _as_fit("friction", f"{law}, stated", columns, structure)
 
 
 def _as_fit(

@@ -3,11 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from scissorcal.aliases import Array
 from scissorcal.errors import InputError
-from scissorcal.model import ResponseLaw, as_pair, law_parameters
+from scissorcal.model import ResponseLaw, as_pair, as_share, law_parameters
 
 Number = float | tuple[float, float]
 """A number, or a number and its standard deviation."""
@@ -50,17 +47,15 @@ class Material:
         if self.toughness_J_per_m2 is not None:
             as_pair("Material.toughness_J_per_m2", self.toughness_J_per_m2)
         if self.kappa is not None:
-            self._check_kappa(*as_pair("Material.kappa", self.kappa))
+            self._check_kappa(self.kappa)
         _ = self.stated
 
-    def _check_kappa(self, value: float, sd: float) -> None:
+    def _check_kappa(self, kappa: Number) -> None:
         if self.toughness_J_per_m2 is None:
             raise InputError("Material.kappa needs toughness_J_per_m2: nothing cracks without it.")
-        if value + 3.0 * sd >= 1.0:
-            raise InputError(
-                f"Material.kappa = {self.kappa!r} is a share, and three standard deviations above "
-                "it must lie below 1. Leave kappa out where cracks run without a jump."
-            )
+        if as_pair("Material.kappa", kappa)[0] == 1.0:
+            raise InputError("Material.kappa = 1 is a crack without jumps: leave kappa out for it.")
+        as_share("Material.kappa", kappa)
 
     @property
     def stated(self) -> dict[str, tuple[float, float]]:
@@ -138,12 +133,3 @@ class Friction:
             for name, (key, value) in given.items()
             if value is not None
         }
-
-
-def draw(stated: dict[str, tuple[float, float]], rng: np.random.Generator, count: int) -> Array:
-    """Draws (count, parameters) of independent log-normal numbers of the stated mean and sd."""
-    columns = []
-    for value, sd in stated.values():
-        spread = np.sqrt(np.log1p((sd / value) ** 2))
-        columns.append(value * np.exp(spread * rng.standard_normal(count) - 0.5 * spread**2))
-    return np.stack(columns, axis=-1)

@@ -337,7 +337,9 @@ class Engine:
             if state.state in WAITING and self._counts(step, item):
                 return f"{item} is {state.state}"
         if step.kind == "sign":
-            return self._unlike_signed(facts)
+            from scissorcal.workday.reviewed import unlike_signed
+
+            return unlike_signed(self, facts["review"])
         if step.kind == "verify" and not self.file(step.inputs[0]).is_file():
             return f"{step.inputs[0]} is missing"
         efforts = EFFORTS if step.by_effort else ("",)
@@ -347,20 +349,6 @@ class Engine:
         if step.kind == "package" and facts["review"] != self.review():
             return "it carries another review than there is now"
         return ""
-
-    def _unlike_signed(self, facts: dict[str, Any]) -> str:
-        """Which of the files that a signature covers are not as they were signed."""
-        from scissorcal.package.review import Review
-        from scissorcal.workday.reviewed import changed_since
-
-        changed = changed_since(self, Review.model_validate(facts["review"]))
-        if not changed:
-            return ""
-        more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
-        found = f"{', '.join(changed[:3])}{more} since it was signed"
-        if any(one.startswith("report/") for one in changed):
-            found += "; 'scissorcal report' writes it anew"
-        return found
 
     def _of_render(self, step: Step, why: str) -> StepState:
         """A rendering is done where the newest one is of the package that is there."""

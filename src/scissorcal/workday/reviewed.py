@@ -1,17 +1,14 @@
 """What a signature covers: every file that a reviewer reads, and all that it rests on."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from scissorcal.foreign import read_foreign
 from scissorcal.foreign.formats import PAGE
-from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN
+from scissorcal.package.review import REPORT_PAGE, REPORT_TWIN, Review
 from scissorcal.report.signature_block import unsigned_digest, with_signature
 from scissorcal.workday.states import DayStates
 from scissorcal.workday.steps import STEPS
-
-if TYPE_CHECKING:
-    from scissorcal.package.review import Review
 
 COVERED = ("recordings", "photographs", "fit", "verify")
 """Kinds of steps whose files a report rests on, beside the recipe and its drawings."""
@@ -30,7 +27,19 @@ def reviewed_content(day: DayStates) -> dict[str, str]:
     return found
 
 
-def changed_since(day: DayStates, review: "Review") -> tuple[str, ...]:
+def unlike_signed(day: DayStates, stored_review: dict[str, Any]) -> str:
+    """Which of the files that a signature covers are not as they were signed; "" where all are."""
+    changed = _changed_since(day, Review.model_validate(stored_review))
+    if not changed:
+        return ""
+    more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
+    found = f"{', '.join(changed[:3])}{more} since it was signed"
+    if any(change.startswith("report/") for change in changed):
+        found += "; 'scissorcal report' writes it anew"
+    return found
+
+
+def _changed_since(day: DayStates, review: Review) -> tuple[str, ...]:
     """Files that are not as they were signed, each with what happened to it."""
     now, page = reviewed_content(day), day.workspace.report_html
     found = []
@@ -76,7 +85,7 @@ def _page_digest(day: DayStates, page: Path) -> str:
     return str(day.index.facts(page, "sha256 without signature", read)["sha256"])
 
 
-def _shows(page: Path, review: "Review") -> bool:
+def _shows(page: Path, review: Review) -> bool:
     """Whether the page shows this signature and no other."""
     text = _page_text(page)
     try:

@@ -98,6 +98,33 @@ def test_an_estimate_that_moves_with_the_cutoff_is_named():
     assert "inertia changes by 9" in moved.why
 
 
+def test_what_the_encoders_steps_take_off_the_inertia_is_expected():
+    """Steps of 0.2 % and 0.5 % of the acceleration: 0.3 % less inertia is what they explain."""
+    layout = Layout((Parameter("inertia", "1", LOG, 0.0, 1.0, ""),))
+    draws = 5e-4 * np.random.default_rng(5).standard_normal((500, 1))
+    here, shares = np.zeros(1), (2e-3, 5e-3)
+    less = bandwidth_verdict(layout, draws, here, here - 3e-3, (61.0, 73.0), shares)
+    more = bandwidth_verdict(layout, draws, here, here + 1e-2, (61.0, 73.0), shares)
+    assert less.value == pytest.approx(0.0, abs=1e-9)
+    assert (less.status, more.status) == ("pass", "fail")
+
+
+def test_the_inertia_holds_what_the_encoders_steps_take_off():
+    """0.1 mrad and 0.2 mN m of noise: without that the inertia is 6 of its sds too low."""
+    truth = Truth(noise=2e-4, rho=0.0)
+    settings = FitFriction(law="coulomb+viscous", symmetry="asymmetric", critic=False)
+    for seed in (21, 22):
+        recording = friction_recording(truth, np.random.default_rng(seed), (0.2, 0.6, 1.5))
+        samples = recording.samples.copy()
+        samples["opening"] = np.round(samples["opening"] / 1e-4) * 1e-4
+        rough = dataclasses.replace(recording, samples=samples)
+        fit = fit_friction((rough,), settings, effort="standard", rng=np.random.default_rng(7))
+        inertia = fit.parameter("inertia")
+        assert abs(inertia.mean - truth.inertia) < 3 * inertia.sd
+        assert inertia.sd < 5e-3 * truth.inertia
+        assert {v.check: v.status for v in fit.verdicts}["bandwidth"] == "pass"
+
+
 def test_a_nuisance_that_moves_with_the_cutoff_fails_nothing():
     """The delay of the torque describes the motor's electronics, and is not rendered."""
     rows = [Parameter(name, "1", LOG, 0.0, 1.0, "") for name in ("inertia", "delay")]

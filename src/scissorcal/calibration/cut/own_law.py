@@ -10,7 +10,14 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.parameters import FittedParameter
 from scissorcal.calibration.result import FitResult
 from scissorcal.errors import InputError
-from scissorcal.model import ResponseLaw, fit_knots, law_parameters, refuse_falling, response_of
+from scissorcal.model import (
+    ResponseLaw,
+    draw_columns,
+    fit_knots,
+    law_parameters,
+    refuse_falling,
+    response_of,
+)
 
 CHECKED = 50
 """Draws of a law's prior at which it must rise, beside its own numbers."""
@@ -27,12 +34,7 @@ def refuse_unusable(law: ResponseLaw, reference_m: float) -> None:
             f"The law {type(law).__name__} leaves nothing to fit: give a number and its standard "
             "deviation, the prior, for what the data are to tell."
         )
-    rng = np.random.default_rng(0)
-    columns = {}
-    for name, (value, sd) in stated.items():
-        spread = np.sqrt(np.log1p((sd / value) ** 2))
-        z = np.append(0.0, rng.standard_normal(CHECKED))
-        columns[name] = value * np.exp(spread * z)
+    columns = draw_columns(stated, np.random.default_rng(0), CHECKED)
     refuse_falling(law, fit_knots(reference_m), columns)
 
 

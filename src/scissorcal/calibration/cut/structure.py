@@ -17,6 +17,7 @@ from scissorcal.model import (
     Response,
     ResponseLaw,
     law_parameters,
+    log_normal,
     response_of,
 )
 from scissorcal.model.checks import LARGEST, SMALLEST
@@ -363,11 +364,9 @@ def _own_rows(own: ResponseLaw) -> list[Parameter]:
     rows = []
     for name, (value, sd) in law_parameters(own).items():
         if sd > 0.0:
-            variance = float(np.log1p((sd / value) ** 2))
-            centre = float(np.log(value)) - 0.5 * variance
             unit = name.rpartition("_")[2] if "_" in name else "1"
             meaning = f"of {type(own).__name__}"
-            rows.append(Parameter(name, unit, LOG, centre, variance**0.5, meaning))
+            rows.append(Parameter(name, unit, LOG, *log_normal(value, sd), meaning))
     return rows
 
 

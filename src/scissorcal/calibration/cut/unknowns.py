@@ -9,7 +9,7 @@ from scissorcal.calibration.cut.structure import LOADED, cutting_from
 from scissorcal.calibration.parameters import Layout, Parameter
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.signals.zeros import DriveZero, idle_zero
-from scissorcal.model import Cutting, edge_height, settled_contact
+from scissorcal.model import Cutting, edge_height, log_normal, settled_contact
 from scissorcal.model.cutting import torque_at, within_thickness
 from scissorcal.model.terms import LOG
 from scissorcal.recipe.schema import Recipe
@@ -266,10 +266,9 @@ def with_toughness(fit: FitResult, recipe: Recipe, rng: np.random.Generator) -> 
     names = [parameter.name for parameter in fit.parameters]
     if "fracture_energy" not in names:
         return fit
-    variance = float(np.log1p((material.thickness_sd_mm / material.thickness_mm) ** 2))
-    centre = float(np.log(material.thickness_mm * 1e-3)) - 0.5 * variance
-    thickness = centre + np.sqrt(variance) * rng.standard_normal(len(fit.draws))
-    u = np.log(fit.column("fracture_energy")) - thickness
+    centre, spread = log_normal(1e-3 * material.thickness_mm, 1e-3 * material.thickness_sd_mm)
+    log_thickness = centre + spread * rng.standard_normal(len(fit.draws))
+    u = np.log(fit.column("fracture_energy")) - log_thickness
     row = Layout((Parameter("toughness", "J/m^2", LOG, *prior.normal(), MEANING),))
     draws = u[:, None]
     return replace(fit, derived=row.fitted(draws), derived_draws=row.columns(draws))

@@ -123,16 +123,24 @@ def near_rest_verdict(experiment: FrictionExperiment, draws: Array) -> Verdict:
 
 
 def bandwidth_verdict(
-    layout: Layout, draws: Array, here: Array, there: Array, cutoffs_Hz: tuple[float, float]
+    layout: Layout,
+    draws: Array,
+    here: Array,
+    there: Array,
+    cutoffs_Hz: tuple[float, float],
+    encoder_shares: tuple[float, float] = (0.0, 0.0),
 ) -> Verdict:
     """Judge whether the estimate depends on the cutoff.
 
     ``here`` and ``there`` (p,) are the optima at both cutoffs, ``draws`` (k, p) the posterior at
     the first, all unconstrained. An error that both share cancels; the rest is the filter's, and
     must be small against the posterior's width. Nuisance parameters (delay, noise, cogging) are not
-    judged: nothing of them is rendered.
+    judged: nothing of them is rendered. The inertia is expected to fall by what the encoder's share
+    of the acceleration grows (:func:`~.choice.with_encoder_error`), give or take as much.
     """
-    moved = np.abs(there - here) / draws.std(axis=0, ddof=1)
+    grown = encoder_shares[1] - encoder_shares[0]
+    expected = np.array([-grown if name == "inertia" else 0.0 for name in layout.names])
+    moved = np.abs(there - here - expected) / np.hypot(draws.std(axis=0, ddof=1), expected)
     judged = [i for i, name in enumerate(layout.names) if name not in NUISANCE]
     worst = max(judged, key=lambda i: moved[i])
     value, name = float(moved[worst]), layout.names[worst]

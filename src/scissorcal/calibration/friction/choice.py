@@ -149,6 +149,25 @@ def with_lack_of_fit(
     return replace(posterior, draws=posterior.draws + np.array(size) * noise)
 
 
+def with_encoder_error(
+    posterior: Posterior, law: FrictionExperiment, rng: np.random.Generator
+) -> Posterior:
+    """The posterior with the error that the encoder's steps give the inertia in its draws.
+
+    What is regressed on has errors, so the inertia is too low by their share of the acceleration's
+    mean square (Fuller 1987, Measurement Error Models, section 1.1). Draws are raised by that
+    share, with a standard deviation of as much: steps are white only where motion crosses several
+    a tick. With a share of 0 nothing changes, and no random number is drawn.
+    """
+    share = law.windows.encoder_share
+    if share == 0.0:
+        return posterior
+    draws = posterior.draws.copy()
+    error = 1.0 + rng.standard_normal(len(draws))
+    draws[:, law.layout.names.index("inertia")] += share * error
+    return replace(posterior, draws=draws)
+
+
 def _size(name: str, value: float, share: float, drive: float) -> float:
     """Standard deviation of the error of one parameter, in its unconstrained coordinate."""
     row = PARAMETERS.get(side_of(name, PARAMETERS) or "")

@@ -24,7 +24,12 @@ from scissorcal.calibration.friction.checks import (
     physical_verdict,
     start_verdict,
 )
-from scissorcal.calibration.friction.choice import choose_law, usual_law, with_lack_of_fit
+from scissorcal.calibration.friction.choice import (
+    choose_law,
+    usual_law,
+    with_encoder_error,
+    with_lack_of_fit,
+)
 from scissorcal.calibration.friction.layout import LawChoice
 from scissorcal.calibration.friction.model import FrictionExperiment, design
 from scissorcal.calibration.friction.noise import (
@@ -124,6 +129,7 @@ def fit_friction(
     if prior is None:  # a study simulates the law itself
         posterior = with_lack_of_fit(posterior, law, settings.lack_of_fit, rng)
         posterior = opened(posterior, law, slow, chosen.held_out_rms, rng)
+        posterior = with_encoder_error(posterior, law, rng)
     usual = settings.between_recordings
     between = compare_recordings(law, chosen.optimum.point, recordings, usual, rng)
     posterior = widened(posterior, between, rng)
@@ -279,7 +285,8 @@ def _bandwidth(
     candidate = replace(there.candidate(there.observed), starts=here[None, :])
     optimum = candidate.optimum(there.series)
     cutoffs = (law.windows.half_at, other_Hz)
-    return bandwidth_verdict(law.layout, posterior.draws, here, optimum.point, cutoffs)
+    shares = (law.windows.encoder_share, windows.encoder_share)
+    return bandwidth_verdict(law.layout, posterior.draws, here, optimum.point, cutoffs, shares)
 
 
 def _notes(

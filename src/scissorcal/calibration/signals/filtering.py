@@ -113,7 +113,7 @@ HALF_AT = 0.365
 """Frequency times knot distance at which a quadratic B-spline passes half: sinc^3 = 1 / 2."""
 ENCODER_SHARE = 2.5e-3
 """Largest share of the encoder's steps in the acceleration's mean square; a fitted inertia is too
-low by the same share."""
+low by the same share, which its draws contain."""
 LONGEST_S = 0.1
 """Windows are not lengthened beyond this."""
 TURN_S = 5e-3

@@ -52,6 +52,7 @@ class Windows:
     without a gap begin. ``slope`` (n,) is the time derivative of the weighed drive, ``tick_s`` the
     time between samples; ``held`` says that commands held the drive from one to the next,
     ``lengthening`` how many times longer the encoder asked windows to be than the cutoff.
+    ``step`` is that of the encoder, 0 where none is to be seen.
     """
 
     bins: Bins
@@ -66,6 +67,15 @@ class Windows:
     tick_s: float
     held: bool
     lengthening: float = 1.0
+    step: float = 0.0
+
+    @property
+    def encoder_share(self) -> float:
+        """Share of the encoder's steps in the acceleration's mean square over these windows."""
+        twice = second_derivative(len(self.weights) // 3, 1.0 / self.tick_s)
+        error = float(np.sum(twice**2)) * self.step**2 / 12.0
+        square = float(np.mean(self.bins.acceleration**2))
+        return error / square if 0.0 < error < square else float(error > 0.0)
 
     @property
     def half_at(self) -> float:
@@ -166,7 +176,8 @@ def weigh(
         shifted = replace(piece, first=piece.first + samples, starts=piece.starts + samples)
         pieces.append(shifted)
         samples += high - low
-    return replace(_joined(pieces, loaded), lengthening=knot / asked)
+    step = float(np.nan_to_num(np.max([motion.step for motion in motions])))
+    return replace(_joined(pieces, loaded), lengthening=knot / asked, step=step)
 
 
 def _over(first: Integers, weights: Array) -> Callable[[Array], Array]:

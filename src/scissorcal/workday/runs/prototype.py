@@ -30,7 +30,7 @@ from scissorcal.workday.plan import make_plan
 from scissorcal.workday.rigs import SIM
 from scissorcal.workday.runs.fit import available, load_result
 from scissorcal.workday.runs.package import built_package
-from scissorcal.workday.runs.render import package_warnings
+from scissorcal.workday.runs.render import unsettled_states
 from scissorcal.workday.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -41,7 +41,6 @@ TRACK_REQUEST = (
     "The motors stay off. Move the handles so that the blade's tip taps the plate, at several "
     "places."
 )
-_STALE = "stale"
 HAND_POINTS = 1500
 """Of a recorded hand: 30 s at 50 Hz."""
 LONGEST_HAND_s = 60.0
@@ -59,21 +58,13 @@ def workspace_scene(
     engine = Engine.of(workspace)
     fits = [load_result(engine, what) for what in available(engine, ("cut", "friction"))]
     package = open_package(path, warn=False)
-    said = package_warnings(workspace, package_path)
     scene = scene_of(
         package,
         made_utc=(now or datetime.now(UTC)).strftime("%Y-%m-%dT%H:%M:%SZ"),
         version=VERSION,
         fits=fits,
         hands=workspace_hands(workspace),
-        states=[
-            *(() if package_path else _origin(workspace)),
-            *(
-                State(label=_STALE if _STALE in sentence else "unverified", sentence=sentence)
-                for sentence in said
-                if sentence not in package.warnings
-            ),
-        ],
+        states=() if package_path else (*_origin(workspace), *_unsettled(engine)),
     )
     if package_path:
         return scene
@@ -112,6 +103,11 @@ def _origin(workspace: Workspace) -> tuple[State, ...]:
     which = "all" if all(stated) else f"{sum(stated)} of {len(stated)}"
     sentence = f"Simulated: {which} recordings of friction and cuts come from a virtual rig."
     return (State(label="simulated", sentence=sentence),)
+
+
+def _unsettled(engine: Engine) -> tuple[State, ...]:
+    """What is unsettled in the workspace, labelled by the state of its step."""
+    return tuple(State(label=state, sentence=said) for state, said in unsettled_states(engine))
 
 
 def workspace_hands(workspace: Workspace) -> tuple[Hand, ...]:

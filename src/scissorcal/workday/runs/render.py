@@ -29,6 +29,7 @@ from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import NONE, RenderOptions, RigOptions
 from scissorcal.workday.runs.at_rig import RigRun, RigTask, run_at_rig
 from scissorcal.workday.runs.fit import available, load_result
+from scissorcal.workday.states import State
 from scissorcal.workday.tracking.tracking_camera import TrackingCamera
 from scissorcal.workday.workspace import Workspace
 
@@ -223,12 +224,19 @@ def package_warnings(workspace: Workspace, package_path: Path | None = None) -> 
         return ()
     if package_path is not None:
         return package.warnings
+    return (*(sentence for _, sentence in unsettled_states(engine)), *package.warnings)
+
+
+def unsettled_states(engine: Engine) -> tuple[tuple[State, str], ...]:
+    """A package that is stale and fits that are unverified: each state with a sentence on it."""
     stale = _stale(engine)
-    said = [stale] if stale else []
-    said += [
-        f"The {name.replace('fit', 'fit of')} is unverified: no trust check says whether its "
-        f"intervals hold ('{engine.state(name).command}')."
-        for name in ("fit friction", "fit cut")
-        if engine.state(name).state == "unverified"
-    ]
-    return (*said, *package.warnings)
+    unsettled: list[tuple[State, str]] = [("stale", stale)] if stale else []
+    for name in ("fit friction", "fit cut"):
+        fit = engine.state(name)
+        if fit.state == "unverified":
+            sentence = (
+                f"The {name.replace('fit', 'fit of')} is unverified: no trust check says whether "
+                f"its intervals hold ('{fit.command}')."
+            )
+            unsettled.append((fit.state, sentence))
+    return tuple(unsettled)
