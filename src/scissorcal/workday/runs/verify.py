@@ -1,4 +1,4 @@
-"""The trust check of a workspace's fits: in parallel, resumable, kept beside the fit."""
+"""The verification of a workspace's fits: in parallel, resumable, kept beside the fit."""
 
 import pickle
 import time
