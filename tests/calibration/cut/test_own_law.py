@@ -27,7 +27,7 @@ class Stiffening:
     def parameters(self):
         return {"total_N": (2.0, 2.0), "exponent": (1.8, 0.4), "linear_share": 1e-3}
 
-    def force_N(self, indentation_m, total_N, exponent, linear_share):  # noqa: N802
+    def force_N(self, indentation_m, total_N, exponent, linear_share):
         u = indentation_m / SMOOTH.reference
         return total_N * (linear_share * u + (1.0 - linear_share) * u**exponent)
 
@@ -37,7 +37,7 @@ class Softening:
     def parameters(self):
         return {"peak_N": (1.0, 0.1)}
 
-    def force_N(self, indentation_m, peak_N):  # noqa: N802
+    def force_N(self, indentation_m, peak_N):
         u = indentation_m / SMOOTH.reference
         return peak_N * u * np.exp(-u)
 
@@ -47,7 +47,7 @@ class Broken:
     def parameters(self):
         return {"scale_N": (1.0, 0.1)}
 
-    def force_N(self, indentation_m, scale_N):  # noqa: N802
+    def force_N(self, indentation_m, scale_N):
         return scale_N * np.sqrt(indentation_m - 1e-5)
 
 
@@ -56,7 +56,7 @@ class Settled:
     def parameters(self):
         return {"scale_N": 1.0}
 
-    def force_N(self, indentation_m, scale_N):  # noqa: N802
+    def force_N(self, indentation_m, scale_N):
         return scale_N * indentation_m
 
 
