@@ -132,7 +132,7 @@ def photographed(width: int, strength: float, rng: np.random.Generator, *, known
     picture = render(layers, lens, random_looks(rng, px_per_mm, strength), rng)
     data = np.frombuffer(as_jpeg(picture, int(rng.integers(75, 97))), dtype=np.uint8)
     read = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), dtype=np.uint8)
-    photo = Photo(read, width, height, 1, (0, 0), 1, "", "rendered.jpg")
+    photo = Photo.from_array(read, "rendered.jpg")
     return Setting(photo, assumed_camera(lens, rng) if known else None, shape, px_per_mm)
 
 

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 from benchmarks.photographs import random_looks
 
-from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
+from scissorcal.calibration.plate.fit import fit_plate
 from scissorcal.errors import ScissorcalError
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.photo import Photo
@@ -106,7 +106,7 @@ def photographed(kind: str, strength: float, rng: np.random.Generator) -> View:
     picture = render(layers, lens, random_looks(rng, 1e-3 * focal / distance, strength), rng)
     data = np.frombuffer(as_jpeg(picture, int(rng.integers(75, 97))), dtype=np.uint8)
     read = np.asarray(cv2.imdecode(data, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
-    photo = Photo(read, WIDTH, HEIGHT, 1, (0, 0), 1, "", "rendered.jpg")
+    photo = Photo.from_array(read, "rendered.jpg")
     return View(photo, board, assumed_camera(lens, rng), truth, kind)
 
 
@@ -132,7 +132,7 @@ def measured(view: View) -> dict[str, Any]:
     """Find and fit one view, and compare it with the true pose."""
     start = time.perf_counter()
     try:
-        found = PosePhoto("rendered.jpg", find_board(view.photo, view.board))
+        found = find_board(view.photo, view.board)
         fit = fit_plate([found], view.camera)
     except ScissorcalError as error:
         return {"refused": str(error)}
@@ -144,8 +144,8 @@ def measured(view: View) -> dict[str, Any]:
     z = np.abs(away) / np.sqrt(np.diag(known))
     return {
         **errors(pose.matrix, np.array(pose.translation_m), view),
-        "corners": len(found.detection.ids),
-        "side_px": found.detection.square_px,
+        "corners": len(found.ids),
+        "side_px": found.square_px,
         "failed": failed,
         "ambiguous": "ambiguity" in failed,
         "z_rotation": z[:3].tolist(),

@@ -22,7 +22,7 @@ from benchmarks.photographs import CastShadow, Lamp, TexturedLayer, random_looks
 
 from scissorcal.calibration.edge.fit import Blade, fit_blade
 from scissorcal.errors import InputError
-from scissorcal.vision.blade.photo import BladePhoto, Laid, by_blade, photograph_scissors
+from scissorcal.vision.blade.photo import BladeLayout, BladePhoto, by_blade, photograph_scissors
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import (
     BladeShape,
@@ -135,7 +135,7 @@ def photographed(
         texture_m=rng.uniform(0.3e-3, 2e-3),
     )
     blades = [outline for layer in metal[:2] for outline in layer.outlines_m]
-    layers: list[Laid] = [sheet, CastShadow.of(blades, above, metal[0].pose, lamp), *metal]
+    layers: list[Any] = [sheet, CastShadow.of(blades, above, metal[0].pose, lamp), *metal]
     looks = random_looks(rng, px_per_mm, rng.uniform(0.3, 0.8))
     picture = render(layers, lens, looks, rng, background=0.8)
     data = np.frombuffer(as_jpeg(picture, int(rng.integers(80, 97))), dtype=np.uint8)
@@ -147,7 +147,7 @@ def photographed(
         off = shape.edge_at(shape.length_m) * np.array([-np.sin(bearing), np.cos(bearing)]) * side
         tips[name] = lens.sees((tip + off)[None], pose)[0]
     return Pair(
-        Photo(read, width, height, 1, (0, 0), 1, "", "rendered.jpg"),
+        Photo.from_array(read, "rendered.jpg"),
         {"left": left, "right": right},
         lens.sees(np.zeros((1, 2)), pose)[0],
         tips,
@@ -264,7 +264,7 @@ def _measured(pairs: list[Pair]) -> list[BladePhoto]:
     for number, pair in enumerate(pairs, start=1):
         try:
             named = replace(pair.photo, source=f"{number}.jpg")
-            found.append(photograph_scissors(named, laid=Laid(mat=False)))
+            found.append(photograph_scissors(named, layout=BladeLayout(mat=False)))
         except InputError:
             if not found and number == len(pairs):
                 raise

@@ -9,8 +9,8 @@ import numpy as np
 from benchmarks.extremes.cells import Cell, Found, judged, worst_of
 
 from scissorcal.aliases import Array, Integers
-from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera
-from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
+from scissorcal.calibration.camera.fit import fit_camera
+from scissorcal.calibration.plate.fit import fit_plate
 from scissorcal.verdicts import failed
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference, left_jacobian
@@ -179,7 +179,7 @@ def _plate(name: str, extreme: str, vector: list[float], place: Array, spoil: Sp
                 if spoil is None
                 else spoil(pixels)
             )
-            photos.append(PosePhoto(f"plate-{index}", _detection(pixels, np.arange(len(points)))))
+            photos.append(_detection(pixels, np.arange(len(points)), f"plate-{index}"))
         fit = fit_plate(photos, _pinhole())
         bad = failed(fit.verdicts)
         away = difference(fit.camera_plate, Pose.from_matrix(turn, middle))
@@ -198,7 +198,7 @@ def _few(keep: list[int], rng: np.random.Generator) -> Found:
     turn = rotation(np.array([0.6, 0.0, 0.0]))
     pixels = _seen(points, turn, np.array([0.0, 0.0, 0.4]))
     pixels = pixels + NOISE_PX * rng.standard_normal(pixels.shape)
-    fit = fit_plate([PosePhoto("plate", _detection(pixels, np.array(keep)))], _pinhole())
+    fit = fit_plate([_detection(pixels, np.array(keep), "plate")], _pinhole())
     bad = failed(fit.verdicts)
     return Found("flagged" if bad else "wrong", "; ".join(verdict.why for verdict in bad))
 
@@ -224,8 +224,8 @@ def _camera(
         pixels = pixels + NOISE_PX * rng.standard_normal(pixels.shape)
         if bad is not None and index == 0:
             pixels = _spoilt(pixels, 1, bad)
-        found = Detection(CAMERA_BOARD, np.arange(len(points)), pixels, 60.0)
-        photos.append(CameraPhoto(f"board-{index}", WIDTH, HEIGHT, found))
+        ids, name = np.arange(len(points)), f"board-{index}"
+        photos.append(Detection(CAMERA_BOARD, ids, pixels, 60.0, name, WIDTH, HEIGHT))
     fit = fit_camera(photos, rng=rng)
     assert fit.camera.covariance is not None
     away = abs(fit.camera.fx - FOCAL) / float(np.sqrt(fit.camera.covariance[0, 0]))
@@ -242,8 +242,8 @@ def _spoilt(pixels: Array, count: int, value: float) -> Array:
     return spoilt
 
 
-def _detection(pixels: Array, ids: Integers) -> Detection:
-    return Detection(PLATE_BOARD, ids, pixels, 60.0)
+def _detection(pixels: Array, ids: Integers, source: str) -> Detection:
+    return Detection(PLATE_BOARD, ids, pixels, 60.0, source, WIDTH, HEIGHT)
 
 
 def _pinhole() -> Camera:

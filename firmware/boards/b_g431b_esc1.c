@@ -1,8 +1,9 @@
 /* B-G431B-ESC1 (STM32G431CB): a brushed motor between the outputs U and V.
  *
- * Not yet run on hardware. Registers and bits: RM0440; pins and alternate functions: the STM32G431
- * datasheet, table 13, and the board's schematic (UM2516). The clock is the part's own HSI16, right
- * within 1 %: the host learns its rate.
+ * Not yet run on hardware. Registers and bits: compared with ST's stm32g431xx.h (cmsis-device-g4) and
+ * stm32g4xx_ll_adc.h, _ll_opamp.h, RCC and DMA requests with NuttX's stm32g4xxxx_*.h; section numbers
+ * are RM0440's. Pins and alternate functions: stm32duino's tables of this board. The clock is the
+ * part's own HSI16, right within 1 %: the host learns its rate.
  *
  *     PB3, PB4    USART2 to the ST-LINK, 921600 baud    PB6, PB7  encoder A, B (J8)
  *     PA8, PC13   phase U, high and low side            PA2       its current, amplified by OPAMP1

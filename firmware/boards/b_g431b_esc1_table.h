@@ -34,14 +34,16 @@ const fw_board board_table = {
     .home_at_stop = 1,
 };
 
-/* The low sides must conduct for a while in each period, for the shunts and the bootstraps. */
+/* The low sides must conduct for a while in each period, for the shunts and the bootstraps: at 0.8 in
+ * 3.4 us of 41.7, with the dead time. diglet48/FOC-Stim measured that this board's shunts need 2.6. */
 const float board_duty_max = 0.8f;
 
 /* Wiring and scales that only this board knows. */
 #define MOTOR_SIGN 1.0f             /* -1 if a positive torque closes the blades */
 #define RAD_PER_COUNT 1.9174760e-4f /* negative if opening counts down */
-#define AMPS_PER_COUNT (-3.3f / 4096.0f / (0.003f * 64.0f / 7.0f)) /* shunt, network and PGA of 16 */
-#define VOLTS_PER_COUNT (3.3f / 4096.0f * (169.0f + 18.0f) / 18.0f)
+/* Shunt and gain as in SimpleFOC's example for the board; 1.5k, 2.2k and 22k leave 4/7 for the PGA's 16. */
+#define AMPS_PER_COUNT (-3.3f / 4096.0f / (0.003f * 64.0f / 7.0f))
+#define VOLTS_PER_COUNT (3.3f / 4096.0f * (169.0f + 18.0f) / 18.0f) /* 169k over 18k */
 
 /* Peripherals: RM0440, the chapter behind each. */
 enum { PWM_TOP = 3000, PERIODS = 24, CHANNELS = 2, RX_SIZE = 512, TX_SIZE = 88 };

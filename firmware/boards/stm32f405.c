@@ -1,7 +1,7 @@
 /* STM32F405: a brushed motor on a bridge with two inputs, an encoder, four analogue channels.
  *
- * Not yet run on hardware. Registers and bits: RM0090; pins and alternate functions: the STM32F405
- * datasheet, table 9.
+ * Not yet run on hardware. Registers and bits: compared with ST's SVD file STM32F40x; section numbers
+ * are RM0090's. DMA streams and alternate functions: NuttX's and stm32duino's tables.
  *
  *     PC6, PC7       USART6 to the host, 921600 baud      PA0, PA1   encoder A, B
  *     PA8, PA9       bridge IN1, IN2 (00 free, 11 brake)  PA4        motor current, mid-supply at 0 A

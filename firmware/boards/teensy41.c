@@ -2,8 +2,9 @@
  * native USB.
  *
  * Not yet run on hardware. The functions below are those of Teensyduino's core
- * (github.com/PaulStoffregen/cores, teensy4/core_pins.h and usb_serial.h), which calls setup and loop.
- * The watchdog's registers and bits: the vendor's header of the MIMXRT1062, not its reference manual.
+ * (github.com/PaulStoffregen/cores, teensy4/core_pins.h, pwm.c and usb_serial.h), which calls setup and
+ * loop. The watchdog's addresses: its imxrt.h; bits, keys and order as in tonton81/WDT_T4. Its reset
+ * needs a core whose startup.c sets IOMUXC_GPR_GPR16 to 0x00200007, as the present one does.
  *
  *     2, 3      encoder A, B                    14 (A0)  motor current, mid-supply at 0 A
  *     4, 5      bridge IN1, IN2                 15 (A1)  supply

@@ -9,6 +9,7 @@ from scissorcal.kernel import ConfigKey, ServoConfig, StateFlag, model_image
 from .bench import ENABLE, Bench
 from .elf import Image
 from .test_rendering import FELT, PAPER, PLAIN, stroke
+from .test_torn_upload import IMAGE, TORN
 
 emulator = pytest.importorskip(
     "tests.firmware.emulator", reason="needs unicorn, of the extra 'dev'", exc_type=ImportError
@@ -48,6 +49,16 @@ def test_the_binary_renders_bit_for_bit_as_the_library(
         assert arm.tick(ENABLE) == library.tick(ENABLE), f"tick {tick}"
         most = max(most, abs(arm.out.torque))
     assert most > 0.05
+
+
+def test_the_binary_answers_torn_uploads_as_the_library(stm32f405: Image) -> None:
+    memory = stm32f405.symbols["image"][1]
+    arm, library = on_arm(stm32f405, PLAIN), loaded(Bench(memory), PLAIN)
+    for make, _ in TORN.values():
+        for part in make():
+            assert arm.tick(part) == library.tick(part)
+        assert arm.configure(ConfigKey.RENDER, 1.0) == library.configure(ConfigKey.RENDER, 1.0)
+    assert arm.upload(IMAGE).crc32 == library.upload(IMAGE).crc32 != 0
 
 
 def test_a_rendered_tick_takes_few_instructions_and_little_stack(stm32f405: Image) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scissorcal import examples
 from scissorcal.errors import InputError
 from scissorcal.kernel import StepFlag, c_sources
 from scissorcal.package import ModelPackage, PackageSummary, open_package, put_review
@@ -124,6 +125,26 @@ def test_the_program_gives_the_kernels_bits(
     assert f"error bound {package.manifest.bound.stated_Nm:.2g} N m" in readme
 
 
+@needs_compiler
+@pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler")
+def test_a_program_in_cpp_links_with_the_step(paper: PackageSummary, tmp_path: Path) -> None:
+    package = open_package(paper.path, warn=False)
+    folder = exported(package, tmp_path / "c")
+    (folder / "use.cpp").write_text(
+        '#include "scissorcal_package.h"\n#include <cstdio>\n'
+        "int main()\n{\n    sc_crack crack = {};\n    sc_step_output out;\n"
+        "    sc_model_step(&scissorcal_package, &crack, 0.4f, -0.3f, -0.02f, &out);\n"
+        '    std::printf("%a\\n", static_cast<double>(out.torque));\n}\n'
+    )
+    library = [path.name for path in folder.glob("sc_*.c")]
+    run("cc", *WARNINGS, "-c", *library, cwd=folder)
+    objects = [Path(name).with_suffix(".o") for name in library]
+    warnings = ("-std=c++20", "-Wall", "-Wextra", "-Werror", "-ffp-contract=off")
+    run("c++", *warnings, "use.cpp", *objects, "-o", "use", cwd=folder)
+    torque = float.fromhex(run(folder / "use", cwd=folder))
+    assert torque == package.kernel().step(0.4, -0.3, -0.02).torque != 0.0
+
+
 @pytest.mark.slow
 def test_every_compiler_takes_it_and_gives_the_same_bits(
     paper: PackageSummary, tmp_path: Path
@@ -154,9 +175,9 @@ def test_cmake_builds_installs_and_pkg_config_finds_it(
 ) -> None:
     package = open_package(paper.path, warn=False)
     folder, place = exported(package, tmp_path / "c"), tmp_path / "installed"
-    run("cmake", "-B", "build", f"-DCMAKE_INSTALL_PREFIX={place}", cwd=folder)
+    run("cmake", "-B", "build", cwd=folder)
     run("cmake", "--build", "build", cwd=folder)
-    run("cmake", "--install", "build", cwd=folder)
+    run("cmake", "--install", "build", "--prefix", place, cwd=folder)
     assert_equal_bits(folder / "build" / "stroke", package)
     if shutil.which("pkg-config") is None:
         pytest.skip("no pkg-config")
@@ -198,6 +219,34 @@ def test_the_project_holds_the_steps_sources_and_no_other(
     free = {path.name: path.read_bytes() for path in (folder / "freestanding").iterdir()}
     kept = c_sources() / "freestanding"
     assert free == {path.name: path.read_bytes() for path in kept.iterdir()}
+
+
+def test_the_pages_figures_are_those_of_the_example(tmp_path: Path) -> None:
+    page = Path(__file__).parents[2] / "docs" / "export.md"
+    if not page.is_file():
+        pytest.skip("runs from a checkout only")
+    text = page.read_text(encoding="utf-8")
+    package = open_package(examples.path("paper-package"), warn=False)
+    facts = export_facts(package, count=False)
+    write_c(package, facts, tmp_path / "c")
+    files = [path.stat().st_size for path in (tmp_path / "c").rglob("*") if path.is_file()]
+    stated = re.search(
+        r"paper-c: (\d+) files, ([\d.]+) kB; tables (\d+) bytes, .* ([\d.e-]+) N", text
+    )
+    assert stated is not None
+    count, kilobytes, tables, bound = map(float, stated.groups())
+    assert (count, tables) == (len(files), facts.table_bytes)
+    assert kilobytes == pytest.approx(sum(files) / 1000, rel=0.05)
+    assert f"model {facts.model_bytes} bytes" in text
+    assert bound == float(f"{package.manifest.bound.stated_Nm:.2g}")
+    inputs, flags, found = steps(
+        "\n".join(line.strip() for line in text.splitlines() if re.search(r" 0x.*p-\d+$", line))
+    )
+    assert len(inputs) == 2
+    for place, flag, values in zip(inputs.tolist(), flags, found, strict=True):
+        out = (kernel := package.kernel()).step(*place)
+        assert np.array_equal(bits(values), bits([out.torque, out.force, kernel.crack]))
+        assert flag == out.flags
 
 
 def test_the_licence_is_that_of_the_project(paper: PackageSummary, tmp_path: Path) -> None:

@@ -13,12 +13,13 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 import pytest
 
+from scissorcal import Blades, Friction, Material, build_package
 from scissorcal.errors import InputError
 from scissorcal.kernel import Kernel, StepFlag
 from scissorcal.package import ModelPackage, PackageSummary, open_package
-from scissorcal.package.export import export_facts, fmu, write_fmu
+from scissorcal.package.export import export_facts, fmu, write_c, write_fmu
 from scissorcal.package.export.draw_tables import draw_tables
-from scissorcal.package.export.fmu_description import NAMES
+from scissorcal.package.export.fmu_description import NAMES, model_description
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -346,3 +347,17 @@ def test_ziglang_builds_the_other_platforms(package: ModelPackage, tmp_path: Pat
         }
     assert heads["aarch64-linux"] == b"\x7fELF"
     assert heads["x86_64-windows"][:2] == b"MZ"
+
+
+def test_numbers_that_were_stated_are_not_called_fitted(tmp_path: Path) -> None:
+    paper = Material(force_N=(2.0, 0.1), exponent=1.4, toughness_J_per_m2=4000.0, thickness_mm=0.1)
+    blades, friction = Blades(length_mm=75.0, taper_deg=2.0), Friction(coulomb_Nm=0.01)
+    facts = export_facts(build_package(paper, blades, friction, tmp_path / "p.zip"), count=False)
+    described = model_description(facts, 201).decode()
+    write_c(open_package(tmp_path / "p.zip", warn=False), facts, tmp_path / "c")
+    written = [path.read_text(encoding="utf-8") for path in (tmp_path / "c").glob("*[dh]")]
+    assert "N; mean of the draws 2.0" in described
+    assert len(written) > 3
+    for text in (described, *written):
+        assert "fitted" not in text
+        assert "posterior mean" not in text

@@ -84,7 +84,9 @@ class RenderingSide(FirmwareSide):
         self.core = core
 
 
-def device(room: int = IMAGE_BYTES) -> tuple[LockstepLink, RenderingSide]:
+def device(
+    room: int = IMAGE_BYTES, link: type[LockstepLink] = LockstepLink
+) -> tuple[Any, RenderingSide]:
     """Paper between the blades of a virtual rig that the firmware drives."""
     sides: list[RenderingSide] = []
 
@@ -92,7 +94,7 @@ def device(room: int = IMAGE_BYTES) -> tuple[LockstepLink, RenderingSide]:
         sides.append(RenderingSide(rig, rng, faults, room))
         return sides[0]
 
-    return LockstepLink("office-paper", np.random.default_rng(1), device=make), sides[0]
+    return link("office-paper", np.random.default_rng(1), device=make), sides[0]
 
 
 def rendered(

@@ -33,5 +33,4 @@ def picture(
 
 def photo_of(image: NDArray[np.uint8], name: str = "photo.png") -> Photo:
     """Take an array for a photograph that was read."""
-    height, width = image.shape[:2]
-    return Photo(image, width, height, 1, (0, 0), 1, "", name)
+    return Photo.from_array(image, name)

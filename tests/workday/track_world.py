@@ -47,7 +47,7 @@ def an_eye(recipe: Recipe, seed: int) -> PoseFinder:
     seen = Pose.from_matrix(turn @ scene.rotation, scene.shift_m + away[3:], np.diag(RIG_SDS**2))
     rig = RigPose(seen, seen, 0.1, (), np.zeros((6, 9)))
     priors = PlatePriors(print_scale_sd_percent=0.0)
-    return PoseFinder(camera, plate_target(recipe).inverse(), rig, priors)
+    return PoseFinder(camera, plate_target(recipe), rig, priors)
 
 
 def tip_of(recipe: Recipe) -> BladePoint:

@@ -1,4 +1,3 @@
-from .camera.fit import CameraPhoto as CameraPhoto
 from .camera.fit import fit_camera as fit_camera
 from .camera.result import CameraFit as CameraFit
 from .camera.result import CrossValidation as CrossValidation
@@ -24,6 +23,8 @@ from .design.choice import choose_captures as choose_captures
 from .design.choice import first_captures as first_captures
 from .design.state import expected_cut as expected_cut
 from .design.state import expected_friction as expected_friction
+from .edge.fit import Blade as Blade
+from .edge.fit import fit_blade as fit_blade
 from .edge.result import Band as Band
 from .edge.result import BladeFit as BladeFit
 from .edge.result import BladeResult as BladeResult
@@ -51,6 +52,7 @@ from .friction.model import FrictionExperiment as FrictionExperiment
 from .parameters import FittedParameter as FittedParameter
 from .plate.checks import HALVES as HALVES
 from .plate.checks import RESIDUALS as RESIDUALS
+from .plate.fit import fit_plate as fit_plate
 from .plate.fit import plate_target as plate_target
 from .plate.result import PlateFit as PlateFit
 from .plate.result import PoseHalves as PoseHalves
@@ -88,6 +90,9 @@ from .verify.simulated_recordings import crack_law as crack_law
 from .verify.simulated_recordings import material_torque as material_torque
 
 __all__ = [
+    "Blade",
+    "BladeFit",
+    "CameraFit",
     "CutExperiment",
     "CutRun",
     "Experiment",
@@ -98,16 +103,21 @@ __all__ = [
     "FittedParameter",
     "FrictionExperiment",
     "FrictionRun",
+    "PlateFit",
     "StrokeError",
     "SummaryRow",
     "TorqueBand",
     "cut_experiment",
     "cutting_from",
+    "fit_blade",
+    "fit_camera",
     "fit_cut",
     "fit_friction",
+    "fit_plate",
     "friction_experiment",
     "load",
     "load_fit",
+    "plate_target",
     "read_header",
     "save",
 ]

@@ -18,6 +18,7 @@ from scissorcal.device.sim.sensors import Faults
 from scissorcal.device.sim.specimen import Specimen, load_specimen
 from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
+    Command,
     Config,
     ConfigEcho,
     FrameDecoder,
@@ -146,6 +147,11 @@ class LockstepLink:
             )
         check_echo(self.name, answer, int(key), float(value))
         return float(answer.value)
+
+    def send(self, message: Command) -> None:
+        """Send a command, which the device has in its next tick."""
+        self._check_open()
+        self._device.receive(encode(message))
 
     def load(self, message: LoadMessage) -> LoadEcho:
         """Send a message of an upload and return the answer, as a PortLink does."""

@@ -8,6 +8,7 @@ from scissorcal.errors import DeviceError
 from scissorcal.kernel import (
     IMAGE_FORMAT,
     Capability,
+    Command,
     ConfigKey,
     Identity,
     LoadBegin,
@@ -27,6 +28,8 @@ class Loading(Protocol):
 
     @property
     def identity(self) -> Identity: ...
+
+    def send(self, message: Command) -> None: ...
 
     def load(self, message: LoadMessage) -> LoadEcho: ...
 
@@ -51,12 +54,14 @@ def load_image(link: Link, image: bytes, tell: ShowShare) -> int:
 
     A device that holds it already is sent nothing. ``tell`` is called after each piece. Raises
     DeviceError, with what to do, where the device refuses the image or holds another one
-    afterwards; its motors must be off.
+    afterwards. The motors are switched off: a host that was cut off leaves ENABLE in force, and
+    also after the watchdog's fault the device would refuse.
     """
     refuse_without_rendering(link.identity)
     if not isinstance(link, Loading):
         raise TypeError(f"A {type(link).__name__} loads nothing.")
     wanted = zlib.crc32(image)
+    link.send(Command(0, 0, 0.0, 0.0))
     if in_force(link) != wanted:
         _send(link, image, wanted, tell)
     held = in_force(link)
@@ -99,9 +104,14 @@ def _confirmed(link: Loading, echo: LoadEcho, image: bytes) -> None:
     if echo.status == LoadStatus.OK:
         return
     again = "start again"
+    forgot = f"it restarted meanwhile. Check its supply, and {again}"
+    if echo.received:  # a restart would have left it at 0
+        forgot = (
+            f"it refused what it had of it ({echo.received} bytes), and its answer was lost or "
+            f"went to another program. Check the cable, close other programs, and {again}"
+        )
     why: dict[int, str] = {
-        LoadStatus.NOT_ANNOUNCED: "no longer knows of the package that is being loaded: it "
-        f"restarted meanwhile. Check its supply, and {again}",
+        LoadStatus.NOT_ANNOUNCED: f"knows of no package that is being loaded: {forgot}",
         LoadStatus.OTHER_FORMAT: "renders packages of another layout than this scissorcal's "
         f"({IMAGE_FORMAT}): update its firmware, or {FROM_HOST}",
         LoadStatus.TOO_LARGE: f"has room for {echo.capacity} bytes, and the package needs "
@@ -111,7 +121,8 @@ def _confirmed(link: Loading, echo: LoadEcho, image: bytes) -> None:
         LoadStatus.TORN: f"received the package torn: check the cable, and {again}",
         LoadStatus.NOT_SOUND: "found numbers in the package that no model has: update its "
         f"firmware, or {FROM_HOST}",
-        LoadStatus.BUSY: f"loads no package while its motors are on: switch them off, and {again}",
+        LoadStatus.BUSY: f"loads no package while its motors are on: another program drives "
+        f"them. Close it, and {again}",
     }
     unknown = f"refused the package with status {echo.status}: {FROM_HOST}"
     raise DeviceError(f"{_name(link)} {why.get(echo.status, unknown)}.")

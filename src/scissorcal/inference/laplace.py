@@ -179,15 +179,16 @@ def laplace(problem: Problem, shape: Shape, spread: Array | None) -> Laplace:
     """Approximate a posterior at its optimum by a normal distribution.
 
     ``spread`` (p, p) is the covariance of the sum of scores as autocorrelation makes it; None
-    where the terms are independent. The information H counts their share as independent; where it
-    says too much, the likelihood is stretched about its optimum so that its curvature becomes
-    H J^-1 H, with J the ``spread`` (Chandler and Bate 2007, doi:10.1093/biomet/asm015).
+    where the terms are independent. The information H counts their share as independent; the
+    likelihood is stretched about its optimum so that its curvature becomes H J^-1 H, with J the
+    ``spread`` (Chandler and Bate 2007, doi:10.1093/biomet/asm015), or that of independent terms
+    where that is less.
     """
     scale, point = problem.prior_sd, shape.point
     stretch, robust = (
         (np.eye(len(point)), shape.information)
         if spread is None
-        else _stretch(shape.information, spread, scale)
+        else _stretch(shape.information, spread, scale, problem.share)
     )
     covariance = _inverse(robust + shape.curvature_prior, scale)
     slope = shape.slope_prior + stretch.T @ shape.scores.sum(axis=0)
@@ -252,18 +253,20 @@ def _inverse(precision: Array, scale: Array, least: float = LEAST_INFORMATION) -
     return np.asarray((vectors / np.maximum(values, floor)) @ vectors.T * unit)
 
 
-def _stretch(information: Array, spread: Array, scale: Array) -> tuple[Array, Array]:
+def _stretch(
+    information: Array, spread: Array, scale: Array, share: float
+) -> tuple[Array, Array]:
     """The map C of Chandler and Bate and the robust information H J^-1 H, both (p, p).
 
-    Along directions where the scores vary less than their information says, as those do that change
-    faster than the noise's memory, the information is kept: robustness only widens.
+    The information counts a ``share`` of the terms. Directions that change faster than the noise's
+    memory are worth more than that, but at most what independent terms are.
     """
     unit = np.outer(scale, scale)
     H = information * unit + RIDGE * np.eye(len(scale))
     root = _root(H)
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(inverse @ (spread * unit) @ inverse)
-    widened = np.maximum(values, 1.0)
+    widened = np.maximum(values, share)
     robust = root @ (vectors / widened) @ vectors.T @ root
     inner = inverse @ (vectors / np.sqrt(widened)) @ vectors.T @ root
     return inner * scale[:, None] / scale[None, :], 0.5 * (robust + robust.T) / unit

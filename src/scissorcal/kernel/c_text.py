@@ -79,5 +79,5 @@ def _table(name: str, table: Any) -> tuple[list[str], str]:
     for row in held:
         values = ffi.unpack(getattr(table, row), table.size)
         lines += c_array(f"{name}_{row}", values)
-    inner = ", ".join(f".{row} = {name}_{row}" for row in held)
+    inner = ", ".join(f".{row} = {f'{name}_{row}' if row in held else '0'}" for row in rows)
     return lines, f"{{{inner}, .size = {table.size}}}"

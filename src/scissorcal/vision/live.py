@@ -92,7 +92,7 @@ def located_frames(
     """
     for frame in frames:
         height, width = frame.image.shape[:2]
-        if (width, height) != (camera.width, camera.height):
+        if not camera.takes(width, height):
             raise InputError(
                 f"The pictures are {width} x {height} pixels, the camera was fitted at "
                 f"{camera.width} x {camera.height}: use the same camera, size, focus and zoom."
@@ -249,8 +249,7 @@ def _picked(
 
 def look(image: Any, boards: Sequence[Board], name: str) -> Detection | None:
     """Find the first of several boards that a picture shows, or None."""
-    height, width = image.shape[:2]
-    photo = Photo(image, width, height, 1, (0, 0), 1, "", name)
+    photo = Photo.from_array(image, name)
     try:
         return find_any_board(photo, boards, explain=False)
     except InputError:

@@ -48,7 +48,7 @@ class Photo:
     and ``height`` are those of the whole photograph, turned upright; ``reduction`` says how many of
     its pixels make one of ``image`` along each side, ``origin`` where the corner of
     ``image`` lies in it. ``orientation`` is EXIF's, 1 to 8; 1 means
-    upright. ``sha256`` is of the file's bytes.
+    upright. ``sha256`` is of the file's bytes, empty where there is no file.
     """
 
     image: Picture
@@ -59,6 +59,26 @@ class Photo:
     orientation: int
     sha256: str
     source: str
+
+    @classmethod
+    def from_array(cls, picture: ArrayLike, source: str = "The picture") -> "Photo":
+        """A picture that is in memory already; ``source`` is its name in messages and results.
+
+        ``picture`` is (rows, columns) grey or (rows, columns, 3) blue-green-red as OpenCV has it,
+        eight bits, upright and not cropped: pixels count from the middle of the first one.
+        Red-green-blue gives other greys where a thing has a colour. Raises InputError with the
+        remedy where it is anything else.
+
+        >>> import numpy as np
+        >>> Photo.from_array(np.zeros((480, 640, 3), np.uint8)).width
+        640
+        >>> Photo.from_array(np.zeros((480, 640)))  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        scissorcal.errors.InputError: The picture has pixels of type float64, not uint8: where ...
+        """
+        image = _checked(picture, source)
+        height, width = image.shape[:2]
+        return cls(image, width, height, 1, (0, 0), 1, "", source)
 
     @property
     def grey(self) -> Picture:
@@ -89,6 +109,60 @@ class Photo:
         """Pixels (n, 2) of ``image`` from those of the whole photograph."""
         moved = np.asarray(pixels, dtype=np.float64) - self.origin
         return np.asarray((moved + 0.5) / self.reduction - 0.5)
+
+
+def as_photo(picture: "Photo | ArrayLike") -> Photo:
+    """The photograph itself, or that of an array; raises InputError as `Photo.from_array` does."""
+    return picture if isinstance(picture, Photo) else Photo.from_array(picture)
+
+
+_TO_EIGHT_BITS = {
+    "f": "where white is 1, give np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8)",
+    "b": "give 255 * picture.astype(np.uint8)",
+    "u": "where all bits are used, give (picture >> 8).astype(np.uint8) of 16 bits",
+    "i": "where white is 255, give picture.astype(np.uint8)",
+}
+
+
+def _checked(picture: Any, source: str) -> Picture:
+    """The array as one that OpenCV takes. Raises InputError where it is no picture."""
+    if isinstance(picture, str | Path):
+        raise InputError(
+            f"{source} is the name of a file, {picture}: read it with "
+            "scissorcal.vision.read_photo, and give what that returns."
+        )
+    if picture is None:
+        raise InputError(
+            f"{source} is None, which cv2.imread returns for a file that it cannot read: check "
+            "the path, or read it with scissorcal.vision.read_photo, which names the fault."
+        )
+    image = np.asarray(picture)
+    if not image.size:
+        raise InputError(
+            f"{source} has the shape {image.shape}, and so no pixel: check what it was cut from."
+        )
+    if image.dtype != np.uint8:
+        remedy = _TO_EIGHT_BITS.get(image.dtype.kind, "give an array of np.uint8")
+        raise InputError(f"{source} has pixels of type {image.dtype}, not uint8: {remedy}.")
+    if image.ndim != 2 and not (image.ndim == 3 and image.shape[2] == 3):
+        raise InputError(
+            f"{source} has the shape {image.shape}, not (rows, columns) or (rows, columns, 3): "
+            f"{_reshaped(image.shape)}."
+        )
+    return np.ascontiguousarray(image)
+
+
+def _reshaped(shape: tuple[int, ...]) -> str:
+    """What to do with an array of another shape than a picture's."""
+    if len(shape) == 3 and shape[2] == 4:
+        return "leave the transparency out, picture[:, :, :3]"
+    if len(shape) == 3 and shape[2] == 1:
+        return "give picture[:, :, 0]"
+    if len(shape) == 3 and shape[0] == 3:
+        return "bring the channels last, np.moveaxis(picture, 0, 2)"
+    if len(shape) == 4:
+        return "give the pictures one by one"
+    return "give one picture"
 
 
 def read_photo(path: Path, *, max_pixels: int = MAX_PIXELS, colour: bool = True) -> Photo:

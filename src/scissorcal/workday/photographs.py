@@ -273,6 +273,9 @@ def detection_of(capture: PhotoCapture, photograph: Photograph) -> "Detection":
         np.array(photograph.ids, dtype=np.int64),
         np.array(photograph.pixels, dtype=np.float64).reshape(-1, 2),
         photograph.square_px or float("nan"),
+        photograph.source,
+        photograph.width,
+        photograph.height,
     )
 
 

@@ -243,7 +243,7 @@ STEPS: tuple[Step, ...] = (
         _fit("friction"),
         inputs=("capture friction",),
         settings=_friction_settings,
-        version=18,
+        version=19,
         by_effort=True,
         file=_in_fits("friction.nc"),
         read=facts.fit,

@@ -15,7 +15,6 @@ from scissorcal.calibration.camera.bundle import SHARED, SeenBoard, fit_bundle, 
 from scissorcal.calibration.camera.checks import verdict_there
 from scissorcal.calibration.camera.fit import (
     CANDIDATES,
-    CameraPhoto,
     compare_cameras,
     fit_camera,
     seen_region,
@@ -46,14 +45,14 @@ def photographs(
     bulge_m: tuple[float, float] = (0.0, 0.0),
     tilt: tuple[float, float] = (0.0, 0.75),
     azimuth: float | None = None,
-) -> list[CameraPhoto]:
+) -> list[Detection]:
     """See the board from ``count`` places, with corner errors of ``noise_px``.
 
     ``shared_px`` bends the pixels of each photograph by a smooth field of its own; ``bulge_m``
     bends the board.
     """
     board = CAMERA_BOARD
-    found: list[CameraPhoto] = []
+    found: list[Detection] = []
     while len(found) < count:
         target = (
             0.5 * board.width_m + rng.uniform(-0.14, 0.14),
@@ -76,17 +75,14 @@ def photographs(
         inside = np.all((pixels > 3.0) & (pixels < (WIDTH - 4, HEIGHT - 4)), axis=1)
         if inside.sum() >= 15:
             ids = np.flatnonzero(inside)
-            detection = Detection(board, ids, pixels[inside], 60.0)
-            found.append(CameraPhoto(f"{len(found):02d}.jpg", WIDTH, HEIGHT, detection))
+            name = f"{len(found):02d}.jpg"
+            found.append(Detection(board, ids, pixels[inside], 60.0, name, WIDTH, HEIGHT))
     return found
 
 
-def boards(photos: list[CameraPhoto]) -> list[SeenBoard]:
+def boards(photos: list[Detection]) -> list[SeenBoard]:
     size = (CAMERA_BOARD.width_m, CAMERA_BOARD.height_m)
-    return [
-        SeenBoard(photo.name, photo.detection.points, photo.detection.pixels, size, 1e-3)
-        for photo in photos
-    ]
+    return [SeenBoard(photo.source, photo.points, photo.pixels, size, 1e-3) for photo in photos]
 
 
 def test_slopes_of_seen_corners_are_right() -> None:
@@ -126,10 +122,10 @@ def test_a_few_wrong_corners_hardly_matter() -> None:
     photos = photographs(rng)
     wrong = []
     for photo in photos:
-        pixels = photo.detection.pixels.copy()
+        pixels = photo.pixels.copy()
         hit = rng.random(len(pixels)) < 0.03
         pixels[hit] += rng.uniform(-4.0, 4.0, (int(hit.sum()), 2))
-        wrong.append(replace(photo, detection=replace(photo.detection, pixels=pixels)))
+        wrong.append(replace(photo, pixels=pixels))
     clean, spoiled = (fit_bundle(boards(some), BROWN, TRUE) for some in (photos, wrong))
     assert abs(spoiled.camera[0] - clean.camera[0]) < 1.0
     assert spoiled.sd_px < 1.6 * clean.sd_px
@@ -171,16 +167,14 @@ def test_the_covariance_is_honest(how: dict[str, float], widest: float) -> None:
         assert stretch > 1.3
 
 
-def middle_only(rng: np.random.Generator, count: int = 24) -> list[CameraPhoto]:
+def middle_only(rng: np.random.Generator, count: int = 24) -> list[Detection]:
     """Photographs whose corners lie in the middle of the picture alone."""
     kept = []
     for photo in photographs(rng, count, tilt=(0.2, 0.75)):
-        off = np.abs(photo.detection.pixels / [WIDTH, HEIGHT] - 0.5)
+        off = np.abs(photo.pixels / [WIDTH, HEIGHT] - 0.5)
         near = np.all(off < 0.27, axis=1)
-        own = photo.detection
         if near.sum() >= 15:
-            seen_there = replace(own, ids=own.ids[near], pixels=own.pixels[near])
-            kept.append(replace(photo, detection=seen_there))
+            kept.append(replace(photo, ids=photo.ids[near], pixels=photo.pixels[near]))
     return kept
 
 
@@ -306,7 +300,7 @@ def test_what_a_model_holds_is_held() -> None:
 
 
 @pytest.fixture(scope="module")
-def fitted() -> tuple[list[CameraPhoto], object]:
+def fitted() -> tuple[list[Detection], object]:
     photos = photographs(np.random.default_rng(4), 15)
     return photos, fit_camera(photos, rng=np.random.default_rng(0), inputs_hash="abc")
 
@@ -359,8 +353,8 @@ def test_pictures_are_drawn(fitted, tmp_path: Path) -> None:  # type: ignore[no-
 def test_a_photograph_that_does_not_fit_is_named() -> None:
     rng = np.random.default_rng(6)
     photos = photographs(rng, 9)
-    pixels = photos[4].detection.pixels + rng.normal(0.0, 1.0, photos[4].detection.pixels.shape)
-    photos[4] = replace(photos[4], detection=replace(photos[4].detection, pixels=pixels))
+    pixels = photos[4].pixels + rng.normal(0.0, 1.0, photos[4].pixels.shape)
+    photos[4] = replace(photos[4], pixels=pixels)
     fit = fit_camera(photos, rng=rng)
     assert [view.name for view in fit.views if view.outlying] == ["04.jpg"]
     (verdict,) = [v for v in fit.verdicts if v.check == "views"]
@@ -388,7 +382,7 @@ def test_parallel_boards_do_not_determine_the_focal_length(
         fit_camera(photos, rng=rng)
 
 
-def parallel(rng: np.random.Generator, tilt: float) -> list[CameraPhoto]:
+def parallel(rng: np.random.Generator, tilt: float) -> list[Detection]:
     """Photographs of one slanted plane, shifted alone."""
     found = []
     for number in range(8):
@@ -396,6 +390,6 @@ def parallel(rng: np.random.Generator, tilt: float) -> list[CameraPhoto]:
         pose = SimPose(pose.rotation, pose.shift_m + rng.uniform(-0.05, 0.05, 3) * [1, 0, 0])
         pixels = LENS.sees(CAMERA_BOARD.points[:, :2], pose)
         pixels = pixels + 0.1 * rng.standard_normal(pixels.shape)
-        detection = Detection(CAMERA_BOARD, np.arange(48), pixels, 60.0)
-        found.append(CameraPhoto(f"{number}.jpg", WIDTH, HEIGHT, detection))
+        name = f"{number}.jpg"
+        found.append(Detection(CAMERA_BOARD, np.arange(48), pixels, 60.0, name, WIDTH, HEIGHT))
     return found

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from scissorcal.calibration.edge import fit as edge_fit
-from scissorcal.calibration.edge.cells import EdgeCells, cells_each, edge_cells
+from scissorcal.calibration.edge.cells import EdgeCells, cells_each, edge_cells, merged_nicks
 from scissorcal.calibration.edge.fit import (
     Blade,
     compare_edges,
     fit_blade,
-    merged_nicks,
 )
 from scissorcal.calibration.edge.model import (
     MOST_EVALUATIONS,

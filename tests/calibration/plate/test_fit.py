@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scissorcal.calibration.plate.fit import PosePhoto, fit_plate
+from scissorcal.calibration.plate.fit import fit_plate
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.vision import (
@@ -44,13 +44,13 @@ REAL = Path(__file__).parents[4] / "shared" / "data" / "aruco"
 
 def shot(
     board: MarkedBoard, pose: SimPose, seed: int = 0, ids: list[int] | None = None, eye: Lens = LENS
-) -> PosePhoto:
+) -> Detection:
     """Photograph a target and find it."""
     layers = target_layers(board, pose, ids=ids)
     looks = Looks(softness_px=0.7, noise=0.01, defocus_px=0.5)
     picture = render(layers, eye, looks, np.random.default_rng(seed))
     name = f"plate-{seed}.jpg"
-    return PosePhoto(name, find_board(photo_of(picture, name), board))
+    return find_board(photo_of(picture, name), board)
 
 
 def away(fit: PlateFit, truth: SimPose) -> tuple[float, float, np.ndarray]:
@@ -69,7 +69,7 @@ def verdict(fit: PlateFit, check: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def still() -> tuple[SimPose, list[PosePhoto]]:
+def still() -> tuple[SimPose, list[Detection]]:
     pose = pose_before(PLATE_BOARD, 0.3, tilt=0.6, azimuth=1.0, turn=0.2)
     return pose, [shot(PLATE_BOARD, pose, seed) for seed in range(4)]
 
@@ -90,7 +90,7 @@ def test_the_pose_is_recovered(board: MarkedBoard, tilt: float) -> None:
 
 
 def test_the_targets_place_on_the_plate_is_removed(
-    still: tuple[SimPose, list[PosePhoto]],
+    still: tuple[SimPose, list[Detection]],
 ) -> None:
     truth, photos = still
     target = Pose.from_rotation_vector([np.pi, 0.0, 0.0], [0.04, -0.02, 0.0])
@@ -101,7 +101,7 @@ def test_the_targets_place_on_the_plate_is_removed(
     assert fit.camera_plate.matrix[2, 2] < 0, "the plate's upper face looks at the camera"
 
 
-def test_a_moved_plate_is_detected_and_named(still: tuple[SimPose, list[PosePhoto]]) -> None:
+def test_a_moved_plate_is_detected_and_named(still: tuple[SimPose, list[Detection]]) -> None:
     """Moved a little (its corners still count), and far (they are left out)."""
     truth, photos = still
     for moved_m in (3e-4, 5e-3):
@@ -116,7 +116,7 @@ def test_a_moved_plate_is_detected_and_named(still: tuple[SimPose, list[PosePhot
 
 
 def test_one_photograph_leaves_motion_not_evaluated(
-    still: tuple[SimPose, list[PosePhoto]],
+    still: tuple[SimPose, list[Detection]],
 ) -> None:
     truth, photos = still
     fit = fit_plate(photos[:1], SURE)
@@ -135,7 +135,7 @@ def test_one_small_marker_square_on_is_ambiguous() -> None:
     assert verdict(fit, "size") == "fail"
 
 
-def test_a_wrong_camera_fails_the_checks(still: tuple[SimPose, list[PosePhoto]]) -> None:
+def test_a_wrong_camera_fails_the_checks(still: tuple[SimPose, list[Detection]]) -> None:
     """Grossly: corners do not fit. Slightly: both sides of the target claim other poses."""
     _, photos = still
     fit = fit_plate(photos, SURE)
@@ -147,21 +147,23 @@ def test_a_wrong_camera_fails_the_checks(still: tuple[SimPose, list[PosePhoto]])
 
 
 def test_without_a_photograph_or_with_two_targets_there_is_no_fit(
-    still: tuple[SimPose, list[PosePhoto]],
+    still: tuple[SimPose, list[Detection]],
 ) -> None:
     with pytest.raises(MissingError, match="capture plate"):
         fit_plate([], SURE)
     pose = pose_before(PLATE_STRIP, 0.33, tilt=0.4)
-    with pytest.raises(InputError, match="a plate has one target"):
+    with pytest.raises(InputError, match="that of one target"):
         fit_plate([still[1][0], shot(PLATE_STRIP, pose)], SURE)
 
 
-def test_corners_along_one_line_are_refused_by_name(still: tuple[SimPose, list[PosePhoto]]) -> None:
-    seen = still[1][0].detection
+def test_corners_along_one_line_are_refused_by_name(still: tuple[SimPose, list[Detection]]) -> None:
+    seen = still[1][0]
     line = seen.points[:, 1] == seen.points[0, 1]
-    thin = Detection(seen.board, seen.ids[line], seen.pixels[line], seen.square_px)
+    thin = dataclasses.replace(
+        seen, ids=seen.ids[line], pixels=seen.pixels[line], source="thin.jpg"
+    )
     with pytest.raises(VerdictError, match=r"thin\.jpg: .* along one line"):
-        fit_plate([still[1][1], PosePhoto("thin.jpg", thin)], SURE)
+        fit_plate([still[1][1], thin], SURE)
 
 
 def test_another_target_is_named() -> None:
@@ -177,7 +179,7 @@ def test_a_slanted_marker_is_measured_within_its_own_border() -> None:
     """Across it a foreshortened border is narrow: looking farther takes its cells for it."""
     board = MarkerBoard("one", 0.028, 0.028, 0.028, ((0.014, 0.014),), first_id=82)
     pose = pose_before(board, 0.25, tilt=1.1)
-    seen = shot(board, pose).detection
+    seen = shot(board, pose)
     exact = LENS.sees(seen.points[:, :2], pose)
     assert np.abs(seen.pixels - exact).max() < 0.1
 
@@ -200,7 +202,7 @@ def test_a_real_board_agrees_between_halves_of_its_corners(name: str) -> None:
     assert set(find_markers(photo.grey, REAL_BOARD.dictionary, REAL_BOARD).ids) == set(range(17))
     found = find_board(photo, REAL_BOARD)
     assert len(found.ids) == 24
-    fit = fit_plate([PosePhoto(name, found)], camera)
+    fit = fit_plate([found], camera)
     assert fit.halves is not None
     assert fit.halves.rotation_deg < 0.3
     assert fit.halves.translation_mm < 1.0
@@ -218,7 +220,7 @@ def test_every_real_marker_is_found() -> None:
         find_board(photo, PLATE_BOARD)
 
 
-def test_positions_that_do_not_fit_the_card_fail(still: tuple[SimPose, list[PosePhoto]]) -> None:
+def test_positions_that_do_not_fit_the_card_fail(still: tuple[SimPose, list[Detection]]) -> None:
     """The blade turned by half of what was said."""
     _, seen = card_views(
         [(a, b) for a in (0.0, 0.03) for b in (0.1, 0.3)], np.random.default_rng(1)

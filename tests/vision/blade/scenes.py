@@ -28,8 +28,7 @@ SHAPE = BladeShape(back_slope=-float(np.tan(0.035)))
 
 
 def photo_of(picture: NDArray[np.uint8], name: str = "blade.jpg") -> Photo:
-    height, width = picture.shape[:2]
-    return Photo(picture, width, height, 1, (0, 0), 1, name, name)
+    return Photo.from_array(picture, name)
 
 
 def blade_photo(

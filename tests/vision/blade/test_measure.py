@@ -11,7 +11,7 @@ from scissorcal.errors import InputError
 from scissorcal.vision.blade.borders import PicturedBlade
 from scissorcal.vision.blade.measure import measure_blade
 from scissorcal.vision.blade.photo import (
-    Laid,
+    BladeLayout,
     NickMark,
     blade_picture,
     photograph_blade,
@@ -117,7 +117,7 @@ def test_without_a_camera_the_uncertainty_is_stated(measured):
 def test_edge_side_up_selects_the_other_side():
     # turned by half a turn, tip to the left, its edge faces the upper rim
     photo = blade_photo(turn=np.pi + 0.02, where=(0.16, 0.09))
-    one = photograph_blade(photo, CAMERA, laid=Laid(edge_side="up")).measured[0]
+    one = photograph_blade(photo, CAMERA, layout=BladeLayout(edge_side="up")).measured[0]
     assert abs(np.median(one.offset - true_edge(SHAPE, one.station))) < 2e-5
 
 
@@ -134,13 +134,15 @@ def test_a_given_pivot_replaces_the_hole():
     with pytest.raises(InputError, match=r"no round pivot hole .* --pivot"):
         photograph_blade(photo, CAMERA)
     place = LENS.sees(np.array([MAT_PIVOT_M]), POSE)[0]
-    one = photograph_blade(photo, CAMERA, laid=Laid(pivot_px=(place[0], place[1]))).measured[0]
+    one = photograph_blade(
+        photo, CAMERA, layout=BladeLayout(pivot_px=(place[0], place[1]))
+    ).measured[0]
     assert abs(np.median(one.offset - true_edge(SHAPE, one.station))) < 1e-4
 
 
 @pytest.mark.parametrize("mat", [True, False])
 def test_both_blades_of_open_scissors(mat):
-    found = photograph_scissors(scissors_photo(0.7, mat=mat), CAMERA, laid=Laid(mat=mat))
+    found = photograph_scissors(scissors_photo(0.7, mat=mat), CAMERA, layout=BladeLayout(mat=mat))
     assert len(found.measured) == 2
     assert found.scissors.screw
     # without the mat perspective stays in
@@ -250,7 +252,9 @@ def test_scale_and_pivot_are_in_the_pixels_of_the_whole_photograph_however_it_wa
     lengths = [
         max(
             one.length
-            for one in photograph_scissors(photo, laid=Laid(mat=False, scale=1e-4)).measured
+            for one in photograph_scissors(
+                photo, layout=BladeLayout(mat=False, m_per_px=1e-4)
+            ).measured
         )
         for photo in (whole, reduced(whole))
     ]
@@ -260,7 +264,7 @@ def test_scale_and_pivot_are_in_the_pixels_of_the_whole_photograph_however_it_wa
     pixel = known.view.to_pixels(known.measured[0].parts.pivot[None])[0]
     pivots = [
         photograph_blade(
-            one, CAMERA, laid=Laid(pivot_px=(float(pixel[0]), float(pixel[1])))
+            one, CAMERA, layout=BladeLayout(pivot_px=(float(pixel[0]), float(pixel[1])))
         ).measured[0]
         for one in (photo, reduced(photo))
     ]

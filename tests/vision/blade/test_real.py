@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from scissorcal.errors import InputError
 from scissorcal.recipe import BladePriors
-from scissorcal.vision.blade.photo import Laid, photograph_scissors
+from scissorcal.vision.blade.photo import BladeLayout, photograph_scissors
 from scissorcal.vision.blade.profile import crossings, sampled, steepest
 from scissorcal.vision.blade.silhouette import silhouette
 from scissorcal.vision.blade.view import PlainView
@@ -44,7 +44,7 @@ OPEN_DEG = {8: 53.0, 10: 53.0, 12: 82.0, 15: 36.0}
 def found():
     return {
         number: photograph_scissors(
-            read_photo(PHOTOS / f"scissors_{number}.jpg"), laid=Laid(mat=False)
+            read_photo(PHOTOS / f"scissors_{number}.jpg"), layout=BladeLayout(mat=False)
         )
         for number in SCREWS
     }
@@ -93,7 +93,7 @@ def test_two_photographs_of_one_pair_agree_to_a_hundredth_of_its_length(found):
 def test_forks_are_refused_with_the_reason(number):
     photo = read_photo(PHOTOS / f"fork_{number}.jpg")
     with pytest.raises(InputError, match=rf"fork_{number}.*no handle with a ring.*fork"):
-        photograph_scissors(photo, laid=Laid(mat=False))
+        photograph_scissors(photo, layout=BladeLayout(mat=False))
 
 
 def drawn_curves():

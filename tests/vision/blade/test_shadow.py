@@ -10,7 +10,7 @@ from benchmarks.scissors import ALIKE, judged, photographed, true_edge
 
 from scissorcal.errors import InputError
 from scissorcal.recipe import BladePriors
-from scissorcal.vision.blade.photo import Laid, by_blade, photograph_scissors
+from scissorcal.vision.blade.photo import BladeLayout, by_blade, photograph_scissors
 from scissorcal.vision.blade.profile import outermost_sharp, steepest
 from scissorcal.vision.blade.view import PlainView
 from scissorcal.vision.sim import Lens, Looks, PaintLayer, SimPose, render
@@ -31,7 +31,7 @@ def distinct(seed, count, **look):
         if abs(pair.contrast) < 0.5:
             continue
         try:
-            found = photograph_scissors(pair.photo, laid=Laid(mat=False))
+            found = photograph_scissors(pair.photo, layout=BladeLayout(mat=False))
         except InputError:
             continue
         yield pair, found
@@ -88,7 +88,7 @@ def test_tips_are_those_of_the_metal_where_the_outline_ends_with_the_shadow():
     beyond, off = [], []
     for index in (2, 21, 29, 35):
         pair = photographed(np.random.default_rng([164, index]), tilt_deg=2.0)
-        found = photograph_scissors(pair.photo, laid=Laid(mat=False))
+        found = photograph_scissors(pair.photo, layout=BladeLayout(mat=False))
         for name, one in zip(found.names, found.measured, strict=True):
             axis = one.axis_px - one.pivot_px
             axis = axis / np.linalg.norm(axis)
@@ -105,7 +105,7 @@ def test_tips_are_those_of_the_metal_where_the_outline_ends_with_the_shadow():
 
 def test_one_plane_holds_both_blades_and_a_tilt_is_part_of_their_covariance():
     pair = photographed(np.random.default_rng([157, 2]), tilt_deg=7.0)
-    found = photograph_scissors(pair.photo, laid=Laid(mat=False))
+    found = photograph_scissors(pair.photo, layout=BladeLayout(mat=False))
     one, other = found.measured
     assert one.unit_length == other.unit_length
     assert one.unit_length == pytest.approx(np.sqrt(one.length * other.length))
@@ -114,7 +114,7 @@ def test_one_plane_holds_both_blades_and_a_tilt_is_part_of_their_covariance():
     known = photograph_scissors(
         pair.photo,
         priors=BladePriors(tilt_sd_deg=0.0, pair_length_sd_percent=0.0),
-        laid=Laid(mat=False),
+        layout=BladeLayout(mat=False),
     )
     assert known.lengths.sd < found.lengths.sd
     assert "tilt" not in known.measured[0].mode_names
@@ -188,20 +188,24 @@ def drawn(kind):
 )
 def test_what_is_no_pair_of_scissors_is_refused_with_a_sentence(picture, words):
     with pytest.raises(InputError, match=words):
-        photograph_scissors(photo_of(np.ascontiguousarray(picture), "x.jpg"), laid=Laid(mat=False))
+        photograph_scissors(
+            photo_of(np.ascontiguousarray(picture), "x.jpg"), layout=BladeLayout(mat=False)
+        )
 
 
 def test_two_pairs_and_cut_off_scissors_are_refused_and_turned_ones_are_not():
     pair, first = next(distinct(160, 10, tilt_deg=1.0))
     picture = pair.photo.image
     with pytest.raises(InputError, match="several objects"):
-        photograph_scissors(photo_of(np.hstack([picture, picture])), laid=Laid(mat=False))
+        photograph_scissors(photo_of(np.hstack([picture, picture])), layout=BladeLayout(mat=False))
     low, high = (int(v) for v in (pair.pivot_px[1] - 60, pair.pivot_px[1] + 60))
     with pytest.raises(InputError, match=r"cut|border"):
-        photograph_scissors(photo_of(np.ascontiguousarray(picture[low:high])), laid=Laid(mat=False))
+        photograph_scissors(
+            photo_of(np.ascontiguousarray(picture[low:high])), layout=BladeLayout(mat=False)
+        )
     whole = by_blade([first])
     turned = photo_of(np.ascontiguousarray(picture[::-1, ::-1]))
-    again = by_blade([photograph_scissors(turned, laid=Laid(mat=False))])
+    again = by_blade([photograph_scissors(turned, layout=BladeLayout(mat=False))])
     for name, (one,) in whole.items():
         (other,) = again[name]
         assert other.length == pytest.approx(one.length, abs=3.0)

@@ -57,7 +57,7 @@ def test_a_scaled_camera_sees_the_same_through_larger_pixels() -> None:
 
 def seen(pose: SimPose) -> Detection:
     pixels = lens().sees(CAMERA_BOARD.points[:, :2], pose)
-    return Detection(CAMERA_BOARD, np.arange(len(pixels)), pixels, 60.0)
+    return Detection(CAMERA_BOARD, np.arange(len(pixels)), pixels, 60.0, "board.jpg", 1280, 720)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from scissorcal.calibration import CameraPhoto, fit_camera
+from scissorcal.calibration import fit_camera
 from scissorcal.vision.camera_files import read_camera_file
 from scissorcal.vision.photo import read_photo
 from scissorcal.vision.targets.boards import CharucoBoard, Chessboard
@@ -35,8 +35,8 @@ def detections(window_px: int | None) -> dict[str, Detection]:
     }
 
 
-def photos(found: dict[str, Detection]) -> list[CameraPhoto]:
-    return [CameraPhoto(name, 640, 480, detection) for name, detection in found.items()]
+def photos(found: dict[str, Detection]) -> list[Detection]:
+    return [replace(detection, source=name) for name, detection in found.items()]
 
 
 @needs_chessboard

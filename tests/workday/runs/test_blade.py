@@ -5,14 +5,21 @@ import numpy as np
 import pytest
 from benchmarks.scissors import photographed
 
-from scissorcal.calibration import BladeResult, load
+from scissorcal.calibration import BladeResult, fit_blade, load
 from scissorcal.errors import InputError, MissingError
-from scissorcal.vision import render_blade_photographs
+from scissorcal.vision import (
+    measure_edge,
+    read_photo,
+    render_blade_photographs,
+    usual_camera,
+    write_camera_file,
+)
 from scissorcal.workday.demo.photographs import specimen_blade
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import FitOptions
 from scissorcal.workday.photographs import BladeSetup, photo_captures
-from scissorcal.workday.runs.blade import capture_blade
+from scissorcal.workday.runs.blade import STREAM, capture_blade
+from scissorcal.workday.runs.camera import import_camera
 from scissorcal.workday.runs.fit import fit_workspace
 from scissorcal.workday.workspace import create_workspace
 from tests.vision.blade.scenes import scissors_photo
@@ -64,6 +71,33 @@ def test_the_virtual_blade_is_captured_and_fitted(workspace, photographs):
     assert again.cached
     assert again.result.edge_posterior.edge == edge_posterior.edge
     assert again.pictures == outcome.pictures
+    assert_arrays_give_the_fit(workspace, photographs, outcome.result)
+
+
+def assert_arrays_give_the_fit(workspace, photographs, result):
+    """The same pixels, measured and fitted without files: the same numbers to the last bit."""
+    recipe = workspace.recipe()
+    priors = recipe.fit.blade.priors
+    measured = []
+    for path in photographs:
+        measured += measure_edge(read_photo(path).image, priors=priors).measured
+    rng = np.random.default_rng([0, STREAM, 0])
+    fit = fit_blade(measured, recipe, effort="draft", rng=rng)
+    (stored,) = result.blades
+    assert fit.edge_posterior.edge == stored.edge_posterior.edge
+    assert np.array_equal(fit.draws, stored.draws)
+    assert np.array_equal(fit.offset.q05, stored.offset.q05)
+    assert np.array_equal(fit.height.mean, stored.height.mean)
+
+
+def test_a_camera_of_another_size_is_not_used_by_a_workspace(tmp_path, photographs):
+    """Its photographs are measured without it, as the fit states."""
+    lab = create_workspace(tmp_path / "lab", "paper-80gsm")
+    file = write_camera_file(usual_camera(640, 480), tmp_path / "camera.yml", "opencv")
+    import_camera(Engine.of(lab), file)
+    capture_blade(lab, photographs[:1], BladeSetup(), lambda _: None)
+    (outcome,) = fit_workspace(lab, ["blade"], FitOptions(effort="draft"))
+    assert any("No camera fit" in note for note in outcome.result.blades[0].notes)
 
 
 def test_open_scissors_do_not_mix_with_a_blade_alone(workspace, photographs):

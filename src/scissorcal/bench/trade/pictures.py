@@ -10,10 +10,10 @@ import numpy as np
 from scissorcal.bench.trade.case import Case, Photographed
 from scissorcal.calibration.edge.fit import Blade, fit_blade
 from scissorcal.calibration.edge.result import BladeFit
-from scissorcal.calibration.plate.fit import PosePhoto, fit_plate, plate_target
+from scissorcal.calibration.plate.fit import fit_plate, plate_target
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.errors import InputError, MissingError
-from scissorcal.vision.blade.photo import Laid, by_blade, photograph_laid
+from scissorcal.vision.blade.photo import BladeLayout, BladePhoto, by_blade, measure_edge
 from scissorcal.vision.photo import Photo, picture_size, read_photo
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 from scissorcal.vision.targets.detect import find_any_board
@@ -60,9 +60,8 @@ def fit_edge(
     chosen = _picked(case.photographs, resolution, rng)
     photos = [(one, _read(path, resolution, colour=True)) for one, path in chosen]
     _load_libraries()
-    priors = case.recipe.fit.blade.priors
     began = time.process_time()
-    seen = [photograph_laid(photo, case.camera, _laid(one), priors) for one, photo in photos]
+    seen = [_measured(one, photo, case) for one, photo in photos]
     sides = by_blade(seen)
     if not sides:
         raise InputError("The scissors are closed in every photograph that was picked.")
@@ -92,7 +91,7 @@ def locate_plate(
     _load_libraries()
     began = time.process_time()
     boards = (PLATE_BOARD, PLATE_STRIP)
-    found = [PosePhoto(photo.source, find_any_board(photo, boards)) for photo in photos]
+    found = [find_any_board(photo, boards) for photo in photos]
     fit = fit_plate(
         found,
         case.camera,
@@ -123,6 +122,10 @@ def _load_libraries() -> None:
         import_module(name)
 
 
-def _laid(one: Photographed) -> Laid:
+def _measured(one: Photographed, photo: Photo, case: Case) -> BladePhoto:
     scale = one.scale_mm_per_px * 1e-3 if one.scale_mm_per_px else None
-    return Laid(one.both, one.mat, one.edge_side, scale, one.pivot_px)
+    layout = BladeLayout(one.both, one.mat, one.edge_side, scale, one.pivot_px)
+    camera = case.camera
+    if camera and not (one.mat and camera.takes(photo.width, photo.height)):
+        camera = None
+    return measure_edge(photo, camera, layout, case.recipe.fit.blade.priors)

@@ -1,7 +1,7 @@
 """Fit the camera to its photographs: candidate models compared, or constants imported."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -37,24 +37,15 @@ from scissorcal.identity import file_digest
 from scissorcal.recipe.priors import CameraPriors
 from scissorcal.verdicts import Check
 from scissorcal.vision.camera_files import CameraFile
+from scissorcal.vision.geometry.board_pose import check_detections
 from scissorcal.vision.geometry.camera import PARAMETERS, Camera, usual_camera
 from scissorcal.vision.targets.detect import Detection
 
 _DRAWS = 500
 
 
-@dataclass(frozen=True)
-class CameraPhoto:
-    """A board as one photograph of ``width`` by ``height`` pixels shows it."""
-
-    name: str
-    width: int
-    height: int
-    detection: Detection
-
-
 def fit_camera(
-    photos: Sequence[CameraPhoto],
+    seen: Sequence[Detection],
     *,
     rng: np.random.Generator,
     priors: CameraPriors = CameraPriors(),
@@ -63,20 +54,22 @@ def fit_camera(
 ) -> CameraFit:
     """Fit focal length, centre and distortion, and say how well they are known.
 
-    Corner errors follow a Student-t, so that a bad corner does little harm. The distortion model is
-    the simplest that photographs left out do not distinguish from the best. The covariance counts
-    that the corners of one photograph err together. Photographs that fit far worse than the others
-    are named, none is dropped. ``priors`` are the recipe's.
+    ``seen`` is what `scissorcal.vision.find_board` found in each photograph. Corner errors follow a
+    Student-t, so that a bad corner does little harm. The distortion model is the simplest that
+    photographs left out do not distinguish from the best. The covariance counts that the corners of
+    one photograph err together. Photographs that fit far worse than the others are named, none is
+    dropped. ``priors`` are the recipe's.
 
-    Raises MissingError with fewer than three photographs, InputError where a corner lies outside
-    of its photograph, VerdictError where they do not determine
+    Raises MissingError with fewer than three photographs, InputError where these are of different
+    sizes or a corner lies outside of its photograph, VerdictError where they do not determine
     the focal length: all taken with the board at one slant.
     """
     tell = progress or (lambda _share, _sentence: None)
-    if len(photos) < FEWEST_VIEWS:
-        raise MissingError(_too_few(len(photos)))
-    width, height = photos[0].width, photos[0].height
-    views = [seen_board(photo.name, photo.detection, priors) for photo in photos]
+    if len(seen) < FEWEST_VIEWS:
+        raise MissingError(_too_few(len(seen)))
+    check_detections(seen)
+    width, height = seen[0].width, seen[0].height
+    views = [seen_board(detection, priors) for detection in seen]
     start = usual_camera(width, height).parameters
     refuse_outside(views, width, height)
     refuse_parallel(views, start)
@@ -92,11 +85,11 @@ def fit_camera(
     tell(0.85, "camera: two halves apart")
     rivals = [b.camera for row, b, _ in compared if row.equivalent and not row.chosen]
     places, cross = pixel_map(camera, stretch, halves(views, bundle), region, rivals)
-    rows = _views(photos, bundle)
+    rows = _views(seen, bundle)
     return CameraFit(
         camera=camera,
         origin="fitted",
-        board=photos[0].detection.board.name,
+        board=seen[0].board.name,
         candidate=chosen.name,
         candidates=tuple(_candidate_facts(row, unseen_px) for row, _, unseen_px in compared),
         draws=rng.multivariate_normal(bundle.camera, covariance, _DRAWS, method="eigh"),
@@ -110,7 +103,7 @@ def fit_camera(
         cross=cross,
         verdicts=camera_verdicts(camera, rows, places, cross),
         inputs_hash=inputs_hash,
-        sources=tuple(photo.name for photo in photos),
+        sources=tuple(detection.source for detection in seen),
         notes=uncovered_notes(places, share),
     )
 
@@ -121,10 +114,12 @@ def _candidate_facts(row: CandidateRow, unseen_px: float) -> dict[str, Any]:
     return {"free": facts.pop("parameters"), "unseen_px": unseen_px, **facts}
 
 
-def seen_board(name: str, detection: Detection, priors: CameraPriors) -> SeenBoard:
+def seen_board(detection: Detection, priors: CameraPriors) -> SeenBoard:
     """Give a detection as the bundle's arrays."""
     size = detection.board.width_m, detection.board.height_m
-    return SeenBoard(name, detection.points, detection.pixels, size, 1e-3 * priors.bulge_sd_mm)
+    return SeenBoard(
+        detection.source, detection.points, detection.pixels, size, 1e-3 * priors.bulge_sd_mm
+    )
 
 
 def seen_region(pixels: Sequence[Array], width: int, height: int) -> tuple[Array, float]:
@@ -145,20 +140,20 @@ def _tilt_of(pose: Array) -> float:
     return float(np.arccos(np.clip(abs(turn[2, 2]), 0.0, 1.0)))
 
 
-def _views(photos: Sequence[CameraPhoto], bundle: Bundle) -> tuple[ViewError, ...]:
+def _views(seen: Sequence[Detection], bundle: Bundle) -> tuple[ViewError, ...]:
     rms = bundle.rms_px
     middle = float(np.median(rms))
     rows = []
-    for photo, pose, residual, error in zip(
-        photos, bundle.poses, bundle.residuals, rms, strict=True
+    for detection, pose, residual, error in zip(
+        seen, bundle.poses, bundle.residuals, rms, strict=True
     ):
         rows.append(
             ViewError(
-                name=photo.name,
+                name=detection.source,
                 corners=len(residual),
                 rms_px=float(error),
                 worst_px=float(np.linalg.norm(residual, axis=1).max()),
-                square_px=photo.detection.square_px,
+                square_px=detection.square_px,
                 distance_m=float(np.linalg.norm(pose[3:])),
                 tilt_deg=float(np.degrees(_tilt_of(pose))),
                 outlying=bool(error > OUTLYING * middle),

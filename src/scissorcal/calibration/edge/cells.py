@@ -1,5 +1,6 @@
 """Edge points made ready for a fit: nicks taken out, the rest averaged over short cells."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +78,30 @@ def edge_cells(measured: BladeMeasurement, cells: int) -> EdgeCells:
 def cells_each(photographs: int) -> int:
     """Cells per photograph that keep a joint fit small."""
     return int(np.clip(MOST_CELLS // max(photographs, 1), 24, CELLS_OF_ONE))
+
+
+def merged_nicks(photographs: Sequence[EdgeCells]) -> tuple[FoundNick, ...]:
+    """Nicks as all photographs show them: one row each, those of one place averaged."""
+    every = sorted((n for cells in photographs for n in cells.nicks), key=lambda n: n.station_m)
+    groups: list[list[FoundNick]] = []
+    for nick in every:
+        last = groups[-1][-1] if groups else None
+        near = last is not None and nick.station_m - last.station_m < 0.5 * (
+            nick.width_m + last.width_m
+        )
+        if near:
+            groups[-1].append(nick)
+        else:
+            groups.append([nick])
+    return tuple(
+        FoundNick(
+            float(np.mean([n.station_m for n in group])),
+            float(np.mean([n.width_m for n in group])),
+            float(np.mean([n.depth_m for n in group])),
+            ", ".join(dict.fromkeys(n.source for n in group)),
+        )
+        for group in groups
+    )
 
 
 def _away_from_smooth(measured: BladeMeasurement) -> Array:

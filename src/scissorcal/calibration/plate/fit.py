@@ -1,7 +1,7 @@
 """The plate's pose from photographs of its target, before the camera and in the rig's frame."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,29 +9,20 @@ from numpy.typing import NDArray
 from scissorcal.calibration.camera.result import PixelMap
 from scissorcal.calibration.plate.checks import camera_verdict, plate_verdicts
 from scissorcal.calibration.plate.result import PlateFit, PoseHalves, PoseView
-from scissorcal.errors import InputError, MissingError, VerdictError
+from scissorcal.errors import MissingError
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.recipe.schema import Recipe
 from scissorcal.vision.geometry.board_pose import BoardPose, Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose, difference
+from scissorcal.vision.geometry.pose import UNMOVED, Pose, difference
 from scissorcal.vision.geometry.rig_frame import RigPose
 from scissorcal.vision.targets.detect import Detection
 
-UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 _EXACT_PRINT = {"print_scale_sd_percent": 0.0}
 
 
-@dataclass(frozen=True)
-class PosePhoto:
-    """The plate's target as one photograph shows it."""
-
-    name: str
-    detection: Detection
-
-
 def fit_plate(
-    photos: Sequence[PosePhoto],
+    seen: Sequence[Detection],
     camera: Camera,
     *,
     priors: PlatePriors = PlatePriors(),
@@ -41,45 +32,53 @@ def fit_plate(
 ) -> PlateFit:
     """Fit one pose of the plate to all photographs of it, corners and photographs together.
 
-    ``plate_target`` says how the target lies on the plate; the plate's frame has x along the cut
-    from its near edge, z out of its upper face. Camera and plate are taken to be at rest; a
-    photograph of another pose is detected by fitting it alone. Both poses that a plane allows
-    are refined and kept. ``priors`` are the recipe's. ``rig`` takes the pose into the rig's frame.
-    ``places`` is how well the camera is known over the picture, from its fit.
-    ``inputs_hash`` of the result is empty: who reads the photographs puts it in.
+    ``seen`` is what `scissorcal.vision.find_board` found in each. ``plate_target`` says how the
+    target lies on the plate; the plate's frame has x along the cut from its near edge, z out of its
+    upper face. Camera and plate are taken to be at rest; a photograph of another pose is detected
+    by fitting it alone. Both poses that a plane allows are refined and kept. ``priors`` are the
+    recipe's. ``rig`` takes the pose into the rig's frame. ``places`` is how well the camera is
+    known over the picture, from its fit. ``inputs_hash`` of the result is empty: who reads the
+    photographs puts it in.
 
-    Raises MissingError without a photograph, InputError where photographs show different targets,
-    VerdictError where the corners determine no pose.
+    Raises MissingError without a photograph, InputError where photographs show different targets or
+    are of another size than the camera's, VerdictError where the corners determine no pose.
+
+    A plate board that lies on the plate with its upper left corner 40 mm behind the plate's near
+    edge and 20 mm to its right (y points left):
+
+    >>> import numpy as np
+    >>> from scissorcal.vision import (
+    ...     PLATE_BOARD, Camera, Lens, Looks, Pose, SimPose, find_board, render, target_layers,
+    ... )
+    >>> camera = Camera(600.0, 600.0, 319.5, 239.5, (0.0,) * 5, 640, 480)
+    >>> lens = Lens(600.0, (319.5, 239.5), 640, 480)
+    >>> layers = target_layers(PLATE_BOARD, SimPose.looking_at((0.07, 0.05), 0.25, tilt=0.4))
+    >>> pictures = [render(layers, lens, Looks(), np.random.default_rng(n)) for n in range(2)]
+    >>> target = Pose.from_rotation_vector([np.pi, 0.0, 0.0], [0.04, -0.02, 0.0])
+    >>> seen = [find_board(picture, "plate board") for picture in pictures]
+    >>> fit = fit_plate(seen, camera, plate_target=target)
+    >>> fit.target, len(fit.views), [v.check for v in fit.verdicts if v.status == "fail"]
+    ('plate board', 2, [])
     """
-    if not photos:
+    if not seen:
         raise MissingError(
             "There is no photograph of the plate's target: print it ('scissorcal target'), stick "
             "it to the plate, and take some with 'scissorcal capture plate --image plate-*.jpg'."
         )
-    target = photos[0].detection.board.name
-    for photo in photos:
-        if photo.detection.board != photos[0].detection.board:
-            raise InputError(
-                f"{photo.name} shows the {photo.detection.board.name}, {photos[0].name} the "
-                f"{target}: a plate has one target; leave one of them out."
-            )
-    corners = Corners.of(*(photo.detection for photo in photos))
-    alone = [
-        _located(corners.where(corners.frame == i), camera, priors, photo)
-        for i, photo in enumerate(photos)
-    ]
-    whole = _located(corners, camera, priors, *photos)
+    corners = Corners.of(*seen)
+    alone = [locate_board(detection, camera, priors) for detection in seen]
+    whole = locate_board(corners, camera, priors)
     halves = _halves(corners, camera, priors)
     back = plate_target.inverse()
     views = tuple(
-        _view(photo, located, whole, corners.frame == i)
-        for i, (photo, located) in enumerate(zip(photos, alone, strict=True))
+        _view(detection, located, whole, corners.frame == i)
+        for i, (detection, located) in enumerate(zip(seen, alone, strict=True))
     )
     pose = whole.pose.after(back)
-    known = camera_verdict(camera, places, [photo.detection for photo in photos])
+    known = camera_verdict(camera, places, seen)
     in_rig = rig.holds(whole, camera).after(back) if rig else None
     return PlateFit(
-        target=target,
+        target=corners.target,
         camera_plate=pose,
         other=whole.other.after(back) if whole.other else None,
         odds=whole.odds,
@@ -91,7 +90,7 @@ def fit_plate(
         noise_px=whole.sd_px,
         verdicts=plate_verdicts(whole, views, halves, known, rig),
         inputs_hash="",
-        sources=tuple(photo.name for photo in photos),
+        sources=corners.sources,
     )
 
 
@@ -101,19 +100,6 @@ def plate_target(recipe: Recipe) -> Pose:
     x, y = (1e-3 * value for value in recipe.plate.place_mm)
     turn = Pose.from_rotation_vector([0.0, 0.0, np.radians(recipe.plate.turn_deg)], [x, y, 0.0])
     return turn.after(Pose.from_rotation_vector([np.pi, 0.0, 0.0], np.zeros(3)))
-
-
-def _located(
-    corners: Corners, camera: Camera, priors: PlatePriors, *photos: PosePhoto
-) -> BoardPose:
-    try:
-        return locate_board(corners, camera, priors)
-    except ValueError as error:
-        names = ", ".join(photo.name for photo in photos)
-        raise VerdictError(
-            f"{names}: {error}, so the plate's pose is undetermined. Show the whole "
-            f"{photos[0].detection.board.name} in good light, or leave the photograph out."
-        ) from None
 
 
 def _halves(corners: Corners, camera: Camera, priors: PlatePriors) -> PoseHalves | None:
@@ -154,21 +140,19 @@ def _half_and_half(
     )
 
 
-def _view(
-    photo: PosePhoto, alone: BoardPose, whole: BoardPose, here: NDArray[np.bool_]
-) -> PoseView:
+def _view(seen: Detection, alone: BoardPose, whole: BoardPose, here: NDArray[np.bool_]) -> PoseView:
     normal = alone.pose.matrix[:, 2]
-    to_target = alone.pose.apply([photo.detection.points.mean(axis=0)])[0]
+    to_target = alone.pose.apply([seen.points.mean(axis=0)])[0]
     away = difference(alone.pose, whole.pose)
     residuals_px = whole.residuals_px[here][alone.used]
     slant = abs(normal @ to_target) / np.linalg.norm(to_target)
     return PoseView(
-        name=photo.name,
-        corners=len(photo.detection.ids),
+        name=seen.source,
+        corners=len(seen.ids),
         used=int(np.sum(whole.used[here])),
         rms_px=float(np.sqrt(np.mean(np.sum(residuals_px**2, axis=1)))),
         rms_alone_px=alone.rms_px,
-        side_px=photo.detection.square_px,
+        side_px=seen.square_px,
         distance_m=float(np.linalg.norm(to_target)),
         tilt_deg=float(np.degrees(np.arccos(np.clip(slant, 0.0, 1.0)))),
         ambiguity=alone.ambiguity,

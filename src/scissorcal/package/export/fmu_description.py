@@ -63,7 +63,7 @@ def model_description(facts: ExportFacts, draws: int) -> bytes:
         instantiationToken=token(facts),
         description=" ".join(f"{line}." for line in (*facts.identity, *facts.covered)),
         version=manifest.content_hash[:16],
-        license="BSD-3-Clause for the sources; the tables belong to the lab that fitted them",
+        license="BSD-3-Clause for the sources; the tables belong to the lab that built them",
         generationTool=f"scissorcal {VERSION}",
         variableNamingConvention="structured",
     )
@@ -109,8 +109,9 @@ _FIXED = {"causality": "parameter", "variability": "fixed", "initial": "exact"}
 _CALCULATED = {"causality": "output", "initial": "calculated"}
 _FLAGS = "1 invalid, 2 touching, 4 advanced, 8 out of range, 16 beyond tip, 32 not cutting"
 _DRAW = (
-    "index of the posterior draw that is simulated; -1: the package's own parameters; the largest: "
-    "the posterior means (medians where a mean and an sd do not describe the posterior)"
+    "index of the draw that is simulated, of the posterior or of the stated numbers; -1: the "
+    "package's own parameters; the largest: the means (medians where a mean and an sd do not "
+    "describe the draws)"
 )
 
 
@@ -141,8 +142,12 @@ def _variables(
     add("Int32", "draw", _DRAW, start="-1", min="-1", max=str(draws - 1), **_FIXED)
     real("crack_start", "m", "place of the crack's tip at the start", start="0.0", **_FIXED)
     calculated = {"causality": "calculatedParameter", "variability": "fixed"}
+    record = facts.manifest.provenance
+    parts = {"cut": record.cut, "friction": record.friction}
+    stated = {what for what, part in parts.items() if part and part.stated}
     for name, item in own:
-        words = f"{item.unit}; posterior mean {item.mean:.6g}, sd {item.sd:.2g}; value of the draw"
+        mean = "mean of the draws" if name.partition(".")[0] in stated else "posterior mean"
+        words = f"{item.unit}; {mean} {item.mean:.6g}, sd {item.sd:.2g}; value of the draw"
         add("Float64", name, words, initial="calculated", **calculated)
 
 

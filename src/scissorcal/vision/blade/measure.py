@@ -64,6 +64,11 @@ class BladeMeasurement:
     unit_length: float | None = None
     unit_length_sd: float = 0.0
 
+    @property
+    def total_sd(self) -> Array:
+        """Standard deviation (n,) of each offset, by its noise and the common errors together."""
+        return np.asarray(np.sqrt(self.sd**2 + np.sum(self.modes**2, axis=1)))
+
 
 def measure_blade(
     blade: PicturedBlade, priors: BladePriors = BladePriors(), *, search: float = 0.035

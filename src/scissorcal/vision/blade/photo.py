@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scissorcal.aliases import Array
+from scissorcal.errors import InputError, check_known
 from scissorcal.recipe.priors import BladePriors
 from scissorcal.vision.blade.borders import PicturedBlade
 from scissorcal.vision.blade.measure import BladeMeasurement, measure_blade
@@ -16,7 +17,7 @@ from scissorcal.vision.blade.silhouette import LONGEST, EdgeSide, Silhouette, lo
 from scissorcal.vision.blade.view import PlainView, View, see_mat
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.overlay import Canvas
-from scissorcal.vision.photo import Photo, Picture
+from scissorcal.vision.photo import Photo, Picture, as_photo
 from scissorcal.vision.targets.detect import linear_light
 
 LARGEST = 1600
@@ -109,55 +110,103 @@ def by_blade(photos: Sequence[BladePhoto]) -> dict[str, list[BladeMeasurement]]:
 
 
 @dataclass(frozen=True)
-class Laid:
+class BladeLayout:
     """How blades were laid down for a photograph.
 
     ``both``: open scissors in place of one blade. ``mat``: on the printed blade mat; without it,
-    ``scale`` (metres per pixel of the whole photograph) gives the size. ``edge_side``: the mat's
-    rim that the edge faces. ``pivot_px``: the pivot in the picture, where no hole shows it.
+    ``m_per_px`` (metres to a pixel of the whole photograph) gives the size. ``edge_side``: the
+    mat's rim that the edge faces, "down" or "up". ``pivot_px``: the pivot in the picture (column,
+    row), where no hole shows it.
     """
 
     both: bool = False
     mat: bool = True
     edge_side: EdgeSide = "down"
-    scale: float | None = None
+    m_per_px: float | None = None
     pivot_px: tuple[float, float] | None = None
 
 
-def photograph_laid(
-    photo: Photo, camera: Camera | None, laid: Laid, priors: BladePriors = BladePriors()
+def measure_edge(
+    picture: Photo | Picture,
+    camera: Camera | None = None,
+    layout: BladeLayout = BladeLayout(),
+    priors: BladePriors = BladePriors(),
 ) -> BladePhoto:
-    """Measure a photograph of one blade or of scissors, as they were laid down.
+    """Measure the edge of a blade, or of both blades of open scissors, in one photograph.
 
-    A camera counts only on the mat, and where it took this size of photograph. Raises InputError as
-    `photograph_blade` does.
+    ``picture`` is a photograph that was read, or an array of eight bits, grey (rows, columns) or
+    blue-green-red (rows, columns, 3). ``measured`` of the result has a `BladeMeasurement` for each
+    blade, none for closed scissors; `scissorcal.calibration.fit_blade` fits those of several
+    photographs together. Pixels become metres by the printed mat: by its pose before ``camera``,
+    without one by a homography, which is less certain. Without the mat no camera is used.
+
+    Raises UnknownNameError where the layout's side is none, InputError where the layout is at odds
+    with itself, the array is no picture, the camera was fitted at another size, or the photograph
+    cannot be used: no mat, no blade or several, blur, glare.
+
+    A rendered blade whose centreline is its x axis; nearly all of its edge is within two standard
+    deviations:
+
+    >>> import numpy as np
+    >>> from scissorcal.vision import (
+    ...     BLADE_MAT, BladeShape, Camera, Lens, Looks, SimPose, blade_layer, render, target_layers,
+    ... )
+    >>> camera = Camera(900.0, 900.0, 499.5, 374.5, (0.0,) * 5, 1000, 750)
+    >>> lens = Lens(900.0, (499.5, 374.5), 1000, 750)
+    >>> pose = SimPose.looking_at((0.126, 0.09), 0.275, tilt=0.1)
+    >>> blade = BladeShape(length_m=0.075, taper_rad=0.035, back_slope=-np.tan(0.035))
+    >>> layers = [*target_layers(BLADE_MAT, pose), blade_layer(blade, pose, (0.062, 0.0885))]
+    >>> picture = render(layers, lens, Looks(), np.random.default_rng(0))
+    >>> (edge,) = measure_edge(picture, camera).measured
+    >>> off = edge.offset - blade.edge_at(edge.station)
+    >>> bool(np.mean(np.abs(off) < 2.0 * edge.total_sd) > 0.9)
+    True
     """
-    if camera and (not laid.mat or (camera.width, camera.height) != (photo.width, photo.height)):
-        camera = None
-    measure = photograph_scissors if laid.both else photograph_blade
-    return measure(photo, camera, laid, priors)
+    _check_layout(layout)
+    measure = photograph_scissors if layout.both else photograph_blade
+    return measure(as_photo(picture), camera, layout, priors)
+
+
+def _check_layout(layout: BladeLayout) -> None:
+    """UnknownNameError or InputError where a layout is at odds with itself."""
+    check_known("side of the mat", layout.edge_side, ("down", "up"))
+    if not layout.mat and not layout.both:
+        raise InputError(
+            "A blade alone is measured on the mat: leave mat=False out, or state both=True where "
+            "the photograph shows open scissors."
+        )
+    if layout.m_per_px is not None:
+        if layout.mat:
+            raise InputError("The mat gives the scale: leave m_per_px out, or state mat=False.")
+        if not 0.0 < layout.m_per_px < 1.0:
+            raise InputError(
+                f"m_per_px = {layout.m_per_px:g} is no size of a pixel: state metres to a pixel, "
+                "such as 1e-4."
+            )
+    if layout.pivot_px is not None and layout.both:
+        raise InputError("Open scissors show their own pivot: leave pivot_px out.")
 
 
 def photograph_blade(
     photo: Photo,
     camera: Camera | None = None,
-    laid: Laid = Laid(),
+    layout: BladeLayout = BladeLayout(),
     priors: BladePriors = BladePriors(),
 ) -> BladePhoto:
     """Measure one blade on the mat.
 
-    The pivot is where ``laid`` has it, in the whole photograph's pixels, else in the blade's hole.
-    Raises InputError where the photograph cannot be used, saying what is wrong with it.
+    The pivot is where ``layout`` has it, in the whole photograph's pixels, else in the blade's
+    hole. Raises InputError where the photograph cannot be used, saying what is wrong with it.
     """
     view = see_mat(photo, camera, priors)
     light = linear_light(photo.grey)
     outline = silhouette(light, view, photo.source)
     pivot, sd = None, 0.0
-    if laid.pivot_px is not None:
-        beside = (laid.pivot_px[0] + 1.0, laid.pivot_px[1])
-        there = view.to_sheet(photo.within([laid.pivot_px, beside]))
+    if layout.pivot_px is not None:
+        beside = (layout.pivot_px[0] + 1.0, layout.pivot_px[1])
+        there = view.to_sheet(photo.within([layout.pivot_px, beside]))
         pivot, sd = there[0], priors.pivot_sd_px * float(np.hypot(*(there[1] - there[0])))
-    parts = lone_blade(outline, photo.source, laid.edge_side, pivot, sd)
+    parts = lone_blade(outline, photo.source, layout.edge_side, pivot, sd)
     measured = measure_blade(PicturedBlade(light, view, parts, photo.source), priors)
     return BladePhoto(photo, view, outline, (measured,))
 
@@ -165,25 +214,25 @@ def photograph_blade(
 def photograph_scissors(
     photo: Photo,
     camera: Camera | None = None,
-    laid: Laid = Laid(),
+    layout: BladeLayout = BladeLayout(),
     priors: BladePriors = BladePriors(),
 ) -> BladePhoto:
     """Measure both blades of open scissors, on the mat or on any bright sheet.
 
-    Without the mat shapes have no scale, unless ``laid`` states it. The camera should look straight
-    down, since its tilt is not corrected. Raises InputError where the photograph shows no scissors,
-    or cannot be used.
+    Without the mat shapes have no scale, unless ``layout`` states it. The camera should look
+    straight down, since its tilt is not corrected. Raises InputError where the photograph shows no
+    scissors, or cannot be used.
     """
     light = linear_light(photo.grey)
-    if laid.mat:
+    if layout.mat:
         view: View = see_mat(photo, camera, priors)
         outline = silhouette(light, view, photo.source)
     else:
         height, width = photo.image.shape[:2]
-        scale = laid.scale * photo.reduction if laid.scale else None
+        scale = layout.m_per_px * photo.reduction if layout.m_per_px else None
         view = PlainView.by_hand(width, height, priors, scale)
         outline = silhouette(light, view, photo.source, longest=min(max(width, height), LONGEST))
-    scissors = find_scissors(outline, photo.source, whole=not laid.mat)
+    scissors = find_scissors(outline, photo.source, whole=not layout.mat)
     if not scissors.blades:
         return BladePhoto(photo, view, outline, (), scissors)
     view, measured, lengths = measure_pair(light, view, scissors.blades, photo.source, priors)

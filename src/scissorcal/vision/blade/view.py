@@ -13,7 +13,13 @@ from scipy.optimize import least_squares
 from scissorcal.aliases import Array
 from scissorcal.errors import InputError
 from scissorcal.recipe.priors import BladePriors
-from scissorcal.vision.geometry.board_pose import Corners, locate_board, project_pose
+from scissorcal.vision.geometry.board_pose import (
+    Corners,
+    UndeterminedPoseError,
+    locate_board,
+    other_size,
+    project_pose,
+)
 from scissorcal.vision.geometry.camera import PARAMETERS, Camera
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.targets.boards import BLADE_MAT, MAT_FIELD_M
@@ -141,18 +147,16 @@ def see_mat(photo: Photo, camera: Camera | None, priors: BladePriors = BladePrio
             "whole mat, in focus and without glare."
         )
     height, width = photo.image.shape[:2]
-    detection = replace(detection, pixels=photo.within(detection.pixels))
+    within = photo.within(detection.pixels)
+    detection = replace(detection, pixels=within, width=width, height=height)
     printed = (0.01 * priors.print_scale_sd_percent) ** 2 * np.eye(2)
     if camera is None:
         return _homography_view(detection, (width, height), printed, photo.source)
-    if (camera.width, camera.height) != (photo.width, photo.height):
-        raise InputError(
-            f"{photo.source} has {photo.width} x {photo.height} pixels, but the camera was fitted "
-            f"at {camera.width} x {camera.height}: use the size of the camera's fit."
-        )
+    if not camera.takes(photo.width, photo.height):
+        raise other_size(photo.source, (photo.width, photo.height), camera)
     if photo.reduction > 1:
         camera = camera.scaled(width, height)
-    return _camera_view(detection, camera, printed, photo.source)
+    return _camera_view(detection, camera, printed)
 
 
 @dataclass(frozen=True)
@@ -201,12 +205,12 @@ class _HomographyView(View):
         return np.asarray(bent * _half(self.size) + _middle(self.size))
 
 
-def _camera_view(detection: Detection, camera: Camera, printed: Array, source: str) -> CameraView:
+def _camera_view(detection: Detection, camera: Camera, printed: Array) -> CameraView:
     corners = Corners.of(detection)
     try:
         board = locate_board(corners, camera)
-    except ValueError as error:
-        raise InputError(f"{source}: the mat's pose cannot be found: {error}.") from None
+    except UndeterminedPoseError as error:
+        raise InputError(str(error)) from None
     whole = np.repeat(board.used.reshape(-1, 4).all(axis=1), 4)
     turn, _ = cv2.Rodrigues(board.pose.matrix[:3, :3])
     pose = np.concatenate([np.ravel(turn), np.asarray(board.pose.translation_m)])

@@ -1,6 +1,7 @@
 """The pose of a flat target before a camera: both solutions of a plane, and their covariance."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cv2
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
+from scissorcal.errors import InputError, MissingError, VerdictError
 from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
@@ -26,33 +28,108 @@ FEWEST = 4
 ROUNDS = 100
 
 
+class UndeterminedPoseError(VerdictError, ValueError):
+    """The corners that were seen do not determine a pose (exit code 3)."""
+
+
 @dataclass(frozen=True)
 class Corners:
     """Corners of one flat target as seen by a camera at rest, in one frame or several.
 
     ``pixels`` (n, 2); ``points`` (n, 3) in the target's frame, z = 0, metres; ``frame`` and
     ``corner`` (n,) say in which picture, and which corner of the target it is: a corner's
-    errors by print and light repeat from picture to picture.
+    errors by print and light repeat from picture to picture. ``target`` and ``sources`` name the
+    target and the pictures in messages; ``size_px`` is the pictures' width and height, None where
+    it is unknown.
     """
 
     pixels: Array
     points: Array
     frame: Integers
     corner: Integers
+    target: str = "target"
+    sources: tuple[str, ...] = ()
+    size_px: tuple[int, int] | None = None
 
     @classmethod
     def of(cls, *detections: Detection) -> "Corners":
-        """The corners of detection target, a frame for each of its detections."""
+        """The corners of one target, a frame for each of its detections.
+
+        Raises MissingError without a detection, InputError where they are of different targets or
+        of pictures of different sizes.
+        """
+        if not detections:
+            raise MissingError(
+                "No picture of a target was given, so there is no pose to find: give what "
+                "find_board found in one."
+            )
+        check_detections(detections)
+        first = detections[0]
+        for detection in detections:
+            if detection.board != first.board:
+                raise InputError(
+                    f"{detection.source} shows the {detection.board.name}, {first.source} the "
+                    f"{first.board.name}: a pose is that of one target; leave one of them out."
+                )
         return cls(
             np.concatenate([detection.pixels for detection in detections]),
             np.concatenate([detection.points for detection in detections]),
             np.repeat(np.arange(len(detections)), [len(detection.ids) for detection in detections]),
             np.concatenate([detection.ids for detection in detections]),
+            first.board.name,
+            tuple(detection.source for detection in detections),
+            (first.width, first.height),
         )
 
     def where(self, keep: NDArray[np.bool_]) -> "Corners":
         """The corners that ``keep`` selects."""
-        return Corners(self.pixels[keep], self.points[keep], self.frame[keep], self.corner[keep])
+        return replace(
+            self,
+            pixels=self.pixels[keep],
+            points=self.points[keep],
+            frame=self.frame[keep],
+            corner=self.corner[keep],
+        )
+
+    def undetermined(self, why: str, remedy: str = "") -> UndeterminedPoseError:
+        """The refusal of a pose, for a reason that is a clause."""
+        remedy = remedy or f"Show the whole {self.target} in good light"
+        names = ", ".join(self.sources[frame] for frame in np.unique(self.frame) if self.sources)
+        return UndeterminedPoseError(
+            f"{names + ': ' if names else ''}{why}, so the pose of the {self.target} is "
+            f"undetermined. {remedy}, or leave the picture out."
+        )
+
+    def check_camera(self, camera: Camera) -> None:
+        """InputError where the pictures have another size than the camera's."""
+        if self.size_px is not None and not camera.takes(*self.size_px):
+            raise other_size(self.sources[0], self.size_px, camera)
+
+
+def check_detections(detections: Sequence[Detection]) -> None:
+    """InputError where one is no detection, or their pictures have different sizes."""
+    first = detections[0]
+    for other in detections:
+        if not isinstance(other, Detection):
+            raise InputError(
+                f"{type(other).__name__} is not what was found in a picture: give what "
+                "scissorcal.vision.find_board returns for it."
+            )
+        if (other.width, other.height) != (first.width, first.height):
+            raise InputError(
+                f"{other.source} has {other.width} x {other.height} pixels, {first.source} "
+                f"{first.width} x {first.height}: one fit takes pictures of one camera at one size "
+                "and zoom; leave one of them out."
+            )
+
+
+def other_size(source: str, size_px: tuple[int, int], camera: Camera) -> InputError:
+    """The refusal of a picture of another size than the camera was fitted at."""
+    return InputError(
+        f"{source} has {size_px[0]} x {size_px[1]} pixels, and the camera was fitted at "
+        f"{camera.width} x {camera.height}: take pictures with the same camera, size, focus and "
+        "zoom."
+    )
 
 
 @dataclass(frozen=True)
@@ -82,26 +159,55 @@ class BoardPose:
 
 
 def locate_board(
-    corners: Corners, camera: Camera, priors: PlatePriors = PlatePriors()
+    seen: Detection | Sequence[Detection] | Corners,
+    camera: Camera,
+    priors: PlatePriors = PlatePriors(),
 ) -> BoardPose:
     """Find a flat target's pose, and the second one that may explain the picture as well.
 
-    Both solutions of the plane's pose (Collins and Bartoli 2014, doi:10.1007/s11263-014-0725-5)
-    are refined on all corners, those far off left out; the better one is the pose. Its covariance
-    has three parts: corner errors that are independent between frames, corner errors that
-    repeat in all frames (both estimated from the residuals), and the errors of camera and print.
-    ``priors`` state what one frame leaves open of the first, and the printer's scale.
+    ``seen`` is what `scissorcal.vision.find_board` found: in one picture, or in several where
+    camera and target are at rest. Both solutions of the plane's pose (Collins and Bartoli 2014,
+    doi:10.1007/s11263-014-0725-5) are refined on all corners, those far off left out; the better
+    one is the pose. Its covariance has three parts: corner errors that are independent between
+    frames, corner errors that repeat in all frames (both estimated from the residuals), and the
+    errors of camera and print.
+    ``priors`` state what one frame leaves open of the first, and the printer's scale. A whole
+    picture that was reduced goes with ``camera.scaled(width, height)``.
 
-    Raises ValueError with fewer than four corners, or corners along one line, or seen as one.
+    Raises InputError where a picture has another size than the camera's or shows another target
+    than the others, MissingError without a picture, UndeterminedPoseError (a VerdictError) with
+    fewer than four corners, or corners along one line, or seen as one.
+
+    A plate board 250 mm before the camera; its pose is within three of its standard deviations:
+
+    >>> import numpy as np
+    >>> from scissorcal.vision import (
+    ...     PLATE_BOARD, Camera, Lens, Looks, Pose, SimPose, difference, find_board, render,
+    ...     target_layers,
+    ... )
+    >>> camera = Camera(600.0, 600.0, 319.5, 239.5, (0.0,) * 5, 640, 480)
+    >>> lens = Lens(600.0, (319.5, 239.5), 640, 480)
+    >>> truth = SimPose.looking_at((0.07, 0.05), 0.25, tilt=0.4)
+    >>> picture = render(target_layers(PLATE_BOARD, truth), lens, Looks(), np.random.default_rng(0))
+    >>> board = locate_board(find_board(picture, "plate board"), camera)
+    >>> off = difference(board.pose, Pose.from_matrix(truth.rotation, truth.shift_m))
+    >>> bool((np.abs(off) < 3.0 * np.sqrt(np.diag(board.pose.covariance))).all())
+    True
     """
+    corners = seen if isinstance(seen, Corners) else _corners_of(seen)
+    corners.check_camera(camera)
     if len(np.unique(corners.corner)) < FEWEST:
-        raise ValueError(f"only {len(np.unique(corners.corner))} corners were seen; 4 are needed")
+        count = len(np.unique(corners.corner))
+        raise corners.undetermined(f"only {count} corners were seen; 4 are needed")
     flat = corners.points[:, :2] - corners.points[:, :2].mean(axis=0)
     if np.linalg.svd(flat, compute_uv=False)[-1] < 1e-6 * np.linalg.norm(flat):
-        raise ValueError("the corners that were seen lie along one line")
+        raise corners.undetermined("the corners that were seen lie along one line")
     used = np.all(np.isfinite(camera.rays(corners.pixels)), axis=1)
     if len(np.unique(corners.corner[used])) < FEWEST:
-        raise ValueError("the corners that were seen lie where the camera's fit does not hold")
+        raise corners.undetermined(
+            "the corners that were seen lie where the camera's fit does not hold",
+            f"Show the {corners.target} nearer to the middle of the picture",
+        )
     try:
         begun = _both(corners.where(used), camera)
         refined = [_refine(start, corners, camera, used) for start in begun]
@@ -113,7 +219,7 @@ def locate_board(
         noise, kept = _components(best.residuals, corners, used, priors)
         by_noise, by_camera, by_print = _covariance(best, corners, used, noise, kept)
     except np.linalg.LinAlgError:
-        raise ValueError("the corners that were seen do not determine a pose") from None
+        raise corners.undetermined("the corners that were seen fit no single pose") from None
     sd = float(np.sqrt(noise + kept))
     print_sd = 0.01 * priors.print_scale_sd_percent
     covariance = by_noise + print_sd**2 * by_print @ by_print.T
@@ -135,6 +241,10 @@ def locate_board(
         by_print=by_print,
         noise=by_noise,
     )
+
+
+def _corners_of(seen: Detection | Sequence[Detection]) -> Corners:
+    return Corners.of(seen) if isinstance(seen, Detection) else Corners.of(*seen)
 
 
 class _Refined(NamedTuple):
@@ -160,7 +270,7 @@ def _both(corners: Corners, camera: Camera) -> list[Array]:
         if np.all(np.isfinite(translation)):
             poses.append(np.concatenate([turn.ravel(), translation]))
     if not poses:
-        raise ValueError("no pose in front of the camera explains the corners")
+        raise corners.undetermined("no pose in front of the camera explains the corners")
     return poses
 
 

@@ -70,6 +70,10 @@ class Camera:
         """``distortion`` as the array that OpenCV takes."""
         return np.array(self.distortion, dtype=np.float64)
 
+    def takes(self, width: int, height: int) -> bool:
+        """Whether its pictures have this size in pixels."""
+        return (self.width, self.height) == (width, height)
+
     def project(self, points: ArrayLike) -> Array:
         """Pixels (n, 2) of points (n, 3) in the camera's frame, metres; NaN behind the camera."""
         import cv2

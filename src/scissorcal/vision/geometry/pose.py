@@ -133,6 +133,10 @@ class Pose:
         return Pose.from_matrix(matrix @ other.matrix, moved, covariance)
 
 
+UNMOVED = Pose((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+"""Of a frame in itself."""
+
+
 def between(a: Pose, b: Pose, shared: Array) -> Pose:
     """T_a_b of T_c_a and T_c_b with the cross-covariance ``shared`` (6, 6)."""
     back = a.inverse()

@@ -3,11 +3,13 @@
 With it, the plate's pose in one picture: what is new in that picture, and what all pictures share.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.aliases import Array
 from scissorcal.recipe.priors import PlatePriors
@@ -15,13 +17,15 @@ from scissorcal.vision.geometry.board_pose import (
     LEAST_SD_PX,
     BoardPose,
     Corners,
+    UndeterminedPoseError,
     locate_board,
     near,
     print_slopes,
     project_pose,
 )
 from scissorcal.vision.geometry.camera import Camera
-from scissorcal.vision.geometry.pose import Pose, between, left_jacobian
+from scissorcal.vision.geometry.pose import UNMOVED, Pose, between, left_jacobian
+from scissorcal.vision.targets.boards import RIG_MARKERS
 from scissorcal.vision.targets.detect import Detection
 
 
@@ -32,13 +36,15 @@ class PicturePose:
     The covariance of ``pose`` is the whole one. It is the sum of ``noise`` (6, 6), from the errors
     of corners, which are new in each picture, and ``shared`` (6, 6), from the errors of camera,
     print and rig card, which are the same in all of them. ``other`` is the second pose that a plane
-    allows.
+    allows, None where there is none, ``odds`` those of the first against it, NaN where unknown:
+    below 20 they leave it open which of both is true.
     """
 
     pose: Pose
     other: Pose | None
     noise: Array
     shared: Array
+    odds: float = math.nan
 
 
 OPEN = 3.0
@@ -66,10 +72,18 @@ class CardView(NamedTuple):
     blade_angle_rad: float
 
 
-def card_view(detection: Detection, position: tuple[float, float], moving_blades: int) -> CardView:
-    """The card as detected in one photograph; ``position`` is advance (mm) and opening (deg)."""
-    corners = Corners.of(detection)
-    return CardView(corners, 1e-3 * position[0], float(np.radians(position[1]) / moving_blades))
+CARD_MIDDLE_M = (0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0)
+"""The middle of the printed rig card in its own frame."""
+
+
+def card_view(
+    detection: Detection, advance_m: float, opening_rad: float, moving_blades: int
+) -> CardView:
+    """The rig card as detected in one photograph, and where the rig stood.
+
+    ``opening_rad`` is the angle between the blades, shared by ``moving_blades`` (1 or 2) of them.
+    """
+    return CardView(Corners.of(detection), advance_m, opening_rad / moving_blades)
 
 
 @dataclass(frozen=True)
@@ -98,9 +112,9 @@ class RigPose:
 
 
 def locate_rig(
-    views: tuple[CardView, ...],
+    views: Sequence[CardView],
     camera: Camera,
-    middle_m: Array,
+    middle_m: ArrayLike = CARD_MIDDLE_M,
     priors: PlatePriors = PlatePriors(),
 ) -> RigPose:
     """Find the rig's frame from pictures of a card that moves in a known way.
@@ -110,14 +124,17 @@ def locate_rig(
     (a blade's edge taken for one of a marker's) are left out. Advances determine the x axis, turns
     the pivot's axis and place; with one of them only, ``undetermined`` names the undetermined
     directions. The covariance includes the camera's and that of the card's print.
-    ``middle_m`` (3,) is the card's middle in its own frame. Raises ValueError where a card cannot
-    be located at all, or where fewer than two different positions were seen.
+    ``views`` are from `card_view`; ``middle_m`` (3,) is the card's middle in its own frame, that of
+    the printed rig card where none is given. Raises UndeterminedPoseError (a
+    VerdictError) where a card cannot be located at all, or where fewer than two different positions
+    were seen, InputError where a picture has another size than the camera's.
     """
+    views, middle_m = tuple(views), np.asarray(middle_m, dtype=np.float64)
     positions = {(round(v.advance_m, 6), round(v.blade_angle_rad, 6)) for v in views}
     if len(positions) < 2:
-        raise ValueError(
-            "the rig has the same position in all pictures: take pictures at several advances and "
-            "several openings"
+        raise UndeterminedPoseError(
+            "The rig has the same position in all pictures: take pictures at several advances and "
+            "several openings."
         )
     located = [locate_board(view.corners, camera) for view in views]
     start = _start(views, tuple(board.pose for board in located), middle_m)
@@ -217,7 +234,10 @@ def _start(views: tuple[CardView, ...], poses: tuple[Pose, ...], middle_m: Array
 def _unit(vector: Array) -> Array:
     length = float(np.linalg.norm(vector))
     if length == 0.0:
-        raise ValueError("the card did not move with the rig: fix it to the moving part")
+        raise UndeterminedPoseError(
+            "The card did not move with the rig: fix it to the moving part, and take the pictures "
+            "again."
+        )
     return np.asarray(vector / length)
 
 
@@ -300,13 +320,44 @@ def _card(poses: tuple[Pose, Pose], view: CardView) -> Array:
     return np.concatenate([in_camera.rotation_vector, in_camera.translation_m])
 
 
-def picture_pose(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | None) -> PicturePose:
-    """The plate of a target that was found; ``back`` is T_target_plate.
+def locate_plate(
+    seen: Detection | Sequence[Detection] | BoardPose,
+    camera: Camera,
+    plate_target: Pose = UNMOVED,
+    rig: RigPose | None = None,
+    priors: PlatePriors = PlatePriors(),
+) -> PicturePose:
+    """Find the plate of a target that was found, before the camera or in the rig's frame.
 
-    ``rig`` takes it into the rig's frame, with the errors of the camera that both share. A filter
-    over many pictures takes ``noise`` for each and ``shared`` once, as its bias: counted in each
-    picture, the shared errors would seem to average out.
+    ``seen`` is what `scissorcal.vision.find_board` found in one picture, or in several where camera
+    and plate are at rest, or what `locate_board` made of it. ``plate_target`` is T_plate_target:
+    how the target lies on the plate, whose frame has x along the cut from its near edge and z out
+    of its upper face. ``rig`` (`locate_rig`) takes the pose into the rig's frame, with the errors
+    of the camera that both share. A filter over many pictures takes ``noise`` for each and
+    ``shared`` once, as its bias: counted in each picture, the shared errors would seem to average
+    out. `scissorcal.calibration.fit_plate` gives the same pose with verdicts. Raises as
+    `locate_board` does.
+
+    A target whose upper left corner lies 40 mm behind the plate's near edge; printed y runs down,
+    hence the half turn:
+
+    >>> import numpy as np
+    >>> from scissorcal.vision import (
+    ...     PLATE_BOARD, Camera, Lens, Looks, Pose, SimPose, find_board, locate_plate, render,
+    ...     target_layers,
+    ... )
+    >>> camera = Camera(600.0, 600.0, 319.5, 239.5, (0.0,) * 5, 640, 480)
+    >>> lens = Lens(600.0, (319.5, 239.5), 640, 480)
+    >>> truth = SimPose.looking_at((0.07, 0.05), 0.25, tilt=0.4)
+    >>> picture = render(target_layers(PLATE_BOARD, truth), lens, Looks(), np.random.default_rng(0))
+    >>> target = Pose.from_rotation_vector([np.pi, 0.0, 0.0], [0.04, 0.0, 0.0])
+    >>> plate = locate_plate(find_board(picture, "plate board"), camera, target)
+    >>> near_edge_m = truth.shift_m - 0.04 * truth.rotation[:, 0]
+    >>> bool(np.abs(plate.pose.translation_m - near_edge_m).max() < 0.3e-3), plate.odds > 20.0
+    (True, True)
     """
+    board = seen if isinstance(seen, BoardPose) else locate_board(seen, camera, priors)
+    back = plate_target.inverse()
     pose = (rig.holds(board, camera) if rig else board.pose).after(back)
     exact = replace(rig.camera_rig, covariance=None).inverse() if rig else None
 
@@ -318,4 +369,4 @@ def picture_pose(board: BoardPose, camera: Camera, back: Pose, rig: RigPose | No
     assert alone.covariance is not None
     shared = pose.covariance - alone.covariance
     other = placed(board.other) if board.other else None
-    return PicturePose(pose, other, alone.covariance, 0.5 * (shared + shared.T))
+    return PicturePose(pose, other, alone.covariance, 0.5 * (shared + shared.T), board.odds)

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from scissorcal.aliases import Array
-from scissorcal.errors import InputError
+from scissorcal.errors import InputError, UnknownNameError, unknown_name
 
 FORMS = (
     "chessboard:COLUMNSxROWS:SQUARE_MM (inner corners) or "
@@ -235,10 +235,45 @@ def targets_of(ids: Iterable[int]) -> dict[str, int]:
 
 
 def dictionary(name: str) -> Any:
-    """Give the ``cv2.aruco.Dictionary`` of a name such as "DICT_5X5_250"."""
+    """Give the ``cv2.aruco.Dictionary`` of a name such as "DICT_5X5_250".
+
+    Raises UnknownNameError, which lists all names, where there is none of that name.
+    """
     import cv2
 
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    number = getattr(cv2.aruco, name, None) if name.startswith("DICT_") else None
+    if number is None:
+        known = [key for key in dir(cv2.aruco) if key.startswith("DICT_")]
+        sentence = unknown_name("dictionary of markers", name, known)
+        raise UnknownNameError(f"{sentence} There are: {', '.join(known)}.")
+    return cv2.aruco.getPredefinedDictionary(number)
+
+
+def as_board(board: Board | str) -> Board:
+    """The board itself, or that of a name: one of `TARGETS` or of `FORMS`.
+
+    Raises UnknownNameError, which lists the names, or InputError where it is neither.
+
+    >>> as_board("plate board").ids[0], as_board("chessboard:9x6:25").square_m
+    (100, 0.025)
+    >>> as_board("plate bord")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    scissorcal.errors.UnknownNameError: "plate bord" is no target. Did you mean "plate board"? ...
+    """
+    if isinstance(board, Board):
+        return board
+    named = {target.name: target for target in TARGETS}
+    if not isinstance(board, str):
+        raise InputError(
+            f"{type(board).__name__} is no board: give a CharucoBoard, MarkerBoard or Chessboard "
+            f"of scissorcal.vision, or one of these names: {', '.join(named)}."
+        )
+    if board in named:
+        return named[board]
+    if ":" in board:
+        return board_from_words(board)
+    sentence = unknown_name("target", board, named)
+    raise UnknownNameError(f"{sentence} For another board give {FORMS}.")
 
 
 def board_from_words(words: str) -> CharucoBoard | Chessboard:
@@ -293,11 +328,7 @@ def words_of_board(board: CharucoBoard) -> str:
 def _charuco(
     columns: int, rows: int, square_m: float, marker_m: float, name: str, legacy: bool
 ) -> CharucoBoard:
-    import cv2
-
-    dictionaries = [key for key in dir(cv2.aruco) if key.startswith("DICT_")]
-    if name not in dictionaries:
-        raise InputError(f"{name} is not a dictionary of markers: give one of {dictionaries}.")
+    held = len(dictionary(name).bytesList)
     board = CharucoBoard(
         f"ChArUco {columns}x{rows}",
         columns,
@@ -307,7 +338,6 @@ def _charuco(
         dictionary=name,
         legacy=legacy,
     )
-    held = len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name)).bytesList)
     if len(board.ids) > held:
         raise InputError(f"{name} has {held} markers; the board needs {len(board.ids)}.")
     return board

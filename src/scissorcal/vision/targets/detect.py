@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from scissorcal.aliases import Array, Integers
 from scissorcal.errors import InputError
-from scissorcal.vision.photo import Photo, Picture
+from scissorcal.vision.photo import Photo, Picture, as_photo
 from scissorcal.vision.targets.boards import (
     Board,
     CharucoBoard,
     Chessboard,
     MarkedBoard,
     MarkerBoard,
+    as_board,
     dictionary,
 )
 from scissorcal.vision.targets.refusals import no_board_sentence
@@ -61,13 +62,17 @@ class Detection:
     """A target as one photograph shows it.
 
     Row k of ``pixels`` (n, 2), in the whole photograph, is ``board.points[ids[k]]``. ``square_px``
-    is the median length of a square's (or a marker's) side there.
+    is the median length of a square's (or a marker's) side there. ``source`` is the photograph's
+    name, ``width`` and ``height`` its size in pixels.
     """
 
     board: Board
     ids: Integers
     pixels: Array
     square_px: float
+    source: str
+    width: int
+    height: int
 
     @property
     def points(self) -> Array:
@@ -82,18 +87,42 @@ class Detection:
 
 
 def find_board(
-    photo: Photo, board: Board, *, window_px: int | None = None, explain: bool = True
+    photo: Photo | Picture,
+    board: Board | str,
+    *,
+    window_px: int | None = None,
+    explain: bool = True,
 ) -> Detection:
     """Find a board's corners in a photograph.
 
-    ChArUco boards and marker boards may be seen in part. ``window_px`` is half the side of the
+    ``photo`` is one that was read, or an array of eight bits, grey (rows, columns) or
+    blue-green-red (rows, columns, 3). ``board`` is a printed target by its name ("camera board",
+    "blade mat", "plate strip", "plate board", "rig markers"), another board by its words
+    ("chessboard:9x6:25"), or a board. ChArUco boards and marker boards may be seen in part.
+    ``window_px`` is half the side of the
     window in which a plain chessboard's corners are refined; None takes a fifth of each corner's
     smallest square, since a window that reaches into the next square pulls its corner away.
 
-    Raises InputError with what the photograph shows instead: nothing, another target, too few
+    Raises UnknownNameError where no board has the name, InputError where the array is no picture,
+    and with what the photograph shows instead: nothing, another target, too few
     corners, squares too small or too blurred. With ``explain`` False, as for a video's frames, the
     message has no explanation.
+
+    A board before a lens that has no distortion; the rms error of its corners is below 0.06 px:
+
+    >>> import numpy as np
+    >>> from scissorcal.vision import PLATE_BOARD, Lens, Looks, SimPose, render, target_layers
+    >>> lens = Lens(600.0, (319.5, 239.5), 640, 480)
+    >>> pose = SimPose.looking_at((0.07, 0.05), 0.25, tilt=0.4)
+    >>> picture = render(target_layers(PLATE_BOARD, pose), lens, Looks(), np.random.default_rng(0))
+    >>> seen = find_board(picture, "plate board")
+    >>> len(seen.ids), seen.pixels.shape, seen.points.shape
+    (24, (24, 2), (24, 3))
+    >>> off = seen.pixels - lens.sees(seen.points[:, :2], pose)
+    >>> bool(np.sqrt(np.mean(off**2)) < 0.06)
+    True
     """
+    photo, board = as_photo(photo), as_board(board)
     if isinstance(board, Chessboard):
         ids, pixels = _chessboard(photo.grey, board, window_px)
     elif isinstance(board, CharucoBoard):
@@ -108,7 +137,8 @@ def find_board(
             else f"{photo.source} does not show the {board.name}."
         )
     whole = photo.whole(pixels)
-    return Detection(board, ids, whole, _side_px(board, ids, whole))
+    side_px = _side_px(board, ids, whole)
+    return Detection(board, ids, whole, side_px, photo.source, photo.width, photo.height)
 
 
 def find_any_board(photo: Photo, boards: Sequence[Board], *, explain: bool = True) -> Detection:
@@ -124,12 +154,26 @@ def find_any_board(photo: Photo, boards: Sequence[Board], *, explain: bool = Tru
     return find_board(photo, boards[-1], explain=explain)
 
 
-def find_markers(grey: Picture, dictionary_name: str, board: MarkedBoard | None = None) -> Markers:
+def find_markers(
+    picture: Photo | Picture, dictionary_name: str, board: MarkedBoard | None = None
+) -> Markers:
     """Find every marker of a dictionary; ``board`` helps to find more of its markers.
 
     Markers are read with twice the default pixels per cell, which finds those blurred by half a
-    cell; corners are then measured from the markers' sides.
+    cell; corners are then measured from the markers' sides. ``picture`` is as in `find_board`, and
+    corners are pixels of the array. Raises UnknownNameError, which lists the
+    dictionaries, where OpenCV has none of that name, InputError where the array is no picture.
+
+    >>> import numpy as np
+    >>> from scissorcal.vision import PLATE_STRIP, Lens, Looks, SimPose, render, target_layers
+    >>> lens = Lens(600.0, (319.5, 239.5), 640, 480)
+    >>> layers = target_layers(PLATE_STRIP, SimPose.looking_at((0.114, 0.014), 0.3))
+    >>> picture = render(layers, lens, Looks(), np.random.default_rng(0))
+    >>> found = find_markers(picture, "DICT_5X5_250", PLATE_STRIP)
+    >>> sorted(found.ids.tolist()), found.corners.shape, bool(found.sharp.all())
+    ([80, 81, 82, 83, 84, 85], (6, 4, 2), True)
     """
+    grey = as_photo(picture).grey
     detector = cv2.aruco.ArucoDetector(dictionary(dictionary_name), _reading())
     corners, ids, rejected = detector.detectMarkers(grey)
     if board is not None and ids is not None and len(ids) >= 2 and len(rejected):

@@ -80,6 +80,8 @@ def no_board_sentence(photo: Photo, board: Board, corners: int, least: int) -> s
     if other and not corners:
         return f"{name} shows {other}, not the {board.name}: {_use(board)}."
     blur = _sharpest_edge_px(photo.grey)
+    if np.isinf(blur):
+        return f"{name} is of one shade: uncover the lens, and show the {board.name} in good light."
     if blur > BLURRED_PX:
         return (
             f"{name} is too blurred: its sharpest edges are {2.56 * blur:.0f} px wide. Focus on "

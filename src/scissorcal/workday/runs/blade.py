@@ -15,7 +15,7 @@ from scissorcal.calibration.edge.result import BladeFit, BladeResult, SeenPair
 from scissorcal.calibration.fit_pictures import edge_picture
 from scissorcal.errors import InputError
 from scissorcal.verdicts import Verdict
-from scissorcal.vision.blade.photo import BladePhoto, Laid, by_blade, photograph_laid
+from scissorcal.vision.blade.photo import BladeLayout, BladePhoto, by_blade, measure_edge
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.overlay import write_picture
 from scissorcal.vision.photo import Photo, read_photo
@@ -88,15 +88,15 @@ def _pair(one: BladePhoto) -> SeenPair:
 
 def _measured(engine: Engine, photo: Photo, setup: BladeSetup) -> BladePhoto:
     scale = setup.scale_mm_per_px * 1e-3 if setup.scale_mm_per_px else None
-    laid = Laid(setup.both, setup.mat, setup.edge_side, scale, setup.pivot_px)
-    camera = _camera(engine) if setup.mat else None
-    return photograph_laid(photo, camera, laid, engine.recipe.fit.blade.priors)
+    layout = BladeLayout(setup.both, setup.mat, setup.edge_side, scale, setup.pivot_px)
+    camera = _camera(engine, photo) if setup.mat else None
+    return measure_edge(photo, camera, layout, engine.recipe.fit.blade.priors)
 
 
-def _camera(engine: Engine) -> Camera | None:
-    """The workspace's camera, where it has one."""
+def _camera(engine: Engine, photo: Photo) -> Camera | None:
+    """The workspace's camera, where it has one that takes photographs of this size."""
     fitted = _camera_fit(engine)
-    return None if fitted is None else fitted.camera
+    return fitted.camera if fitted and fitted.camera.takes(photo.width, photo.height) else None
 
 
 def _camera_fit(engine: Engine) -> CameraFit | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from scissorcal.calibration.camera.bundle import SeenBoard
-from scissorcal.calibration.camera.fit import CameraPhoto, fit_camera, imported_camera, seen_board
+from scissorcal.calibration.camera.fit import fit_camera, imported_camera, seen_board
 from scissorcal.calibration.camera.result import CameraFit
 from scissorcal.calibration.fit_pictures import left_over, residual_chart, uncertainty_chart
 from scissorcal.errors import InputError
@@ -21,7 +21,7 @@ from scissorcal.vision.overlay import (
 )
 from scissorcal.vision.photo import Photo, PictureShape, read_photo, same_shape
 from scissorcal.vision.targets.boards import CharucoBoard, Chessboard
-from scissorcal.vision.targets.detect import find_board
+from scissorcal.vision.targets.detect import Detection, find_board
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.history import save_version
 from scissorcal.workday.photographs import (
@@ -83,17 +83,17 @@ def fit(engine: Engine, request: Request) -> Made:
     Both are charts of matplotlib; a note replaces them where that is not installed.
     """
     captures = photo_captures(engine.workspace, "camera")
-    photos = _photos(captures)
+    seen = _detections(captures)
     rng = np.random.default_rng([request.seed, STREAM])
     priors = engine.recipe.fit.camera.priors
     result = fit_camera(
-        photos,
+        seen,
         rng=rng,
         priors=priors,
         inputs_hash=request.inputs_hash,
         progress=request.run.tell,
     )
-    boards = [seen_board(photo.name, photo.detection, priors) for photo in photos]
+    boards = [seen_board(detection, priors) for detection in seen]
     charts = find_spec("matplotlib") is not None
     return Made(
         result,
@@ -138,16 +138,14 @@ def _shape_of(captures: Sequence[PhotoCapture]) -> PictureShape | None:
 
 def _coverage_of(captures: Sequence[PhotoCapture]) -> ViewCoverage:
     coverage = ViewCoverage()
-    for photo in _photos(captures):
-        coverage = coverage.with_view(photo.detection, photo.width, photo.height)
+    for detection in _detections(captures):
+        coverage = coverage.with_view(detection, detection.width, detection.height)
     return coverage
 
 
-def _photos(captures: Sequence[PhotoCapture]) -> list[CameraPhoto]:
+def _detections(captures: Sequence[PhotoCapture]) -> list[Detection]:
     return [
-        CameraPhoto(photo.source, photo.width, photo.height, detection_of(capture, photo))
-        for capture in captures
-        for photo in capture.index.photographs
+        detection_of(capture, photo) for capture in captures for photo in capture.index.photographs
     ]
 
 

@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 
 from scissorcal.calibration.camera.result import CameraFit
-from scissorcal.calibration.plate.fit import PosePhoto, fit_plate, plate_target
+from scissorcal.calibration.plate.fit import fit_plate, plate_target
 from scissorcal.calibration.plate.result import PlateFit
-from scissorcal.errors import InputError, VerdictError
+from scissorcal.errors import VerdictError
+from scissorcal.vision.geometry.board_pose import UndeterminedPoseError
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.rig_frame import RigPose, card_view, locate_rig
 from scissorcal.vision.overlay import residual_overlay, write_picture
@@ -76,11 +77,7 @@ def fit(engine: Engine, request: Request) -> Made:
     newest = photo_captures(engine.workspace, "plate")[-1:]
     photos = []
     for capture in newest:
-        _refuse_other_camera(capture, camera)
-        photos += [
-            PosePhoto(photo.source, detection_of(capture, photo))
-            for photo in capture.index.photographs
-        ]
+        photos += [detection_of(capture, photo) for photo in capture.index.photographs]
     result = fit_plate(
         photos,
         camera,
@@ -101,28 +98,17 @@ def locate_workspace_rig(engine: Engine, camera: Camera) -> RigPose | None:
     captures = photo_captures(engine.workspace, "rig")[-1:]
     views = []
     for capture in captures:
-        _refuse_other_camera(capture, camera)
         for photo in capture.index.photographs:
-            position = photo.advance_mm or 0.0, photo.opening_deg or 0.0
-            found = detection_of(capture, photo)
-            views.append(card_view(found, position, engine.recipe.rig.moving_blades))
+            advance_m = 1e-3 * (photo.advance_mm or 0.0)
+            opening_rad = float(np.radians(photo.opening_deg or 0.0))
+            card = detection_of(capture, photo)
+            views.append(card_view(card, advance_m, opening_rad, engine.recipe.rig.moving_blades))
     if not views:
         return None
-    middle = np.array([0.5 * RIG_MARKERS.width_m, 0.5 * RIG_MARKERS.height_m, 0.0])
     try:
-        return locate_rig(tuple(views), camera, middle, engine.recipe.fit.plate.priors)
-    except ValueError as error:
-        raise VerdictError(f"{captures[0].folder}: {error}.") from None
-
-
-def _refuse_other_camera(capture: PhotoCapture, camera: Camera) -> None:
-    for photo in capture.index.photographs:
-        if (photo.width, photo.height) != (camera.width, camera.height):
-            raise InputError(
-                f"{capture.folder.name}/{photo.file} has {photo.width} x {photo.height} pixels, "
-                f"and the camera was fitted at {camera.width} x {camera.height}: photograph the "
-                "plate with the same camera, size, focus and zoom."
-            )
+        return locate_rig(views, camera, priors=engine.recipe.fit.plate.priors)
+    except UndeterminedPoseError as error:
+        raise VerdictError(f"{captures[0].folder}: {error}") from None
 
 
 def _draw(

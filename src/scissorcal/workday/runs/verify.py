@@ -26,7 +26,7 @@ from scissorcal.workday.runs.cut import edge_of_photographs
 from scissorcal.workday.runs.fit import available, load_result, share_of
 from scissorcal.workday.workspace import FitKind, Workspace
 
-ALGORITHM = 6
+ALGORITHM = 7
 """Raised whenever a fit of the same inputs would give other numbers."""
 
 

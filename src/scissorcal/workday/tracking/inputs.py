@@ -59,8 +59,7 @@ def pose_finder(
             "cannot be told together: photograph the rig card at several advances and openings "
             f"('scissorcal capture plate {photographs}'), or {otherwise}."
         )
-    back = plate_target(recipe).inverse()
-    return PoseFinder(fitted.camera, back, rig, recipe.fit.plate.priors)
+    return PoseFinder(fitted.camera, plate_target(recipe), rig, recipe.fit.plate.priors)
 
 
 def track_about(engine: Engine, recipe: Recipe, camera: str, eye: PoseFinder | None) -> TrackAbout:

@@ -35,7 +35,7 @@ from scissorcal.recording.layout import (
 from scissorcal.tracking.follow import FollowedRow
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose
-from scissorcal.vision.geometry.rig_frame import PicturePose, RigPose, picture_pose
+from scissorcal.vision.geometry.rig_frame import PicturePose, RigPose, locate_plate
 from scissorcal.vision.live import Frame, LocatedFrame, State, located_frames
 from scissorcal.vision.targets.boards import PLATE_BOARD, PLATE_STRIP
 
@@ -67,12 +67,12 @@ class TrackPicture:
 class PoseFinder:
     """What turns a camera's pictures into poses of the plate.
 
-    ``back`` is T_target_plate; ``rig`` takes poses into the rig's frame, None where that is not
-    known.
+    ``plate_target`` is T_plate_target; ``rig`` takes poses into the rig's frame, None where that is
+    not known.
     """
 
     camera: Camera
-    back: Pose
+    plate_target: Pose
     rig: RigPose | None
     priors: PlatePriors
 
@@ -82,7 +82,7 @@ class PoseFinder:
 
     def picture(self, located: LocatedFrame) -> TrackPicture:
         """The picture as a track takes it; a video's arrives when it is stamped."""
-        frame, pose = located.frame, located.pose
+        frame, pose, target = located.frame, located.pose, self.plate_target
         live = not math.isnan(frame.arrived_s)
         return TrackPicture(
             number=frame.number,
@@ -93,7 +93,7 @@ class PoseFinder:
             target=located.board.name if located.board else "",
             odds=min(pose.odds, 1e12) if pose and pose.other else math.nan,
             rms_px=pose.rms_px if pose else math.nan,
-            seen=picture_pose(pose, self.camera, self.back, self.rig) if pose else None,
+            seen=locate_plate(pose, self.camera, target, self.rig) if pose else None,
             done=frame.number / frame.count if frame.count else math.nan,
         )
 

@@ -8,13 +8,14 @@ from scipy.stats import chi2
 from scissorcal.vision.geometry.board_pose import Corners, locate_board
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, difference
-from scissorcal.vision.geometry.rig_frame import RigPose, picture_pose
+from scissorcal.vision.geometry.rig_frame import RigPose, locate_plate
 from scissorcal.vision.targets.boards import PLATE_BOARD
 
 LENS = (0.05, -0.1, 0.0, 0.0, 0.0)
 KNOWLEDGE = np.diag([0.8, 0.8, 0.6, 0.6, 1e-3, 3e-3, 1e-4, 1e-4, 1e-3]) ** 2
 CAMERA = Camera(1000.0, 1000.0, 640.0, 360.0, LENS, 1280, 720, KNOWLEDGE)
-BACK = Pose.from_rotation_vector([np.pi, 0.0, 0.0], [0.03, 0.01, 0.0]).inverse()
+TARGET = Pose.from_rotation_vector([np.pi, 0.0, 0.0], [0.03, 0.01, 0.0])
+BACK = TARGET.inverse()
 PIXEL = 0.1
 PICTURES = 8
 WORLDS = 60
@@ -60,8 +61,8 @@ def scores() -> tuple[float, float, float]:
         camera, scale = an_offset(rng)
         truth = a_view(rng)
         seen = [
-            picture_pose(
-                locate_board(corners_by(camera, truth, scale, rng), CAMERA), CAMERA, BACK, None
+            locate_plate(
+                locate_board(corners_by(camera, truth, scale, rng), CAMERA), CAMERA, TARGET
             )
             for _ in range(PICTURES)
         ]
@@ -97,7 +98,7 @@ def test_taking_the_whole_covariance_for_noise_is_overconfident() -> None:
         camera, scale = an_offset(rng)
         truth = a_view(rng)
         corners = (corners_by(camera, truth, scale, rng) for _ in range(PICTURES))
-        seen = [picture_pose(locate_board(one, CAMERA), CAMERA, BACK, None) for one in corners]
+        seen = [locate_plate(locate_board(one, CAMERA), CAMERA, TARGET) for one in corners]
         mean = np.mean([difference(one.pose, truth.after(BACK)) for one in seen], axis=0)
         naive.append(mean @ np.linalg.solve(seen[0].pose.covariance / PICTURES, mean))
     assert np.mean(naive) > 4.0 * 6.0
@@ -110,7 +111,7 @@ def test_both_parts_make_up_the_whole_in_the_rigs_frame() -> None:
     by_camera = 1e-5 * rng.standard_normal((6, 9))
     rig = RigPose(camera_rig, camera_rig, 0.1, (), by_camera)
     found = locate_board(corners_by(CAMERA, a_view(rng), np.ones(2), rng), CAMERA)
-    seen = picture_pose(found, CAMERA, BACK, rig)
+    seen = locate_plate(found, CAMERA, TARGET, rig)
     np.testing.assert_allclose(seen.noise + seen.shared, seen.pose.covariance, atol=1e-18)
     turned = camera_rig.matrix.T @ found.noise[:3, :3] @ camera_rig.matrix
     np.testing.assert_allclose(seen.noise[:3, :3], turned, atol=1e-15)
