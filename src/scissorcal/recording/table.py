@@ -190,11 +190,10 @@ def sheets_of(table: Table) -> Integers | int:
     if SHEET not in table.columns:
         return -1
     values = table.columns[SHEET].values
-    wrong = (values != np.rint(values)) | (values < -1.0)
-    if wrong.any():
-        row = int(np.argmax(wrong))
+    wrong = np.flatnonzero((values != np.rint(values)) | (values < -1.0))
+    if len(wrong):
         raise InputError(
-            f"{table.place(row, SHEET)}: {values[row]:g} counts no sheet: give whole numbers, 0 "
+            f"{table.place(wrong[0], SHEET)}: {values[wrong[0]]:g} counts no sheet: give whole numbers, 0 "
             "for the first fresh piece of material, 1 for the next, -1 where none is loaded."
         )
     return values.astype(np.int64)
