@@ -193,7 +193,7 @@ def sheets_of(table: Table) -> Integers | int:
     wrong = np.flatnonzero((values != np.rint(values)) | (values < -1.0))
     if len(wrong):
         raise InputError(
-            f"{table.place(wrong[0], SHEET)}: {values[wrong[0]]:g} counts no sheet: give whole numbers, 0 "
+            f"{table.place(wrong[0], SHEET)}: {values[wrong[0]]:g} counts no sheet: give 0 "
             "for the first fresh piece of material, 1 for the next, -1 where none is loaded."
         )
     return values.astype(np.int64)
