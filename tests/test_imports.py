@@ -44,7 +44,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "workday": LOWEST | MIDDLE | {"bench", "prototype"},
     "cli": LOWEST | MIDDLE | {"workday", "bench", "prototype", "identify"},
     "stated": {"model", "calibration", "package", "recipe"},
-    "library": {"calibration", "package", "recipe", "recording", "workday"},
+    "library": {"calibration", "model", "package", "recipe", "recording", "workday"},
     "examples": {"package", "recording"},
     "<root>": {"examples", "library", "model", "package", "recording", "stated"},
     "__main__": {"cli"},

@@ -2,7 +2,6 @@
 
 import logging
 import re
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -139,11 +138,6 @@ def test_a_prediction_follows_what_was_measured(fit: FitResult) -> None:
     assert error < 0.02 * np.median(np.abs(series.measured[swept]))
 
 
-def test_a_cut_is_predicted_by_its_package() -> None:
-    with pytest.raises(InputError, match="package build"):
-        cut_fit(recipe()).predict(0.5, -0.2)
-
-
 def test_places_that_are_no_numbers_are_refused(fit: FitResult) -> None:
     with pytest.raises(InputError, match="not finite"):
         fit.predict([0.5, np.nan], 0.3)
@@ -265,6 +259,8 @@ def test_a_table_becomes_the_recording_it_was_made_of() -> None:
     again = Recording.from_pandas(made.to_pandas())
     assert np.array_equal(again.samples, made.samples)
     assert again.strokes == made.strokes
+    cut = Recording.from_pandas(made.to_pandas().assign(sheet=1), kind="cut")
+    assert {stroke.sheet for stroke in cut.strokes} == {1}
     table = made.to_pandas()[["time_s", "motor_torque_Nm"]].assign(
         angle=np.degrees(made.samples["opening"])
     )
@@ -285,6 +281,8 @@ def test_a_table_becomes_the_recording_it_was_made_of() -> None:
         ({"opening_m": [0.0, 1.0, 2.0, 3.0]}, "give one of them"),
         ({"torque_Nm": None, "force_N": [0.0] * 4}, "not measured at a rotary joint"),
         ({"kind": "cutt"}, 'Did you mean "cut"'),
+        ({"sheet": 0.5}, "0.5 counts no sheet"),
+        ({"sheet": [0, 1]}, r"sheet has shape \(2,\)"),
     ],
 )
 def test_arrays_that_are_no_motion_are_refused(changes: dict, sentence: str) -> None:
@@ -315,32 +313,3 @@ def test_progress_and_the_log_are_told_the_stages(caplog: pytest.LogCaptureFixtu
     assert all(0.0 <= done <= 1.0 for done, _ in told)
     assert caplog.messages[0] == told[0][1]
     assert {record.name for record in caplog.records} == {"scissorcal"}
-
-
-# ------------------------------------------------------------------------------------ a workspace
-
-
-def command(folder: Path, *words: str) -> None:
-    run = "from scissorcal.cli import main; main()"
-    subprocess.run([sys.executable, "-c", run, *words], cwd=folder, check=True, capture_output=True)
-
-
-@pytest.mark.slow
-def test_a_workspaces_functions_do_what_the_commands_do(tmp_path: Path) -> None:
-    here = create_workspace(tmp_path / "here", "paper-80gsm")
-    there = create_workspace(tmp_path / "there", "paper-80gsm")
-    captured = here.capture("friction", seed=3)
-    assert here.recordings("friction") == (captured.path,)
-    command(there.root, "capture", "friction", "--device", "sim", "--seed", "3", "--yes")
-    recordings = [scissorcal.open_recording(w.recordings("friction")[0]) for w in (here, there)]
-    for field in ("opening", "motor_torque", "device_time_us", "stroke"):
-        assert np.array_equal(recordings[0].samples[field], recordings[1].samples[field])
-    (outcome,) = here.fit("friction", effort="draft")
-    command(there.root, "fit", "friction", "--effort", "draft")
-    assert np.array_equal(outcome.result.draws, there.fits["friction"].draws)
-    assert list(here.fits) == ["friction"]
-    assert here.fit("friction", effort="draft")[0].cached
-    alone = scissorcal.fit_friction(recordings[0], recipe=here.recipe(), effort="draft")
-    assert np.array_equal(alone.draws, outcome.result.draws)
-    assert here.report().fits == ("friction",)
-    assert here.report_html.is_file()

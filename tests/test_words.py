@@ -13,6 +13,8 @@ from tests.test_docs import ROOT, words_not_used
 PACKAGE = Path(scissorcal.__file__).parent
 NAME = re.compile(r"`+[^`]*`+|\w+ = |\w+(?:\.\w+)+")
 HELD = sorted(PACKAGE.rglob("*.py"))
+STORED = {("report/subjects/decision.py", "trust check")}
+"""Names of values in files that were written before the word changed: the column of report.json."""
 
 
 def sentences_of(source: str) -> list[tuple[int, str]]:
@@ -44,12 +46,11 @@ def not_used() -> re.Pattern[str]:
 
 def words_found(path: Path) -> list[str]:
     """The words that are not used, with the places of the sentences that use them."""
-    found = []
+    place, found = path.relative_to(PACKAGE).as_posix(), []
     for line, text in sentences_of(path.read_text(encoding="utf-8")):
         flat = " ".join(text.split())
-        found += [
-            f"{path.relative_to(PACKAGE)}:{line}: {word}" for word in not_used().findall(flat)
-        ]
+        if (place, flat) not in STORED:
+            found += [f"{place}:{line}: {word}" for word in not_used().findall(flat)]
     return found
 
 

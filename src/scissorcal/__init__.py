@@ -16,12 +16,14 @@ if TYPE_CHECKING:
     from scissorcal import examples
     from scissorcal.aliases import Progress
     from scissorcal.library import (
+        create_workspace,
         fit_cut,
         fit_friction,
         open_fit,
         open_package,
         open_recording,
         open_workspace,
+        verify_fit,
     )
     from scissorcal.model import ResponseLaw
     from scissorcal.package import OutsideCoverageWarning
@@ -40,6 +42,7 @@ __all__ = [
     "ResponseLaw",
     "__version__",
     "build_package",
+    "create_workspace",
     "examples",
     "fit_cut",
     "fit_friction",
@@ -47,6 +50,7 @@ __all__ = [
     "open_package",
     "open_recording",
     "open_workspace",
+    "verify_fit",
 ]
 
 

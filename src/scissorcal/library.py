@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from scissorcal.calibration.edge.result import BladeResult
     from scissorcal.calibration.plate.result import PlateFit
     from scissorcal.calibration.result import FitResult
+    from scissorcal.calibration.verify.result import VerifyResult
+    from scissorcal.model import ResponseLaw
     from scissorcal.package import ModelPackage
     from scissorcal.recipe import Recipe
     from scissorcal.recording import Recording
@@ -23,6 +25,20 @@ if TYPE_CHECKING:
 
 Effort = Literal["draft", "standard", "thorough"]
 LOG = logging.getLogger("scissorcal")
+
+
+def create_workspace(path: Path | str, recipe: Path | str = "paper-80gsm") -> "Workspace":
+    """Make a workspace: the folder ``path`` with a copy of a recipe, as 'scissorcal init' does.
+
+    ``recipe`` is a built-in one's name or a file. Raises InputError where the folder has a recipe
+    already, or the recipe is wrong.
+
+    >>> create_workspace("my-paper").recipe().name
+    'paper-80gsm'
+    """
+    from scissorcal.workday.workspace import create_workspace as created
+
+    return created(Path(path), str(recipe))
 
 
 def open_workspace(path: Path | str = ".") -> "Workspace":
@@ -157,6 +173,7 @@ def fit_cut(
     recipe: "Recipe | Path | str",
     friction: "FitResult | Path | str",
     *,
+    law: "ResponseLaw | None" = None,
     effort: Effort = "standard",
     seed: int = 0,
     progress: "Progress | None" = None,
@@ -164,7 +181,8 @@ def fit_cut(
     """Fit a material's response and fracture to recordings of cuts (or presses).
 
     ``recipe`` has blades, scene and priors; ``friction`` is the fit of empty motion, or its file.
-    The rest is as in `fit_friction`. The edge is the recipe's: one of photographs needs a
+    ``law`` is a response of your own (`ResponseLaw`) in the place of the recipe's families. The
+    rest is as in `fit_friction`. The edge is the recipe's: one of photographs needs a
     workspace. Raises InputError where the blades hardly touched the material, or ``friction`` is
     another fit.
 
@@ -174,21 +192,65 @@ def fit_cut(
     """
     import numpy as np
 
-    from scissorcal.calibration import CutRun, FitResult, check_effort
+    from scissorcal.calibration import CutRun, check_effort
     from scissorcal.calibration import fit_cut as fitted
     from scissorcal.workday.runs.cut import STREAM
 
     check_effort(effort)
-    used, chosen = _recordings(recordings, "cut"), _recipe(recipe)
-    known = friction if isinstance(friction, FitResult) else open_fit(friction)
+    used, chosen, known = _recordings(recordings, "cut"), _recipe(recipe), _friction(friction)
+    rng = np.random.default_rng([seed, STREAM])
+    run = CutRun(progress=_with_log(progress), own_law=law)
+    return fitted(used, chosen, known, effort=effort, rng=rng, run=run)
+
+
+def verify_fit(
+    fit: "FitResult | Path | str",
+    recordings: "Recording | Path | str | Sequence[Recording | Path | str]",
+    recipe: "Recipe | Path | str | None" = None,
+    friction: "FitResult | Path | str | None" = None,
+    *,
+    law: "ResponseLaw | None" = None,
+    fits: int = 100,
+    seed: int = 0,
+    progress: "Progress | None" = None,
+) -> "VerifyResult":
+    """Check whether the intervals of a fit of `fit_friction` or `fit_cut` hold, in this process.
+
+    Recordings, recipe, friction and ``law`` are those that the fit was made of. ``fits`` to
+    simulated data are made (simulation-based calibration), and the checks of 'scissorcal verify';
+    look at the result's ``verdicts`` and ``calibration``. Workspaces check theirs in several
+    processes (`Workspace.verify`). Raises InputError where a cut comes without recipe or friction,
+    or a fit with a law of your own without that.
+    """
+    from scissorcal.calibration import FitResult
+    from scissorcal.calibration.verify.check import StudySettings
+    from scissorcal.calibration.verify.of_fit import check_fit, known_cut, known_friction
+    from scissorcal.recipe import FitFriction
+
+    checked = fit if isinstance(fit, FitResult) else open_fit(fit)
+    if not isinstance(checked, FitResult):
+        raise InputError(f"A fit of {checked.what} has no intervals that simulations check.")
+    used = _recordings(recordings, checked.what)
+    chosen = None if recipe is None else _recipe(recipe)
+    if checked.what == "friction":
+        known = known_friction(used, chosen.fit.friction if chosen else FitFriction(), checked)
+    elif chosen is None or friction is None:
+        raise InputError("A fit of a cut is checked with its recipe and its fit of friction.")
+    else:
+        known = known_cut(used, chosen, _friction(friction), checked, law=law)
+    return check_fit(known, StudySettings(seed=seed), fits, _with_log(progress))
+
+
+def _friction(given: "FitResult | Path | str") -> "FitResult":
+    from scissorcal.calibration import FitResult
+
+    known = given if isinstance(given, FitResult) else open_fit(given)
     if not isinstance(known, FitResult) or known.what != "friction":
         raise InputError(
             f"A fit of a cut builds on a fit of friction, and this one is of {known.what}: give "
             "the fit of fit_friction(), or fits/friction.nc."
         )
-    rng = np.random.default_rng([seed, STREAM])
-    run = CutRun(progress=_with_log(progress))
-    return fitted(used, chosen, known, effort=effort, rng=rng, run=run)
+    return known
 
 
 def _recordings(

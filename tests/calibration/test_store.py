@@ -216,5 +216,5 @@ def test_a_trust_check_of_wrong_types_is_refused(tmp_path: Path, change: dict[st
     path = tmp_path / "cut.verify.json"
     save(checked(), path)
     path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
-    with pytest.raises(InputError, match=r"is not a trust check .* run 'scissorcal verify' again"):
+    with pytest.raises(InputError, match=r"is not a verification .* run 'scissorcal verify' again"):
         load(path, VerifyResult)

@@ -1,4 +1,4 @@
-"""``--axis advance``: capture, fit and trust check of the carriage, and what is refused."""
+"""``--axis advance``: capture, fit and verification of the carriage, and what is refused."""
 
 from pathlib import Path
 

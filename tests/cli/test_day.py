@@ -141,7 +141,7 @@ def test_a_report_of_another_recipe_is_not_signed(
     said = cli("report", "sign", "--name", "C", "--decision", "accept")
     recorded.recipe_path.write_text(text, encoding="utf-8")
     assert said.code == 5
-    assert "other fits, trust checks or settings" in said.err
+    assert "other fits, verifications or settings" in said.err
     assert cli("report", "sign", "--name", " ", "--decision", "accept").code == 2
 
 

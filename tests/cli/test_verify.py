@@ -30,7 +30,7 @@ def test_it_prints_tables_and_verdicts(
         "; white ",
         "effort_rms",
         "they do not share (whole strokes of a kind, alternating by speed).",
-        "Trust check: prior sensitivity",
+        "Verification: prior sensitivity",
         "----  verify.friction  calibration",
         "pass  verify.friction  halves-effort",
     ):

@@ -351,3 +351,33 @@ def test_a_position_with_marks_of_loss_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path / "log.csv", [[k * 0.01, a, 0.0] for k, a in enumerate(angle.tolist())])
     said = refusal(path, units={**UNITS, "opening": "deg"})
     assert "300 stands in 9 rows where nothing leads from or to the other values" in said
+
+
+def test_sheets_are_those_of_a_column(tmp_path: Path) -> None:
+    """A stroke has the sheet of its first sample; -1 is no mark of loss but no sheet."""
+    sheets = [-1] * 150 + [0] * 150 + [1] * 100
+    table = [[*row, sheet] for row, sheet in zip(rows(), sheets, strict=True)]
+    path = written(tmp_path / "log.csv", table, head="t,angle,torque,piece")
+    columns = {**COLUMNS, "sheet": "piece"}
+    cut = ImportOptions(kind="cut")
+    recording = import_table(path, columns=columns, units=UNITS, options=cut)
+    first = [int(np.argmax(recording.samples["stroke"] == s.index)) for s in recording.strokes]
+    assert [stroke.sheet for stroke in recording.strokes] == [sheets[place] for place in first]
+    assert len({stroke.sheet for stroke in recording.strokes}) == 3
+    again = read_recording(write_recording(recording, tmp_path / "cut.mcap"))
+    assert again.strokes == recording.strokes
+    assert not any("sheet is cut" in note for note in recording.notes)
+    without = import_table(path, columns=COLUMNS, units=UNITS, options=cut)
+    assert any("name one that counts fresh sheets" in note for note in without.notes)
+
+
+@pytest.mark.parametrize("wrong", [0.5, -2.0])
+def test_what_counts_no_sheet_is_refused_with_its_line(tmp_path: Path, wrong: float) -> None:
+    table = [[*row, 0.0] for row in rows()]
+    table[6][-1] = wrong
+    path = written(tmp_path / "log.csv", table, head="t,angle,torque,piece")
+    columns = {**COLUMNS, "sheet": "piece"}
+    with pytest.raises(InputError, match=rf"line 8, column 'piece': {wrong:g} counts no sheet"):
+        import_table(path, columns=columns, units=UNITS)
+    with pytest.raises(InputError, match="neither a unit nor a scale"):
+        import_table(path, columns=columns, units={**UNITS, "sheet": "mm"})

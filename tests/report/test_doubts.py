@@ -1,4 +1,4 @@
-"""What the report says against a fit: critic, replay, prior, trust check, correlations."""
+"""What the report says against a fit: critic, replay, prior, verification, correlations."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -63,7 +63,7 @@ def doubted() -> FitResult:
 
 
 def checked(fit: FitResult, ranks: tuple[int, ...]) -> VerifyResult:
-    """A trust check of one quantity with these ranks of 100."""
+    """A verification of one quantity with these ranks of 100."""
     z = tuple(np.linspace(0.05, 0.95, 19).tolist())
     band = RankBand(0.05, z, tuple(v - 0.1 for v in z), tuple(v + 0.1 for v in z))
     cover = Coverage(0.9, float(np.mean([5 <= r < 95 for r in ranks])), 0.84, 0.96)

@@ -294,7 +294,7 @@ def test_photographs_that_passed_claim_no_trust_check() -> None:
     passed = Verdict("fit.blade", "halves", "pass", 0.4, 0.01, "They agree.")
     headline = geometry_headline("blade", [passed])
     assert "verified" not in headline.sentence
-    assert "no trust check" in headline.sentence
+    assert "no verification" in headline.sentence
     alone = trust_panel([headline], [])
     assert alone.title == "Checks passed"
     assert alone.rows[0].values[0].text == "✓ checks passed"

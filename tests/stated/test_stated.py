@@ -29,7 +29,7 @@ class Cubic:
     def parameters(self):
         return {"slope_N_per_mm": (0.5, 0.02), "cubic": 0.3}
 
-    def force_N(self, indentation_m, slope_N_per_mm, cubic):  # noqa: N802
+    def force_N(self, indentation_m, slope_N_per_mm, cubic):
         depth = 1e3 * indentation_m
         return slope_N_per_mm * (depth + cubic * depth**3)
 
@@ -126,7 +126,7 @@ class Step:
     def parameters(self):
         return {"force_N": 1.0}
 
-    def force_N(self, indentation_m, force_N):  # noqa: N802
+    def force_N(self, indentation_m, force_N):
         return force_N * np.where(indentation_m < 3e-4, 1e-3 * indentation_m, 1.0 + indentation_m)
 
 

@@ -249,7 +249,7 @@ def test_a_stopped_fit_of_other_data_is_stale(copied: Workspace) -> None:
 
 
 def check_of(workspace: Workspace, what: Literal["friction", "cut"], status: Status) -> None:
-    """Keep a trust check of the fit as it is now, with coverage counted."""
+    """Keep a verification of the fit as it is now, with coverage counted."""
     engine = Engine.of(workspace)
     fit = load_fit(engine.file(f"fit {what}"))
     verdict = Verdict(f"verify.{what}", "calibration", status, 0.4, 0.5, "Ranks as they are.")

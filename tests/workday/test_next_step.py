@@ -67,9 +67,9 @@ def states(found: Mapping[str, State], photographs: bool = False) -> tuple[StepS
         (REPORTED, SIGN),
         ({**REPORTED, "report sign": "done"}, "scissorcal package build"),
         ({**REPORTED, "report sign": "done", "package build": "done"}, None),
-        # who signed an unverified fit decided so: a trust check would void that signature
+        # who signed an unverified fit decided so: a verification would void that signature
         ({**FITTED, "report": "done", "report sign": "done"}, "scissorcal package build"),
-        # a trust check in part was the user's choice
+        # a verification in part was the user's choice
         (
             {**FITTED, "verify friction": "incomplete", "verify cut": "incomplete"},
             "scissorcal report",
@@ -147,5 +147,5 @@ def test_a_package_whose_fits_are_gone_is_not_called_current(
     assert verdict.status == "not_evaluated"
     assert "'scissorcal fit friction'" in verdict.why
     check = workspace.root / "fits" / "friction.verify.json"
-    check.write_text("{}", encoding="utf-8")  # a trust check without its fit
+    check.write_text("{}", encoding="utf-8")  # a verification without its fit
     assert next_step(Engine.of(workspace)) == "scissorcal fit friction"

@@ -97,19 +97,27 @@ Did you mean "inertia"?
         rate: ArrayLike,
         acceleration: ArrayLike = 0.0,
         *,
+        contact: ArrayLike | None = None,
         probability: float = 0.9,
     ) -> "TorqueBand":
-        """Predict the drive's torque of empty motion, with the band of the posterior.
+        """Predict torque at openings (rad) and rates (rad/s), with the band of the posterior.
 
-        ``opening`` (rad), ``rate`` (rad/s) and ``acceleration`` (rad/s^2) broadcast (m and so on
-        for a linear joint). The torque is that of the fitted law: inertia, friction of long strokes
-        and offset. The band is that of the mean, without the sensor's noise and without what a new
-        recording may differ by: `scissorcal predict` has a band for new recordings. Raises
-        InputError for a cut, whose torque a package predicts.
+        Of friction: the drive's torque of empty motion, that of the fitted law: inertia times
+        ``acceleration`` (rad/s^2), friction of long strokes and offset (m and so on for a linear
+        joint). Of a cut: the material's torque, positive where it resists closing, averaged over
+        teeth, where the crack stands ``contact`` metres from the pivot (its place in the sheet less
+        the advance) and has run on until it rests. Without ``contact`` the blades cut: the crack
+        stands where it just rests. With friction the blades feel
+        ``cut.predict(opening, rate).torque - friction.predict(opening, rate).torque``, less the
+        sensor's offset; a package's torque() and band() have both.
+
+        All arguments broadcast. The band is that of the mean, without the sensor's noise and
+        without what a new recording may differ by: `scissorcal predict` has a band for new
+        recordings of empty motion. Raises InputError where an argument is not of this fit.
         """
         from scissorcal.calibration import predict_torque
 
-        return predict_torque(self._fit, (opening, rate, acceleration), probability)
+        return predict_torque(self._fit, (opening, rate, acceleration), probability, contact)
 
     @property
     def plot(self) -> "FitPlots":

@@ -101,7 +101,7 @@ def _panel(day: "DemoResult") -> "Panel":
         failed = [verdict.check for verdict in check.verdicts if verdict.status == "fail"]
         outcome = f"failed: {', '.join(failed)}" if failed else "passed"
         coverage = coverage_found(check)
-        notes.append(f"{check.what}: trust check {outcome}{coverage and f'; {coverage}'}.")
+        notes.append(f"{check.what}: verification {outcome}{coverage and f'; {coverage}'}.")
     notes += [
         f"Torque error of the package: {100 * day.torque_error:.2f} % (rms over the scene).",
         f"Rendered {day.rendering.strokes} strokes in {day.rendering.seconds:.1f} s.",

@@ -252,7 +252,7 @@ def log(
     rows = [["version", "written (UTC)", "model", "checks"]]
     for version in found:
         checks = f"failed: {', '.join(version.failed)}" if version.failed else "passed"
-        checks += ", trust check kept" if version.verified and not version.current else ""
+        checks += ", verification kept" if version.verified and not version.current else ""
         name = version.name + (" *" if version.current else "")
         rows.append([name, version.written, version.label, checks])
     text = table(rows) if found else "There is no fit yet: run 'scissorcal fit'."

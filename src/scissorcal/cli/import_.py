@@ -115,11 +115,11 @@ def import_(
     A camera file is one of OpenCV, ROS (camera_info), Kalibr (camchain), VINS, ORB-SLAM or another
     program with the same keys, and takes no option but --workspace.
 
-    For a log, channels are time, opening, advance, motor_torque, handle_force, torque_command and
-    force_command; a column is a heading, a number from 0, or a variable of a .mat file (X[2] for
-    its third column). Units may stand in the headings; for a linear joint, opening is in metres
-    and motor_torque in newtons. A scale is a number or a variable of the file, such as rad per
-    count. Grams, g, are grams of force.
+    For a log, channels are time, opening, advance, motor_torque, handle_force, torque_command,
+    force_command, and sheet of a cut, which counts fresh sheets from 0; a column is a heading, a
+    number from 0, or a variable of a .mat file (X[2] for its third column). Units may stand in the
+    headings; for a linear joint, opening is in metres and motor_torque in newtons. A scale is a
+    number or a variable of the file, such as rad per count. Grams, g, are grams of force.
 
     Several logs of one layout become a recording each. One that cannot be read is named with its
     reason, and the others are imported; the command then ends with 2.

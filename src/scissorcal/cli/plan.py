@@ -28,7 +28,7 @@ def plan(explain: Explain = False, folder: Folder = None) -> Answer:
     """Show the state of every step that the scene requires, and the next command.
 
     missing: not there. incomplete: a capture lacks what the recipe plans. stale: made from other
-    inputs than there are now. failed: a check failed. unverified: no trust check yet. done: none
+    inputs than there are now. failed: a check failed. unverified: no verification yet. done: none
     of these.
 
     \b

@@ -60,8 +60,8 @@ def report(
 ) -> Answer:
     """Write the report: one HTML file that needs no network, and its JSON twin.
 
-    A signed report is left as it is while its fits, recipe and trust checks are, unless its page is
-    missing. --anew writes it all the same, which voids the signature if report.json changed.
+    A signed report is left as it is while its fits, recipe and verifications are, unless its page
+    is missing. --anew writes it all the same, which voids the signature if report.json changed.
 
     \b
     Example:
@@ -154,10 +154,10 @@ def sign(
 ) -> Answer:
     """Sign the report that lies in the workspace: report/signature.json.
 
-    The signature covers the page, report.json and all that they rest on: recipe, fits, trust
-    checks, recordings, photographs. It is void once one of them changes, and 'plan' says which. The
-    next package carries it, and rendering warns without it. Who wrote a name is shown by a key
-    alone; 'ssh-keygen -t ed25519 -f lab-key' makes one.
+    The signature covers the page, report.json and all that they rest on: recipe, fits,
+    verifications, recordings, photographs. It is void once one of them changes, and 'plan' says
+    which. The next package carries it, and rendering warns without it. Who wrote a name is shown by
+    a key alone; 'ssh-keygen -t ed25519 -f lab-key' makes one.
 
     \b
     Example:
@@ -181,7 +181,7 @@ def sign(
     unverified = [state.name for state in engine.states() if state.state == "unverified"]
     if unverified:
         text += (
-            f"\nnote: it covers {' and '.join(unverified)} as unverified. A trust check that is "
+            f"\nnote: it covers {' and '.join(unverified)} as unverified. A verification that is "
             "made later is not covered: run 'scissorcal verify', 'scissorcal report', then sign"
         )
     return Answer(review.model_dump(), text, files=[path])

@@ -155,7 +155,7 @@ STATE = Format(
 """Indexes, designs, probes and studies that scissorcal writes for itself; kilobytes to 10 MB."""
 
 RECORDS = Format("records of a run", 500 * _MB, "Move it away; the run begins anew.", ("*",))
-"""100,000 fits of a trust check with 50 parameters of five numbers have 500 MB; most have 1 MB.
+"""100,000 fits of a verification with 50 parameters of five numbers have 500 MB; most have 1 MB.
 What is no record, such as half a line of a killed run, is put aside by its reader."""
 
 SURFACE = Format("a table of probed points", 5 * _MB, "Write x_mm, y_mm, z_mm, one point a line.")

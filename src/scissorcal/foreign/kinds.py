@@ -76,7 +76,7 @@ _OWN = {
     "specimen": "a specimen of the virtual rig",
     "track": "a track of lines",
     "trade": "a result of 'scissorcal bench trade'",
-    "verify": "a trust check of a fit",
+    "verify": "a verification of a fit",
 }
 """Names of what scissorcal writes as text, by the word that each begins with."""
 _OWN_FORMAT = re.compile(

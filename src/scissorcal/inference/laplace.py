@@ -253,9 +253,7 @@ def _inverse(precision: Array, scale: Array, least: float = LEAST_INFORMATION) -
     return np.asarray((vectors / np.maximum(values, floor)) @ vectors.T * unit)
 
 
-def _stretch(
-    information: Array, spread: Array, scale: Array, share: float
-) -> tuple[Array, Array]:
+def _stretch(information: Array, spread: Array, scale: Array, share: float) -> tuple[Array, Array]:
     """The map C of Chandler and Bate and the robust information H J^-1 H, both (p, p).
 
     The information counts a ``share`` of the terms. Directions that change faster than the noise's

@@ -232,6 +232,19 @@ def torque_at(
     return np.asarray(force * x / np.sqrt(1.0 + taper**2))
 
 
+def torque_on_blade(
+    cutting: Cutting, opening: ArrayLike, place: ArrayLike, rate: ArrayLike | None = None
+) -> Array:
+    """The torque of :func:`torque_at`; 0 where the crack stands beyond the blade's tip.
+
+    Material there is out of reach. NaN where no edge stands over ``place``.
+    """
+    theta = np.asarray(opening, dtype=np.float64)
+    view = edge_height(cutting.edge, place, theta / cutting.moving_blades)
+    beyond = view.station >= cutting.edge.length_m
+    return np.where(beyond, 0.0, torque_at(cutting, theta, place, rate))
+
+
 def within_thickness(cutting: Cutting, indentation: Array) -> NDArray[np.bool_]:
     """Whether the blades together sink in by no more than the material's thickness.
 

@@ -48,7 +48,7 @@ class ResponseLaw(Protocol):
 
     def parameters(self) -> Mapping[str, float | tuple[float, float]]: ...
 
-    def force_N(self, indentation_m: Array, **values: float) -> Array: ...  # noqa: N802
+    def force_N(self, indentation_m: Array, **values: float) -> Array: ...
 
 
 def spline_of(

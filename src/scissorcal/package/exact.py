@@ -10,13 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scissorcal.aliases import Array
 from scissorcal.calibration.cut.structure import cutting_from
 from scissorcal.calibration.result import FitResult
-from scissorcal.model import (
-    Cutting,
-    FrictionLaw,
-    edge_height,
-    friction_torque,
-)
-from scissorcal.model.cutting import contact_after_run, torque_at
+from scissorcal.model import Cutting, FrictionLaw, friction_torque
+from scissorcal.model.cutting import contact_after_run, torque_on_blade
 
 MOST_DRAWS = 200
 MOST_AT_ONCE = 500_000
@@ -44,9 +39,7 @@ class ExactModel:
 
     def torque_settled(self, opening: ArrayLike, opening_rate: ArrayLike, place: Array) -> Array:
         """The torque of `torque` where the crack stands at ``place`` (m), as `settled` gives it."""
-        view = edge_height(self.cutting.edge, place, self.blade_angle(opening))
-        beyond = view.station >= self.cutting.edge.length_m
-        felt = np.where(beyond, 0.0, torque_at(self.cutting, opening, place, opening_rate))
+        felt = torque_on_blade(self.cutting, opening, place, opening_rate)
         if self.friction is None:
             return felt
         return np.asarray(felt - friction_torque(self.friction, opening, opening_rate))

@@ -44,7 +44,7 @@ class Review(BaseModel):
     """A signature under a report, as in report/signature.json and in a package's manifest.
 
     ``content`` has the SHA-256 of every file that the reviewer read and of all that it rests on:
-    page, JSON twin, recipe, fits, trust checks, recordings, photographs. The page counts without
+    page, JSON twin, recipe, fits, verifications, recordings, photographs. The page counts without
     its signature. ``fit_hashes`` are the inputs hashes of the fits. ``digest`` covers all of this
     with name, decision, note and time: a review in which one of them was changed is refused.
     Anyone can write a review with a right digest. Who wrote it is shown only by ``key``, to those

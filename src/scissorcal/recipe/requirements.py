@@ -179,7 +179,7 @@ def capture_facts(recipe: Recipe, kind: CaptureKind) -> Mapping[str, object]:
 
 
 def command_words(what: str) -> str:
-    """What commands call a capture, a fit or a trust check of this name.
+    """What commands call a capture, a fit or a verification of this name.
 
     >>> command_words("friction-advance"), command_words("cut")
     ('friction --axis advance', 'cut')

@@ -13,7 +13,7 @@ from scissorcal.recording.header import Joint
 from scissorcal.recording.importing import ImportOptions, recording_of_table
 from scissorcal.recording.layout import MEASURED, column_name
 from scissorcal.recording.recording import Recording
-from scissorcal.recording.table import Column, Table, find_column, quantity
+from scissorcal.recording.table import SHEET, Column, Table, find_column, quantity
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,6 +26,7 @@ CHANNELS = {
     "force_N": "motor_torque",
     "handle_force_N": "handle_force",
     "advance_m": "advance",
+    SHEET: SHEET,
 }
 """Arguments of `Recording.from_arrays` that are arrays, and the channel of each."""
 OPTIONS = ("kind", "handle_radius_m", "min_travel", "allow_gaps", "notes")
@@ -41,6 +42,8 @@ def recording_from_arrays(
     given = {n: v for n, v in {**named, **more}.items() if n in CHANNELS and v is not None}
     options = {name: value for name, value in more.items() if name in OPTIONS}
     columns: dict[str, Column] = {}
+    if np.ndim(given.get(SHEET, ())) == 0:
+        given[SHEET] = np.full(np.shape(given.get("time_s", ())), given[SHEET])
     for name, values in given.items():
         channel = CHANNELS[name]
         if channel in columns:
@@ -73,7 +76,7 @@ def recording_from_pandas(
     wanted = _usual_columns(headings, Joint(joint)) if columns is None else dict(columns)
     found = {}
     for channel, heading in wanted.items():
-        check_known("channel", channel, ("time", *MEASURED))
+        check_known("channel", channel, ("time", *MEASURED, SHEET))
         place = find_column(Path("the table"), headings, heading, channel)
         values = np.asarray(table.iloc[:, place], dtype=np.float64)
         found[channel] = Column(headings[place], values)
@@ -81,7 +84,8 @@ def recording_from_pandas(
 
 
 def _usual_columns(headings: list[str], joint: Joint) -> dict[str, str]:
-    usual = {"time": "time_s"} | {name: column_name(name, joint) for name in MEASURED}
+    usual = {"time": "time_s", SHEET: SHEET}
+    usual |= {name: column_name(name, joint) for name in MEASURED}
     return {channel: name for channel, name in usual.items() if name in headings}
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from scissorcal.errors import InputError
 from scissorcal.recording.faulty_values import (
@@ -32,16 +32,22 @@ from scissorcal.recording.strokes import (
     stroke_threshold,
 )
 from scissorcal.recording.table import (
+    SHEET,
     Quantity,
     Table,
     describe,
     quantity,
+    sheets_of,
     size_note,
 )
 from scissorcal.recording.table_file import read_table, refuse_no_table
 
 SHORT_SHARE, MANY = 0.25, 20
 """More strokes than MANY, half of them shorter than this share of the range, are worth a note."""
+NO_SHEET = (
+    "No column says which sheet is cut, so the fit of the cut will not take this log: name one "
+    "that counts fresh sheets from 0 (-c sheet=COLUMN; sheet= in Python)."
+)
 
 
 @dataclass(frozen=True)
@@ -80,11 +86,12 @@ def import_table(
     """Read a table as a recording, in SI, with strokes found from the motion.
 
     ``columns`` says which column holds which channel: ``time``, ``opening``, ``advance``,
-    ``motor_torque``, ``handle_force``, ``torque_command``, ``force_command``; by heading or by
-    number from 0 (in a .mat file by variable: ``q``, ``data.q``, ``X[2]``). ``opening`` is
-    needed, and ``motor_torque`` or ``handle_force`` (with ``handle_radius_m``), unless
-    ``motion_only`` says that nothing else was measured; and ``time`` or ``rate_Hz``. Channels that
-    are not named are 0, which a note says.
+    ``motor_torque``, ``handle_force``, ``torque_command``, ``force_command``, and ``sheet``, which
+    counts fresh pieces of material from 0 (-1: none is loaded); by heading or by number from 0 (in
+    a .mat file by variable: ``q``, ``data.q``, ``X[2]``). ``opening`` is needed, and
+    ``motor_torque`` or ``handle_force`` (with ``handle_radius_m``), unless ``motion_only`` says
+    that nothing else was measured; and ``time`` or ``rate_Hz``. Channels that are not named are 0,
+    which a note says.
 
     ``units`` are those of the columns (deg, rad, mm, um, N m, mN m, N mm, kN, ms, us, ...), which
     may also stand in the headings; ``scale`` multiplies a column: a number, or single variables
@@ -135,7 +142,7 @@ def recording_of_table(
     """Make a recording of a table's columns by channel, in memory; see `import_table`."""
     joint = options.joint
     samples = empty_samples(table.length)
-    for channel in set(table.columns) - {"time"}:
+    for channel in set(table.columns) - {"time", SHEET}:
         samples[channel] = table.columns[channel].values * quantities[channel].factor
     sentences = list(table.notes)
     sentences += _opening_goes_on(samples, table, joint)
@@ -147,7 +154,9 @@ def recording_of_table(
         sentences += wrapped
         set_clock(samples, table, quantities["time"].factor, allow_gaps=options.allow_gaps)
     sentences += _note_on_jumps(samples, table, joint)
-    strokes, stroke_sentence, odd = _label(samples, joint, options.min_travel)
+    strokes, stroke_sentence, odd = _label(samples, joint, options.min_travel, sheets_of(table))
+    if options.kind == "cut" and SHEET not in table.columns:
+        sentences.append(NO_SHEET)
     sentences += [*odd, *_sizes(samples, quantities, joint)]
     particular = _particular(quantities, samples, sentences)
     return Recording(
@@ -171,7 +180,7 @@ def _check_request(
     """Check the arguments; ``converted`` are the channels with a unit or scale."""
     wanted = () if options.motion_only else ("motor_torque", "handle_force")
     min_travel = options.min_travel
-    known = ("time", *MEASURED)
+    known = ("time", *MEASURED, SHEET)
     for name in (*columns, *converted):
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
@@ -268,14 +277,14 @@ def _note_on_jumps(samples: NDArray[np.void], table: Table, joint: Joint) -> lis
 
 
 def _label(
-    samples: NDArray[np.void], joint: Joint, min_travel: float | None
+    samples: NDArray[np.void], joint: Joint, min_travel: float | None, sheet: ArrayLike
 ) -> tuple[tuple[Stroke, ...], str, list[str]]:
     """Label the strokes; give them, how they were found, and sentences on what is odd in them."""
     opening = np.asarray(samples["opening"], dtype=np.float64)
     chosen = stroke_threshold(opening, joint)
     if min_travel is not None:
         chosen = StrokeThreshold(min_travel, "as given")
-    labels = label_strokes(opening, samples["device_time_us"] * 1e-6, chosen.travel)
+    labels = label_strokes(opening, samples["device_time_us"] * 1e-6, chosen.travel, sheet=sheet)
     samples["stroke"] = labels.stroke_of_sample
     counts = Counter(stroke.kind for stroke in labels.strokes)
     unit = joint.position_unit
@@ -305,7 +314,8 @@ def _sizes(
 ) -> list[str]:
     """Sentences on channels whose numbers look as in another unit."""
     values = {
-        name: np.asarray(samples[name], dtype=np.float64) for name in {*quantities} - {"time"}
+        name: np.asarray(samples[name], dtype=np.float64)
+        for name in {*quantities} - {"time", SHEET}
     }
     notes = (size_note(name, values[name], joint) for name in sorted(values))
     return [note for note in notes if note]

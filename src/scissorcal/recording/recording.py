@@ -82,11 +82,12 @@ class Recording:
         """Make a recording of arrays (n,), with strokes found from the motion, as an import does.
 
         A rotary joint has ``opening_rad``, which grows when the blades open, and ``torque_Nm`` of
-        the motor, positive when it opens them; a linear one ``opening_m`` and ``force_N``.
-        ``more`` takes ``kind`` ("friction", "cut"), ``notes``, ``handle_force_N`` with
-        ``handle_radius_m``, ``min_travel`` (rad, or m) and ``allow_gaps``, as `ImportOptions` has
-        them. Raises InputError for arrays of other lengths, a number that is not finite, a time
-        that repeats or falls, and a name that there is not.
+        the motor, positive when it opens them; a linear one ``opening_m`` and ``force_N``. ``more``
+        takes ``kind`` ("friction", "cut"), ``notes``, ``handle_force_N`` with ``handle_radius_m``,
+        ``min_travel`` (rad, or m) and ``allow_gaps``, as `ImportOptions` has them; of a cut
+        ``advance_m`` and ``sheet``, which counts fresh pieces of material from 0 (a number, or one
+        for each sample, -1 where none is loaded). Raises InputError for arrays of other lengths, a
+        number that is not finite, a time that repeats or falls, and a name that there is not.
 
         >>> time_s = np.arange(0.0, 8.0, 0.005)
         >>> Recording.from_arrays(

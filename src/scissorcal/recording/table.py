@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from scissorcal.aliases import Array
+from scissorcal.aliases import Array, Integers
 from scissorcal.errors import InputError
 from scissorcal.recipe.units import conversion, parse_unit, split_unit
 from scissorcal.recipe.unlikely import EVERYDAY, MARGIN
@@ -181,6 +181,24 @@ class Quantity(NamedTuple):
     note: str = ""
 
 
+SHEET = "sheet"
+"""The column that counts fresh pieces of material from 0, -1 where none is loaded."""
+
+
+def sheets_of(table: Table) -> Integers | int:
+    """The sheet that each row is of, -1 without such a column; InputError for what counts none."""
+    if SHEET not in table.columns:
+        return -1
+    values = table.columns[SHEET].values
+    wrong = np.flatnonzero((values != np.rint(values)) | (values < -1.0))
+    if len(wrong):
+        raise InputError(
+            f"{table.place(wrong[0], SHEET)}: {values[wrong[0]]:g} counts no sheet: give 0 "
+            "for the first fresh piece of material, 1 for the next, -1 where none is loaded."
+        )
+    return values.astype(np.int64)
+
+
 def quantity(
     table: Table, channel: str, unit: str | None, scale: str | float | None, joint: Joint
 ) -> Quantity:
@@ -192,6 +210,10 @@ def quantity(
     no unit is known, or one of another kind than the channel.
     """
     column = table.columns[channel]
+    if channel == SHEET:
+        if unit is not None or scale is not None:
+            raise InputError("A sheet is a whole number: give neither a unit nor a scale for it.")
+        return Quantity(1.0, f"{channel} is {shortened(column.heading)!r}")
     target = "s" if channel == "time" else unit_of(channel, joint)
     factor = 1.0 if scale is None else _scale_factor(table, channel, scale)
     heading_unit = unit_in(column.heading)

@@ -81,9 +81,10 @@ class Evidence:
     """What fits are reported from besides themselves, all of it optional.
 
     ``recordings`` name strokes and their speeds, and are matched to ``FitResult.sources`` by path,
-    file name or hash; only those with samples give the work of each stroke. ``checks`` are trust
-    checks by fit ("friction", "cut"), ``geometry`` is what photographs gave, ``completeness`` what
-    was planned, recorded and used of captures (one without it is counted from recordings and fits).
+    file name or hash; only those with samples give the work of each stroke. ``checks`` are
+    verifications by fit ("friction", "cut"), ``geometry`` is what photographs gave,
+    ``completeness`` what was planned, recorded and used of captures (one without it is counted from
+    recordings and fits).
     ``choice`` says what of the fitted laws the scene needs, ``pieces`` are those of a drawn plate
     (`recipe.plate_layers.plate_pieces`). ``panels`` are further ones, such as what a package
     states. ``recipe_text`` is the recipe as it was written; without it the values are printed as

@@ -301,7 +301,7 @@ class Engine:
             return made("failed", found, below.command, notes=notes, **kept)
         check = self.state(step.verified_by) if step.verified_by else None
         if check and check.state == "failed":
-            found = f"{facts['label']}; its trust check failed: {', '.join(check.failed)}"
+            found = f"{facts['label']}; its verification failed: {', '.join(check.failed)}"
             kept["failed"] = tuple(f"{check.name} {one}" for one in check.failed)
             return made("failed", found, remedy(step, kept["failed"], "", self.state), **kept)
         if check and check.state != "done":
@@ -309,7 +309,7 @@ class Engine:
         return made("done", facts["label"], "", notes=notes, **kept)
 
     def _failed_below(self, step: Step) -> StepState | None:
-        """A fit that this fit builds on and that failed, if only by its trust check."""
+        """A fit that this fit builds on and that failed, if only by its verification."""
         if step.kind != "fit":
             return None
         fits = (self.state(_plain(item)) for item in step.inputs if self._counts(step, item))

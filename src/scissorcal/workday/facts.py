@@ -38,7 +38,7 @@ def fit(path: Path) -> Facts:
 
 
 def trust_check(path: Path) -> Facts:
-    """Facts of a trust check; its inputs are the fit that it checked.
+    """Facts of a verification; its inputs are the fit that it checked.
 
     ``lacks`` says what it must have for the fit to count as verified.
     """

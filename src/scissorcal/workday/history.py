@@ -44,7 +44,7 @@ class Version:
     ``time_utc`` is the time of the file in use; for an earlier version, that of its file when it
     was kept, which stands in its folder's name.
     ``label`` is its model and effort, ``failed`` the checks that failed; both are empty for a file
-    that cannot be read. ``verified`` says that its trust check was kept with it.
+    that cannot be read. ``verified`` says that its verification was kept with it.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Version:
 
 
 def keep(engine: Engine, name: str) -> Path | None:
-    """Have the result of a step, its trust check and its pictures in fits/history/<version>/ too.
+    """Have the result of a step, its verification and its pictures in fits/history/<version>/ too.
 
     Gives the folder, None where there was no result. A kill leaves the whole folder or none. A
     folder that is there, as after a killed restore, loses nothing.
@@ -173,7 +173,7 @@ def save_version(
     """Keep the result that is there, then write the new one. Gives its path.
 
     ``draw`` draws the pictures that stand beside it, into the folder it is given. Where writing
-    fails, or is killed, the earlier result stays in use. Pictures and trust checks are never those
+    fails, or is killed, the earlier result stays in use. Pictures and verifications are never those
     of another result; after a kill they may stand in the result's version alone.
     """
     path = engine.file(name)
@@ -187,7 +187,7 @@ def save_version(
     finally:
         shutil.rmtree(drawn, ignore_errors=True)
     if kept is not None and file_digest(path) == file_digest(kept / path.name):
-        # The same result again: its trust check stands, and no version is added.
+        # The same result again: its verification stands, and no version is added.
         for check in _checks_beside(kept / path.name):
             _put(check, path.parent / check.name)
         discard_folder(kept)
@@ -292,7 +292,7 @@ def _folder(engine: Engine) -> Path:
 
 
 def _beside(path: Path) -> tuple[Path, ...]:
-    """What stands beside a result: its trust check, the records of that, its folder of pictures."""
+    """What stands beside a result: its verification, the records of that, its pictures."""
     return (*_checks_beside(path), path.with_suffix(""))
 
 

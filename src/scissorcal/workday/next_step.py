@@ -10,7 +10,7 @@ from scissorcal.workday.steps import BY_NAME
 PHOTOGRAPHED = ("camera", "blade", "plate")
 READY = ("done", "unverified")
 AFTER_FITS = ("report", "sign", "package")
-"""Kinds of steps that show or pack what the fits say: a trust check comes before them."""
+"""Kinds of steps that show or pack what the fits say: a verification comes before them."""
 
 VERIFY = "scissorcal verify"
 
@@ -38,8 +38,8 @@ def next_command(states: Sequence[StepState], *, linear: bool = False) -> str | 
 
     Steps come in the order of the day, with these exceptions. Photographs that were begun are
     finished before anything else, as the camera stands there. A fit is verified before its report
-    is written, so that the report and its signature cover the trust check; where a trust check was
-    made without its counts, or an unverified fit was signed, nobody is sent back. Where the
+    is written, so that the report and its signature cover the verification; where a verification
+    was made without its counts, or an unverified fit was signed, nobody is sent back. Where the
     recordings are of a linear joint (``linear``), only the steps of friction apply: it carries no
     blades.
     """
@@ -78,7 +78,7 @@ def _photographs_first(
 
 
 def _is_unverified(states: Sequence[StepState], needed: Sequence[StepState]) -> bool:
-    """Whether a fit lacks its trust check: one that was made in part is the user's choice."""
+    """Whether a fit lacks its verification: one that was made in part is the user's choice."""
     unverified = {BY_NAME[s.name].verified_by for s in needed if s.state == "unverified"}
     return any(s.name in unverified and s.state != "incomplete" for s in states)
 

@@ -27,9 +27,9 @@ State = Literal[
 
 missing: there is no result. damaged: its file cannot be read; its command makes it again. stale: it
 was made from other inputs than there are now, or an input is missing, damaged or stale. incomplete:
-a capture lacks what the recipe plans, a fit ran out of time, or a trust check counted no coverage.
+a capture lacks what the recipe plans, a fit ran out of time, or a verification counted no coverage.
 failed: a check of it or of a fit below it failed, a recording cannot be read, or a person rejected
-it. unverified: no complete trust check of this very fit is there. done: none of these. excluded:
+it. unverified: no complete verification of this very fit is there. done: none of these. excluded:
 the scene does not need it.
 """
 
@@ -38,7 +38,7 @@ WAITING: frozenset[State] = frozenset({"missing", "damaged", "stale"})
 
 CHANGED = {
     "verify": "of an earlier fit",
-    "report": "it shows other fits, trust checks or settings than there are now",
+    "report": "it shows other fits, verifications or settings than there are now",
     "package": "built from other fits or settings than there are now",
 }
 """Why a result of this kind is stale, where its inputs are all there."""

@@ -27,7 +27,7 @@ class Workspace(WorkspaceSteps):
     """The file names of one workspace, and its steps as functions (`WorkspaceSteps`).
 
     captures/<kind>-<UTC stamp>.mcap, fits/friction.nc, fits/friction-advance.nc and fits/cut.nc
-    with their trust checks fits/<what>.verify.json, report/report.html and report/report.json with
+    with their verifications fits/<what>.verify.json, report/report.html and report/report.json with
     their signature report/signature.json, package/<recipe name>.zip, all below ``root``.
     """
 
@@ -125,7 +125,7 @@ class Workspace(WorkspaceSteps):
         return self.root / "fits" / f"{what}.nc"
 
     def verify_partial_path(self, what: FitKind) -> Path:
-        """Where a trust check keeps each of its fits as it is done."""
+        """Where a verification keeps each of its fits as it is done."""
         return self.root / "fits" / f"{what}.verify.partial.jsonl"
 
     def package_path(self, recipe: "Recipe") -> Path:

@@ -1,4 +1,4 @@
-"""The trust check on a real positioning system."""
+"""The verification on a real positioning system."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The trust check of a workspace: resumable, the same for any number of workers, never mixed."""
+"""The verification of a workspace: resumable, the same for any number of workers, never mixed."""
 
 import json
 import os
@@ -222,7 +222,7 @@ def test_one_run_at_a_time(cleared: Workspace) -> None:
 def test_a_damaged_result_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "friction.verify.json"
     path.write_text("{}", encoding="utf-8")
-    with pytest.raises(InputError, match=r"friction\.verify\.json is not a trust check"):
+    with pytest.raises(InputError, match=r"friction\.verify\.json is not a verification"):
         load(path, VerifyResult)
 
 

@@ -362,8 +362,9 @@ def _refuse_no_contact(data: _Data) -> None:
     """Refuse recordings without marked sheets, or with hardly any torque from the material."""
     if not any(np.any(motion.sheet >= 0) for motion in data.motions):
         raise InputError(
-            f"{data.names}: no stroke through material is marked. Capture cuts with "
-            f"'scissorcal capture cut', or mark strokes and sheets when importing. {data.counted}"
+            f"{data.names}: no stroke through material is marked. Capture cuts with 'scissorcal "
+            "capture cut', or say which sheet each sample is of when importing (-c sheet=COLUMN; "
+            f"sheet= of Recording.from_arrays). {data.counted}"
         )
     least = FELT_SDS * float(
         np.hypot(data.basis.friction.noise.white_Nm, data.basis.friction.noise.slow_Nm)

@@ -89,6 +89,44 @@ def as_spline_fit(fit: FitResult, law: ResponseLaw) -> FitResult:
     )
 
 
+def as_law_fit(fit: FitResult, law: ResponseLaw) -> FitResult:
+    """The fit of :func:`as_spline_fit` in the law's own parameters again, to simulate and refit it.
+
+    Its best point has them at their medians. Raises InputError where the fit is of another law.
+    """
+    wanted = [name for name, (_, sd) in law_parameters(law).items() if sd > 0.0]
+    names = [parameter.name for parameter in fit.derived]
+    if fit.derived_draws is None or not fit.candidate.startswith(f"{type(law).__name__} "):
+        raise InputError(
+            f"This fit is of another law ({fit.candidate}) than {type(law).__name__}: give the law "
+            "that it was fitted with."
+        )
+    at = [names.index(name) for name in wanted if name in names]
+    if len(at) < len(wanted):
+        missing = ", ".join(name for name in wanted if name not in names)
+        raise InputError(
+            f"This fit has no draws of {missing}, so {type(law).__name__} was changed since: fit "
+            "again, or give the law as it was."
+        )
+    kept = [i for i, p in enumerate(fit.parameters) if not p.name.startswith("response_")]
+    own = fit.derived_draws[:, at]
+    structure = {n: v for n, v in fit.structure.items() if n != "response_knots_m"}
+    return replace(
+        fit,
+        parameters=(*(fit.derived[i] for i in at), *(fit.parameters[i] for i in kept)),
+        draws=np.hstack([own, fit.draws[:, kept]]),
+        map_point=np.concatenate([np.median(own, axis=0), fit.map_point[kept]]),
+        prior_draws=None,
+        structure={**structure, "response": "own", "response_law": law},
+    )
+
+
+def of_own_law(fit: FitResult) -> str:
+    """The name of the law of one's own that a fit is of; empty for a family of the recipe's."""
+    name = fit.candidate.partition(" response")[0]
+    return name if fit.structure.get("response") == "spline" and name != "spline" else ""
+
+
 def _narrowed(draws: Array, prior: Array | None, index: int) -> float:
     """The posterior's width over the prior's; 1 where either does not vary."""
     width = 0.0 if prior is None else float(np.std(prior[:, index]))

@@ -224,13 +224,9 @@ class CutLaw:
         """The law of a fit's structure."""
         response = str(structure["response"])
         knots = structure.get("response_knots_m", ()) if response == "spline" else ()
-        return cls(
-            response,
-            str(structure["fracture"]),
-            bool(structure.get("rate_damping", False)),
-            bool(structure.get("load_share", False)),
-            tuple(knots),
-        )
+        damped, loaded = (bool(structure.get(n, False)) for n in ("rate_damping", "load_share"))
+        own = structure.get("response_law")
+        return cls(response, str(structure["fracture"]), damped, loaded, tuple(knots), own)
 
     @property
     def key(self) -> dict[str, Any]:

@@ -1,1 +1,1 @@
-"""The trust check: coverage of the intervals, agreement of two halves, prior sensitivity."""
+"""The verification: coverage of the intervals, agreement of two halves, prior sensitivity."""

@@ -1,4 +1,4 @@
-"""The trust check as a whole: the fits that it needs, their summary and assessment."""
+"""The verification as a whole: the fits that it needs, their summary and assessment."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

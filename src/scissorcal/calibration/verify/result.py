@@ -1,4 +1,4 @@
-"""What the trust check results in: calibration, halves, prior sensitivity, verdicts."""
+"""What the verification results in: calibration, halves, prior sensitivity, verdicts."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -153,7 +153,7 @@ class Sensitivity:
 
 @dataclass(frozen=True, repr=False)
 class VerifyResult(Result):
-    """The trust check of one fit, as stored in fits/<what>.verify.json.
+    """The verification of one fit, as stored in fits/<what>.verify.json.
 
     ``fit_hash`` is the inputs hash of the fit that was checked, ``fit_content`` the SHA-256 of its
     file. Checks that were not requested are None; ``not_done`` gives the reason for each requested
@@ -161,7 +161,7 @@ class VerifyResult(Result):
     fails although the fit is right.
     """
 
-    title = "trust check"
+    title = "verification"
     command = "scissorcal verify"
 
     format: Literal["scissorcal-verify/1"]

@@ -10,6 +10,7 @@ from scissorcal.aliases import Array
 from scissorcal.calibration.comparison import names_of_contenders
 from scissorcal.calibration.cut.fit import fit_cut
 from scissorcal.calibration.cut.known import KnownFriction
+from scissorcal.calibration.cut.own_law import as_law_fit
 from scissorcal.calibration.cut.path_work import torque_noise_of
 from scissorcal.calibration.fit_model import CutRun, FrictionRun
 from scissorcal.calibration.friction.fit import fit_friction
@@ -149,7 +150,8 @@ class CutSimulator:
 
         A power law's segments are begun at the mean of the truths, not at a first guess.
         """
-        return fit_cut(
+        law = self.structure.get("response_law")
+        fit = fit_cut(
             data,
             self.recipe,
             self.friction,
@@ -159,8 +161,10 @@ class CutSimulator:
                 edge=self.edge,
                 last_chosen=self.candidate,
                 prior=replace(prior, laws=self.contenders),
+                own_law=law,
             ),
         )
+        return fit if law is None else as_law_fit(fit, law)
 
 
 def friction_simulator(

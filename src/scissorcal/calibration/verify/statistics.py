@@ -1,4 +1,4 @@
-"""Statistics of the trust check: ranks, sensitivity to the prior, difference of two halves."""
+"""Statistics of the verification: ranks, sensitivity to the prior, difference of two halves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

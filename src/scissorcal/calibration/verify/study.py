@@ -1,4 +1,4 @@
-"""The fits of a trust check: truths drawn from a prior, simulated and fitted again."""
+"""The fits of a verification: truths drawn from a prior, simulated and fitted again."""
 
 import json
 import time
@@ -33,7 +33,7 @@ _KINDS: tuple[Kind, ...] = ("simulated", "half", "whole")
 
 @dataclass(frozen=True)
 class Task:
-    """One fit of a trust check: to simulated data, to a half of the data, or to all of them."""
+    """One fit of a verification: to simulated data, to a half of the data, or to all of them."""
 
     kind: Kind
     index: int
@@ -41,7 +41,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Study:
-    """The input of every fit of a trust check.
+    """The input of every fit of a verification.
 
     ``generating`` gives truths, ``simulator`` raw data of them and their whole fit; ``start`` (p,)
     is the fit's posterior mean, ``draws`` the number of draws of the posteriors of halves and

@@ -1,4 +1,4 @@
-"""Verdicts of the trust check."""
+"""Verdicts of the verification."""
 
 from collections.abc import Sequence
 

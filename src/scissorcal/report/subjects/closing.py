@@ -88,7 +88,7 @@ class GeometryOrigin:
 
 @dataclass(frozen=True)
 class TrustCheckOrigin:
-    """A trust check that the report shows: of which fit, and the SHA-256 of its content."""
+    """A verification that the report shows: of which fit, and the SHA-256 of its content."""
 
     fit: str
     fit_hash: str
@@ -157,7 +157,7 @@ def posterior_sha256(fit: FitResult) -> str:
 
 
 def trust_check_sha256(check: VerifyResult) -> str:
-    """SHA-256 of a trust check's content, as JSON with sorted keys."""
+    """SHA-256 of a verification's content, as JSON with sorted keys."""
     return bytes_digest(json.dumps(asdict(check), sort_keys=True).encode())
 
 

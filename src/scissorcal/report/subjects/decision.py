@@ -1,4 +1,4 @@
-"""The decision page: simulated or real, trust, data, trust check, felt error, weaknesses."""
+"""The decision page: simulated or real, trust, data, verification, felt error, weaknesses."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ OUTCOMES: dict[Assessment, str] = {
     "reject": "Do not use",
 }
 PHOTOGRAPHS_PASSED = "✓ checks passed"
-"""Of a fit of photographs, for which there is no trust check that could be missing."""
+"""Of a fit of photographs, for which there is no verification that could be missing."""
 
 
 def origin_of(recordings: Sequence[Recording]) -> Origin:
@@ -219,7 +219,7 @@ def _lack(head: str, cell: Cell) -> str:
 
 
 def checked_panel(fits: Sequence[FitResult], checks: Mapping[str, VerifyResult]) -> Panel:
-    """Whether the trust check was made, with the coverage that it found."""
+    """Whether the verification was made, with the coverage that it found."""
     rows = []
     for fit in fits:
         check = checks.get(fit.what)
@@ -229,11 +229,11 @@ def checked_panel(fits: Sequence[FitResult], checks: Mapping[str, VerifyResult])
             outcome = _outcome(check)
             said = "; ".join(part for part in (outcome, coverage_found(check)) if part)
         rows.append(Row(fit.what, (words("trust check", said),), marked=check is None))
-    return Panel(f"{PART}-checked", PART, "Trust check", rows=tuple(rows))
+    return Panel(f"{PART}-checked", PART, "Verification", rows=tuple(rows))
 
 
 def _outcome(check: VerifyResult) -> str:
-    """What a trust check ended in."""
+    """What a verification ended in."""
     for status, word in (("fail", "failed"), ("not_evaluated", "not evaluated")):
         named = [verdict.check for verdict in check.verdicts if verdict.status == status]
         if named:

@@ -56,8 +56,8 @@ def layers_panel(recipe: Recipe, pieces: tuple[LayerPiece, ...]) -> Panel:
         tuple(_piece_row(index, piece) for index, piece in enumerate(pieces, 1)),
         (_pieces_chart(pieces),),
         notes=(
-            "Fits, trust checks, torque and band of this report are those of the uniform sheet; "
-            "no trust check covers the plate.",
+            "Fits, verifications, torque and band of this report are those of the uniform sheet; "
+            "no verification covers the plate.",
         ),
         caption="A piece is a stretch of one layer without a gap; x = 0 is where the cut begins.",
     )

@@ -1,4 +1,4 @@
-"""Whether to trust a fit: its headline, and the trust check of its intervals."""
+"""Whether to trust a fit: its headline, and the verification of its intervals."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ METHOD = "simulation-based calibration, Talts et al. 2018, doi 10.48550/arXiv.18
 
 
 def trust_panels(fit: FitResult, check: VerifyResult | None, part: str) -> tuple[Panel, ...]:
-    """The trust check of a fit in the report; how to make it where it was not made."""
+    """The verification of a fit in the report; how to make it where it was not made."""
     if check is None:
         why = (
             f"It has not been made for this fit: run `scissorcal verify {fit.words}`. It simulates "
             f"recordings, refits them and counts the coverage of the intervals ({METHOD})."
         )
-        return (absent(f"{part}-verify", part, "Trust check", why),)
+        return (absent(f"{part}-verify", part, "Verification", why),)
     return check_panels(check, part)
 
 
@@ -64,7 +64,7 @@ def check_panels(check: VerifyResult, part: str) -> tuple[Panel, ...]:
         panels.append(_sensitivity(check.sensitivity, part, id_))
     if check.not_done:
         why = " ".join(check.not_done)
-        panels.append(absent(f"{id_}-open", part, "Trust check: not done", why))
+        panels.append(absent(f"{id_}-open", part, "Verification: not done", why))
     return tuple(panels)
 
 
@@ -120,7 +120,7 @@ def _calibration(calibration: Calibration, part: str, id_: str) -> Panel:
         f"{METHOD[0].upper()}{METHOD[1:]}: share of intervals that held the truth; in brackets the "
         "range that correct intervals keep to."
     )
-    title = "Trust check: intervals on simulated data"
+    title = "Verification: intervals on simulated data"
     charts = (_ranks(calibration, f"{id_}-ranks"),)
     return Panel(id_, part, title, sentence, tuple(rows), charts, notes=(note,), caption=caption)
 
@@ -169,7 +169,7 @@ def _halves(halves: Halves, part: str, id_: str) -> Panel:
         f"{significant(halves.p_value, 2)}."
     )
     note = f"Two fits to strokes that they do not share ({halves.split})."
-    title = "Trust check: two halves of the data"
+    title = "Verification: two halves of the data"
     caption = "The difference against the uncertainty that each half claims."
     return Panel(f"{id_}-halves", part, title, sentence, rows, notes=(note,), caption=caption)
 
@@ -197,7 +197,7 @@ def _sensitivity(sensitivity: Sensitivity, part: str, id_: str) -> Panel:
         "How far the posterior moves when prior or data count slightly more (power scaling); above "
         f"{short(sensitivity.threshold)} it matters."
     )
-    title = "Trust check: prior sensitivity"
+    title = "Verification: prior sensitivity"
     return Panel(f"{id_}-sensitivity", part, title, sentence, rows, caption=caption)
 
 
@@ -225,10 +225,10 @@ class Headline:
 
 
 def write_headline(fit: FitResult, checked: Sequence[Verdict] = ()) -> Headline:
-    """Weigh a fit's verdicts, effort and identifiability; ``checked`` are of its trust check.
+    """Weigh a fit's verdicts, effort and identifiability; ``checked`` are of its verification.
 
     Any failed verdict rejects. Missing verdicts, checks that were not evaluated, draft effort, or
-    a parameter that repeats its prior ask for care. Without a trust check a fit that passed its
+    a parameter that repeats its prior ask for care. Without a verification a fit that passed its
     own checks is not verified, nor with one that counted no coverage.
     """
     verdicts = (*fit.verdicts, *checked)
@@ -252,7 +252,7 @@ def write_headline(fit: FitResult, checked: Sequence[Verdict] = ()) -> Headline:
             f"truth was not tested.{error}"
         )
         step = f"Run `scissorcal verify {fit.words}`, then `scissorcal report`."
-        brief = f"{passed}; {'coverage not counted' if checked else 'trust check not done'}"
+        brief = f"{passed}; {'coverage not counted' if checked else 'verification not done'}"
         return Headline(fit.what, "unverified", sentence, brief, (step,))
     sentence = f"The {fit.what} fit can be trusted: it {passed}.{error}"
     step = "Read on, and sign with `scissorcal report sign`."
@@ -279,7 +279,7 @@ def geometry_headline(kind: GeometryKind, verdicts: Sequence[Verdict]) -> Headli
     passed = f"passed all {len(verdicts)} checks" if len(verdicts) > 1 else "passed its one check"
     sentence = (
         f"The {kind} fit {passed}. Whether its intervals hold the truth is not among them: fits of "
-        "photographs have no trust check."
+        "photographs have no verification."
     )
     step = "Look at its pictures: is what was drawn what you see?"
     return Headline(kind, "unverified", sentence, passed, (step,))

@@ -90,7 +90,7 @@ def wanted_knobs(case: Case, wanted: Sequence[str], *, on_cluster: bool = False)
 
 
 def coverage_notes(engine: Engine) -> list[str]:
-    """What trust checks of this workspace found of the intervals' coverage, where there are any."""
+    """What verifications of this workspace found of the intervals' coverage, if there are any."""
     found = []
     for name in ("verify friction", "verify cut"):
         if engine.needed(name) and engine.state(name).state in ("done", "failed"):
@@ -98,7 +98,7 @@ def coverage_notes(engine: Engine) -> list[str]:
             if check.calibration:
                 shares = [quantity.coverage[1].share for quantity in check.calibration.quantities]
                 found.append(
-                    f"The trust check of {check.what} ({check.effort} effort, "
+                    f"The verification of {check.what} ({check.effort} effort, "
                     f"{check.calibration.fits} simulated fits) found the truth in {min(shares):.0%}"
                     f" to {max(shares):.0%} of its 90 % intervals, by quantity."
                 )

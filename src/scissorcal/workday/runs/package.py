@@ -158,7 +158,7 @@ def current_verdict(engine: Engine) -> Verdict:
 def _fits(engine: Engine) -> dict[str, Any]:
     """The fits that the package is compiled from; None where the scene does not need one.
 
-    What their trust checks failed is among their verdicts, so that the package lists it.
+    What their verifications failed is among their verdicts, so that the package lists it.
     """
     found: dict[str, Any] = {}
     for item in BY_NAME["package build"].inputs:

@@ -235,7 +235,7 @@ def unsettled_states(engine: Engine) -> tuple[tuple[State, str], ...]:
         fit = engine.state(name)
         if fit.state == "unverified":
             sentence = (
-                f"The {name.replace('fit', 'fit of')} is unverified: no trust check says whether "
+                f"The {name.replace('fit', 'fit of')} is unverified: no verification says whether "
                 f"its intervals hold ('{fit.command}')."
             )
             unsettled.append((fit.state, sentence))

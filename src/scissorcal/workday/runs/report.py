@@ -139,7 +139,7 @@ def _choice(engine: Engine) -> SceneChoice | None:
 
 
 def _trust_checks(engine: Engine, fits: dict[str, FitResult]) -> dict[str, VerifyResult]:
-    """The trust checks of these very fits."""
+    """The verifications of these very fits."""
     current = [w for w in fits if engine.state(f"verify {w}").state in ("done", "failed")]
     return {what: load(engine.file(f"verify {what}"), VerifyResult) for what in current}
 

@@ -1,4 +1,4 @@
-"""The trust check of a workspace's fits: in parallel, resumable, kept beside the fit."""
+"""The verification of a workspace's fits: in parallel, resumable, kept beside the fit."""
 
 import pickle
 import time
@@ -9,18 +9,14 @@ from typing import Any
 
 from scissorcal.aliases import Progress
 from scissorcal.calibration import FitResult
-from scissorcal.calibration.cut.fit import cut_experiment
-from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.friction.advance import actuation_of, sliding_joints
-from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.calibration.store import load, save
-from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
+from scissorcal.calibration.verify.check import StudySettings, assess, tasks_of
+from scissorcal.calibration.verify.of_fit import Known, known_cut, known_friction
 from scissorcal.calibration.verify.result import VerifyResult
-from scissorcal.calibration.verify.simulator import Simulator, cut_simulator, friction_simulator
 from scissorcal.calibration.verify.study import Study, Task, run
 from scissorcal.errors import InputError, MissingError
 from scissorcal.identity import digest
-from scissorcal.recording import Recording
 from scissorcal.workday.engine import Engine
 from scissorcal.workday.options import Processes, VerifySettings
 from scissorcal.workday.pool import Pool, open_pool, unpacked
@@ -69,24 +65,15 @@ def verify_workspace(
         for index, kind in enumerate(kinds):
             tell = share_of(progress, index, len(kinds))
             tell(0.0, f"{kind}: making ready")
-            fit = load_result(engine, kind)
-            experiment, simulator, sheets = _experiment(engine, kind, fit)
-            study = make_study(
-                experiment,
-                fit,
-                simulator,
-                settings=StudySettings(
-                    seed=settings.seed, prior=settings.prior, spread=settings.spread
-                ),
-                sheets=sheets,
-            )
+            known = _known(engine, kind)
+            study = known.study(StudySettings(settings.seed, settings.prior, settings.spread))
             tasks = tasks_of(study, settings.checks, settings.fits)
             partial = workspace.verify_partial_path(kind)
             with RecordFile(partial, _inputs_hash(engine, kind, settings)) as file:
                 fitted = _run(pool, study, tasks, file, kind, tell)
                 wanted_tasks = {(task.kind, task.index) for task in tasks}
                 records = [r for r in file.records if (r["kind"], r["index"]) in wanted_tasks]
-                result = assess(study, fit, settings.checks, records)
+                result = assess(study, known.fit, settings.checks, records)
                 result = replace(result, fit_content=engine.identity(f"verify {kind}"))
                 path = engine.file(f"verify {kind}")
                 if not _holds(path, result):
@@ -116,40 +103,20 @@ def _kinds(engine: Engine, wanted: Sequence[FitKind]) -> list[FitKind]:
     return [kind for kind in kinds if kind in there]
 
 
-def _experiment(
-    engine: Engine, kind: FitKind, fit: FitResult
-) -> tuple[Experiment, Simulator, dict[int, int]]:
-    """The design of a fit, its simulator, and the sheet that each of its strokes went through."""
+def _known(engine: Engine, kind: FitKind) -> Known:
+    """A current fit with its design, its simulator, and the sheets of its strokes."""
+    fit: FitResult = load_result(engine, kind)
     recipe = engine.recipe
     recordings = used_recordings(engine.workspace, recipe, kind, engine.index)
     if kind == "friction":
-        settings = recipe.fit.friction
-        empty = friction_experiment(recordings, settings, fit)
-        return empty, friction_simulator(recordings, settings, fit, empty.layout), {}
+        return known_friction(recordings, recipe.fit.friction, fit)
     if kind == "friction-advance":
         own = recipe.fit.advance
         slid = sliding_joints(recordings, actuation_of(fit), own.lack_of_fit)
-        empty = friction_experiment(slid, own, fit)
-        return empty, friction_simulator(slid, own, fit, empty.layout), {}
+        return known_friction(slid, own, fit)
     edge, _ = edge_of_photographs(engine)
     friction: FitResult = load_result(engine, "friction")
-    design = cut_experiment(recordings, recipe, friction, fit, edge)
-    simulator = cut_simulator(recordings, recipe, friction, fit, design.layout, edge)
-    return design, simulator, _sheets(recordings)
-
-
-def _sheets(recordings: Sequence[Recording]) -> dict[int, int]:
-    """Number the sheets of all recordings, by the stroke labels that a fit gives."""
-    found: dict[int, int] = {}
-    numbers: dict[tuple[int, int], int] = {}
-    offset = 0
-    for index, recording in enumerate(recordings):
-        for stroke in recording.strokes:
-            if stroke.sheet >= 0:
-                sheet = numbers.setdefault((index, stroke.sheet), len(numbers))
-                found[offset + stroke.index] = sheet
-        offset += len(recording.strokes)
-    return found
+    return known_cut(recordings, recipe, friction, fit, edge)
 
 
 def _run(
