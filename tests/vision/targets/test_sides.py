@@ -1,5 +1,7 @@
 """Corners of markers that a lens distorts: without what it bends of their sides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,6 +81,10 @@ def test_corners_in_any_order_and_of_markers_seen_in_part() -> None:
     fewer = np.arange(len(both.pixels)) != 5
     unbent[4:8] = both.pixels[4:8]
     assert np.allclose(both.where(fewer).unbent(camera).pixels, unbent[fewer], rtol=0, atol=1e-9)
+    lost = both.pixels.copy()
+    lost[5] = np.nan
+    marked = replace(both, pixels=lost).unbent(camera).pixels
+    assert np.allclose(marked[fewer], unbent[fewer], rtol=0, atol=1e-9)
     single = both.where(np.arange(len(both.pixels)) % 4 == 0)
     assert np.array_equal(single.unbent(camera).pixels, single.pixels)
 

@@ -93,6 +93,7 @@ class Corners:
         if not self.by_sides:
             return self
         order = np.lexsort((self.corner, self.frame))
+        order = order[np.isfinite(self.pixels[order]).all(axis=1)]
         marker = np.stack([self.frame, self.corner // 4])[:, order]
         _, place, count = np.unique(marker, axis=1, return_inverse=True, return_counts=True)
         whole = order[count[place.ravel()] == 4]
