@@ -100,13 +100,19 @@ def test_fits_of_files_are_those_of_the_command(here: Workspace) -> None:
 def test_a_cut_is_predicted_as_its_fit_expects_it(here: Workspace) -> None:
     """Over its own segments, within 1 % of the largest torque; the fit has a delay and an offset.
 
-    Segments of a running crack have the contact at which the indentation is the reference's.
+    Segments of a running crack have the contact at which it settles by the fit's best point.
     """
     cut, edge = here.fits["cut"], Straight()
     series = cut.series
-    depth = edge.top - edge.height_of(series.opening, series.contact)
-    runs = np.isclose(depth, cut.structure["reference_indentation_m"], rtol=1e-6)
+    best = {p.name: value for p, value in zip(cut.parameters, cut.map_point, strict=True)}
+    power = best["response_exponent"]
+    assert "kappa" not in best, "its crack runs at one energy"
+    force = best["fracture_energy"] / (2.0 * edge.slope(series.opening))
+    depth = edge.reference * (force / best["response_force"]) ** (1.0 / power)
+    settled = edge.contact_of(series.opening, edge.top - depth)
+    runs = np.isclose(series.contact, settled, rtol=0.0, atol=1e-9)
     assert 0.5 < runs.mean() < 0.95
+    assert np.ptp(depth[runs]) > 2e-5, "not the reference indentation everywhere"
     rests = {"contact": series.contact[~runs]}
     for places, where in ((runs, {}), (~runs, rests)):
         band = cut.predict(series.opening[places], series.opening_rate[places], **where)

@@ -274,7 +274,7 @@ STEPS: tuple[Step, ...] = (
         _fit("cut"),
         inputs=("capture cut", "fit friction", "fit blade"),
         settings=_cut_settings,
-        version=19,
+        version=20,
         by_effort=True,
         file=_in_fits("cut.nc"),
         read=facts.fit,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scissorcal.aliases import Array, Integers
 from scissorcal.calibration.cut.likelihood import CutLikelihood, Evaluation
 from scissorcal.calibration.cut.path_work import mean_advance
-from scissorcal.calibration.cut.structure import NUISANCE, CutLaw, response_from
+from scissorcal.calibration.cut.structure import NUISANCE, CutLaw, cutting_from, response_from
 from scissorcal.calibration.fit_candidate import (
     SEARCH_REACH,
     Candidate,
@@ -20,6 +20,7 @@ from scissorcal.calibration.fit_candidate import (
 )
 from scissorcal.calibration.parameters import Layout
 from scissorcal.calibration.signals.filtering import Bins
+from scissorcal.model import settled_contact
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,11 @@ class CutExperiment:
         )
 
     def contact(self, u: Array) -> Array:
-        """Distance (m) of the crack from the pivot over each segment (n,)."""
+        """Distance (m) of the contact from the pivot over each segment (n,).
+
+        Where a crack runs the contact is where it settles, or at the reference indentation where
+        no place is: the edges are parallel there.
+        """
         segments, geometry = self.likelihood.segments, self.likelihood.geometry
         places = self.evaluate(u).places
         advance = self.bins.advance
@@ -179,7 +184,11 @@ class CutExperiment:
             [np.full(len(piece.torque), places[piece.rest]) for piece in segments.pieces]
             or [np.zeros(0)]
         )
-        running = geometry.place(self.bins.opening[len(elastic) :], geometry.reference_m)
+        opening = self.bins.opening[len(elastic) :]
+        running = geometry.place(opening, geometry.reference_m)
+        if len(opening):
+            settled = settled_contact(cutting_from(self.key, self.layout.natural(u)), opening)
+            running = np.where(np.isfinite(settled), settled, running)
         return np.concatenate([elastic - advance[: len(elastic)], running])
 
 
