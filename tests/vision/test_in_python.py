@@ -10,10 +10,11 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from scissorcal.calibration import fit_blade, fit_camera, fit_plate
 from scissorcal.errors import InputError, MissingError, UnknownNameError, VerdictError
+from scissorcal.recipe import PlatePriors
 from scissorcal.vision.blade.photo import BladeLayout, measure_edge
 from scissorcal.vision.geometry.board_pose import UndeterminedPoseError, locate_board
 from scissorcal.vision.geometry.camera import Camera
@@ -49,6 +50,8 @@ Picture = NDArray[np.uint8]
 PAGE = Path(__file__).parents[2] / "docs" / "vision.md"
 LENS = Lens(900.0, (503.2, 371.9), 1000, 750, (-0.08, 0.03, 4e-4, -3e-4, 0.0))
 CAMERA = Camera(900.0, 900.0, *LENS.centre_px, LENS.distortion, 1000, 750)
+STRONG = (-0.2, 0.05, 8e-4, -5e-4, 0.0)
+"""A distortion with which the sides of a marker bend by more than corners err."""
 LOOKS = Looks(exposure=0.85, softness_px=0.6, noise=0.008)
 SHAPE = BladeShape(back_slope=-float(np.tan(0.035)))
 """Its centreline is its x axis, so that ``edge_at`` is e(s) in the frame of a measurement."""
@@ -144,33 +147,58 @@ def test_an_edge_in_grey_and_without_a_camera(edge_picture: Picture) -> None:
 
 
 @pytest.mark.parametrize(
-    ("board", "bend"),
-    [(PLATE_BOARD, LENS.distortion), (PLATE_STRIP, (0.0,) * 5)],
-    ids=["plate board", "plate strip, no distortion"],
+    ("board", "bend", "print_sd_percent", "seed"),
+    [
+        (PLATE_BOARD, LENS.distortion, 0.1, 2029),
+        (PLATE_STRIP, (0.0,) * 5, 0.1, 2029),
+        (PLATE_STRIP, LENS.distortion, 0.0, 213_001),
+        (PLATE_STRIP, STRONG, 0.1, 213_002),
+    ],
+    ids=[
+        "plate board",
+        "plate strip, no distortion",
+        "plate strip, exact print",
+        "plate strip, strong distortion",
+    ],
 )
 def test_poses_are_within_their_own_intervals(
-    board: MarkedBoard, bend: tuple[float, float, float, float, float]
+    board: MarkedBoard,
+    bend: tuple[float, float, float, float, float],
+    print_sd_percent: float,
+    seed: int,
 ) -> None:
-    """Sixteen views, six numbers each, printed off by 0.1 % as the priors have it.
-
-    Distortion bends the sides of markers, which detection takes for straight: the page has by how
-    much the strip's errors exceed their covariance then.
-    """
+    """Sixteen views, six numbers each, printed off by the error that the priors have."""
     lens, camera = replace(LENS, distortion=bend), replace(CAMERA, distortion=bend)
-    rng = np.random.default_rng(2029)
+    priors = PlatePriors(print_scale_sd_percent=print_sd_percent)
+    rng = np.random.default_rng(seed)
     square = 0.0
-    for seed in range(16):
+    for view in range(16):
         tilt, azimuth = rng.uniform(0.2, 0.9), rng.uniform(0.0, 6.28)
-        across, down = 1.0 + 1e-3 * rng.standard_normal(2)
+        across, down = 1.0 + 0.01 * print_sd_percent * rng.standard_normal(2)
         middle = (0.5 * board.width_m, 0.5 * board.height_m)
         truth = SimPose.looking_at(middle, 1.4 * board.width_m, tilt=tilt, azimuth=azimuth)
         layers = target_layers(board, truth, print_scale=(across, down))
-        picture = render(layers, lens, LOOKS, np.random.default_rng([2029, seed]))
-        pose = locate_board(find_board(picture, board.name), camera).pose
+        picture = render(layers, lens, LOOKS, np.random.default_rng([seed, view]))
+        pose = locate_board(find_board(picture, board.name), camera, priors).pose
         off = difference(pose, Pose.from_matrix(truth.rotation, truth.shift_m))
         assert pose.covariance is not None
         square += float(off @ np.linalg.solve(pose.covariance, off))
     assert square < chi2.isf(CHANCE, 16 * 6)
+
+
+def test_a_camera_fitted_to_markers_knows_its_focal_length() -> None:
+    lens = replace(LENS, distortion=STRONG)
+    seen = []
+    for view in range(10):
+        azimuth = 0.2 * np.pi * view
+        aside = (0.126 + 0.04 * np.cos(3.0 * azimuth), 0.09 + 0.03 * np.sin(azimuth))
+        pose = SimPose.looking_at(aside, 0.3 + 0.02 * (view % 3), tilt=0.45, azimuth=azimuth)
+        rng = np.random.default_rng([213_004, view])
+        seen.append(find_board(render(target_layers(BLADE_MAT, pose), lens, LOOKS, rng), BLADE_MAT))
+    camera = fit_camera(seen, rng=np.random.default_rng(0)).camera
+    assert camera.covariance is not None
+    sd_px = np.sqrt(camera.covariance[0, 0])
+    assert abs(camera.fx - 900.0) < norm.isf(0.5 * CHANCE) * sd_px
 
 
 def test_a_plate_in_the_rigs_frame_is_within_its_own_intervals() -> None:

@@ -22,7 +22,7 @@ from scissorcal.vision.blade.view import CameraView
 from scissorcal.vision.photo import Photo
 from scissorcal.vision.sim import Nick, SimPose, blade_layer, render, target_layers
 from scissorcal.vision.targets.boards import BLADE_MAT, CAMERA_BOARD, MAT_PIVOT_M
-from scissorcal.vision.targets.detect import linear_light
+from scissorcal.vision.targets.sides import linear_light
 from tests.vision.blade.scenes import (
     CAMERA,
     LENS,

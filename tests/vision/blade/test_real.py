@@ -16,7 +16,7 @@ from scissorcal.vision.blade.silhouette import silhouette
 from scissorcal.vision.blade.view import PlainView
 from scissorcal.vision.photo import read_photo
 from scissorcal.vision.sim.optics import Looks, coverage, develop
-from scissorcal.vision.targets.detect import linear_light
+from scissorcal.vision.targets.sides import linear_light
 
 DATA = Path(__file__).parents[4] / "shared" / "data"
 PHOTOS = DATA / "scissors_photos"

@@ -1,7 +1,7 @@
 """Fit the camera to its photographs: candidate models compared, or constants imported."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ from scissorcal.identity import file_digest
 from scissorcal.recipe.priors import CameraPriors
 from scissorcal.verdicts import Check
 from scissorcal.vision.camera_files import CameraFile
-from scissorcal.vision.geometry.board_pose import check_detections
+from scissorcal.vision.geometry.board_pose import Corners, check_detections
 from scissorcal.vision.geometry.camera import PARAMETERS, Camera, usual_camera
 from scissorcal.vision.targets.detect import Detection
 
@@ -76,6 +76,10 @@ def fit_camera(
     tell(0.0, "camera: first fit")
     first = fit_bundle(views, CANDIDATES[0][1], np.append(start, [0.0, 0.0]))
     refuse_undetermined(first, width, height)
+    if any(detection.board.kind == "markers" for detection in seen):
+        lens = Camera.of(fit_bundle(views, _BENDING, first.shared).camera, width, height)
+        unbent = [replace(photo, pixels=Corners.of(photo).unbent(lens).pixels) for photo in seen]
+        views = [seen_board(detection, priors) for detection in unbent]
     compared = compare_cameras(views, first.shared, tell)
     ((chosen, bundle, _),) = (candidate for candidate in compared if candidate[0].chosen)
     refuse_undetermined(bundle, width, height)
@@ -201,6 +205,9 @@ CANDIDATES: tuple[tuple[str, Array], ...] = (
     ("k1, k2, p1, p2, k3, oblong pixels", _free(*((name,) for name in PARAMETERS))),
 )
 """Pixels are square (fx = fy) in all but the last two. The board may bulge in every candidate."""
+
+_BENDING = CANDIDATES[3][1]
+"""The distortion that says what a lens bends of the sides of markers, before one is chosen."""
 
 
 def compare_cameras(

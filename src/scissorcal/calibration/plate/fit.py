@@ -65,7 +65,7 @@ def fit_plate(
             "There is no photograph of the plate's target: print it ('scissorcal target'), stick "
             "it to the plate, and take some with 'scissorcal capture plate --image plate-*.jpg'."
         )
-    corners = Corners.of(*seen)
+    corners = Corners.of(*seen).unbent(camera)
     alone = [locate_board(detection, camera, priors) for detection in seen]
     whole = locate_board(corners, camera, priors)
     halves = _halves(corners, camera, priors)

@@ -18,7 +18,7 @@ from scissorcal.vision.blade.view import PlainView, View, see_mat
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.overlay import Canvas
 from scissorcal.vision.photo import Photo, Picture, as_photo
-from scissorcal.vision.targets.detect import linear_light
+from scissorcal.vision.targets.sides import linear_light
 
 LARGEST = 1600
 """Pixels along the longer side of a picture."""

@@ -206,7 +206,7 @@ class _HomographyView(View):
 
 
 def _camera_view(detection: Detection, camera: Camera, printed: Array) -> CameraView:
-    corners = Corners.of(detection)
+    corners = Corners.of(detection).unbent(camera)
     try:
         board = locate_board(corners, camera)
     except UndeterminedPoseError as error:

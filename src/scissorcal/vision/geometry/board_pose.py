@@ -14,6 +14,7 @@ from scissorcal.recipe.priors import PlatePriors
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.pose import Pose, left_jacobian
 from scissorcal.vision.targets.detect import Detection
+from scissorcal.vision.targets.sides import unbent_corners
 
 LEAST_SD_PX = 0.02
 """Least standard deviation of a corner."""
@@ -40,7 +41,8 @@ class Corners:
     ``corner`` (n,) say in which picture, and which corner of the target it is: a corner's
     errors by print and light repeat from picture to picture. ``target`` and ``sources`` name the
     target and the pictures in messages; ``size_px`` is the pictures' width and height, None where
-    it is unknown.
+    it is unknown. ``by_sides`` says that corners 4 k to 4 k + 3 are those of a marker, where
+    straight lines along its sides cross: a lens bends these, which `unbent` corrects.
     """
 
     pixels: Array
@@ -50,6 +52,7 @@ class Corners:
     target: str = "target"
     sources: tuple[str, ...] = ()
     size_px: tuple[int, int] | None = None
+    by_sides: bool = False
 
     @classmethod
     def of(cls, *detections: Detection) -> "Corners":
@@ -79,7 +82,25 @@ class Corners:
             first.board.name,
             tuple(detection.source for detection in detections),
             (first.width, first.height),
+            first.board.kind == "markers",
         )
+
+    def unbent(self, camera: Camera) -> "Corners":
+        """The corners without what the camera's distortion bends of the sides of markers.
+
+        Markers that are not seen whole keep their corners.
+        """
+        if not self.by_sides:
+            return self
+        order = np.lexsort((self.corner, self.frame))
+        order = order[np.isfinite(self.pixels[order]).all(axis=1)]
+        marker = np.stack([self.frame, self.corner // 4])[:, order]
+        _, place, count = np.unique(marker, axis=1, return_inverse=True, return_counts=True)
+        whole = order[count[place.ravel()] == 4]
+        pixels = self.pixels.copy()
+        quads = pixels[whole].reshape(-1, 4, 2)
+        pixels[whole] = unbent_corners(quads, camera).reshape(-1, 2)
+        return replace(self, pixels=pixels, by_sides=False)
 
     def where(self, keep: NDArray[np.bool_]) -> "Corners":
         """The corners that ``keep`` selects."""
@@ -196,6 +217,7 @@ def locate_board(
     """
     corners = seen if isinstance(seen, Corners) else _corners_of(seen)
     corners.check_camera(camera)
+    corners = corners.unbent(camera)
     if len(np.unique(corners.corner)) < FEWEST:
         count = len(np.unique(corners.corner))
         raise corners.undetermined(f"only {count} corners were seen; 4 are needed")

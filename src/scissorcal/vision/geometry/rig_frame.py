@@ -137,6 +137,7 @@ def locate_rig(
             "several openings."
         )
     located = [locate_board(view.corners, camera) for view in views]
+    views = tuple(view._replace(corners=view.corners.unbent(camera)) for view in views)
     start = _start(views, tuple(board.pose for board in located), middle_m)
     all_rows = _Rows(views, camera, middle_m, tuple(board.used for board in located))
     rows, point = all_rows, all_rows.nearest(start)

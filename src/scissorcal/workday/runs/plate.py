@@ -11,7 +11,7 @@ from scissorcal.calibration.camera.result import CameraFit
 from scissorcal.calibration.plate.fit import fit_plate, plate_target
 from scissorcal.calibration.plate.result import PlateFit
 from scissorcal.errors import VerdictError
-from scissorcal.vision.geometry.board_pose import UndeterminedPoseError
+from scissorcal.vision.geometry.board_pose import Corners, UndeterminedPoseError
 from scissorcal.vision.geometry.camera import Camera
 from scissorcal.vision.geometry.rig_frame import RigPose, card_view, locate_rig
 from scissorcal.vision.overlay import residual_overlay, write_picture
@@ -124,6 +124,7 @@ def _draw(
         for photograph in capture.index.photographs:
             seen = detection_of(capture, photograph)
             photo = read_photo(capture.path(photograph), colour=False)
-            left = seen.pixels - camera.project(pose.apply(seen.points))
-            picture = residual_overlay(photo, seen.pixels, left, axes=axes)
+            pixels = Corners.of(seen).unbent(camera).pixels
+            left = pixels - camera.project(pose.apply(seen.points))
+            picture = residual_overlay(photo, pixels, left, axes=axes)
             write_picture(picture, folder / f"{Path(photograph.file).stem}.png")
