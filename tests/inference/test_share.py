@@ -76,3 +76,14 @@ def test_a_search_without_squares_weighs_a_share_alike() -> None:
     here = find_optimum(often).point
     there = find_optimum(replace(often, standardised=None)).point
     assert there == pytest.approx(here, abs=2e-3)
+
+
+def test_a_direction_without_data_keeps_its_prior_whatever_the_share() -> None:
+    """The information that keeps such directions well defined is not divided by the share."""
+    columns = np.column_stack([np.zeros(COUNT), sweeps(COUNT)])
+    noise = 0.5 * np.random.default_rng(3).standard_normal(COUNT)
+    measured = columns @ np.array([0.3, 1.0, 0.5, 0.2]) + noise
+    blind = regression(columns, measured, np.zeros(COUNT, dtype=np.int64))
+    for share in (1.0, 1e-3):
+        posterior = infer(replace(blind, share=share), "draft", np.random.default_rng(0))
+        assert posterior.draws[:, 0].std() == pytest.approx(50.0, rel=0.05)

@@ -19,7 +19,8 @@ from scissorcal.inference.optimise import Optimum, move_optimum
 from scissorcal.inference.problem import NotFiniteError, Problem, picked
 
 RIDGE = 1e-3
-"""Information, in units of the prior's, that keeps directions without data well defined."""
+"""Information, in units of the prior's, that keeps directions without data well defined. As the
+data's it is of independent terms: of terms that count a share, it counts the share."""
 
 LEAST_INFORMATION = 0.1
 """Information along any direction, in units of the prior's, that a covariance is built from."""
@@ -260,7 +261,7 @@ def _stretch(information: Array, spread: Array, scale: Array, share: float) -> t
     memory are worth more than that, but at most what independent terms are.
     """
     unit = np.outer(scale, scale)
-    H = information * unit + RIDGE * np.eye(len(scale))
+    H = information * unit + share * RIDGE * np.eye(len(scale))
     root = _root(H)
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(inverse @ (spread * unit) @ inverse)
