@@ -111,6 +111,18 @@ def test_the_basis_is_the_law_at_every_sample_and_weighed(seed):
     assert found == pytest.approx(windows.average(exact), abs=allowed)
 
 
+def test_steps_count_beside_a_recording_without_any():
+    """A log without steps to be seen hides nothing of the steps of another one's encoder."""
+    time = np.arange(4000) / 1000
+    smooth = recording(np.sin(time), np.sin(time))
+    stepped = recording(np.round(np.sin(time) / 1e-3) * 1e-3, np.sin(time))
+    assert weigh((smooth,), 75.0).encoder_share == 0.0
+    for logs in ((stepped,), (smooth, stepped), (stepped, smooth)):
+        windows = weigh(logs, 75.0)
+        assert windows.step == pytest.approx(1e-3)
+        assert windows.encoder_share > 0.0
+
+
 def test_windows_that_hold_a_rest_or_a_turn_do_not_count():
     """A swing of 6 rad/s turns seven times in 3.7 s; each turn spoils the windows that hold it."""
     time = np.arange(8000) / 1000

@@ -52,7 +52,7 @@ class Windows:
     without a gap begin. ``slope`` (n,) is the time derivative of the weighed drive, ``tick_s`` the
     time between samples; ``held`` says that commands held the drive from one to the next,
     ``lengthening`` how many times longer the encoder asked windows to be than the cutoff.
-    ``step`` is that of the encoder, 0 where none is to be seen.
+    ``step`` is the largest of the encoder in any recording, 0 where none is to be seen.
     """
 
     bins: Bins
@@ -176,7 +176,7 @@ def weigh(
         shifted = replace(piece, first=piece.first + samples, starts=piece.starts + samples)
         pieces.append(shifted)
         samples += high - low
-    step = float(np.nan_to_num(np.max([motion.step for motion in motions])))
+    step = max((motion.step for motion in motions if np.isfinite(motion.step)), default=0.0)
     return replace(_joined(pieces, loaded), lengthening=knot / asked, step=step)
 
 
