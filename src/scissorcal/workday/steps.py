@@ -258,7 +258,7 @@ STEPS: tuple[Step, ...] = (
         _fit("friction-advance"),
         inputs=("capture friction-advance",),
         settings=_friction_advance_settings,
-        version=5,
+        version=6,
         by_effort=True,
         file=_in_fits("friction-advance.nc"),
         read=facts.fit,
