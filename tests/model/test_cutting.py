@@ -97,6 +97,16 @@ def test_eq4_closure_pins_its_factors():
     )
 
 
+@pytest.mark.parametrize("closure", ["work", "eq4"])
+def test_where_no_crack_can_stand_there_is_no_torque(closure):
+    """Edges that open outwards: the contact is -inf, and no number is lost over it."""
+    edge = Edge("line", -0.008, -0.3, 0.075)
+    law = cutting(edge, closure=closure)
+    contact = settled_contact(law, 0.1)
+    assert np.isneginf(contact)
+    assert torque_at(law, 0.1, contact) == 0.0
+
+
 def test_reclosing_over_cut_material_gives_no_torque():
     law = cutting()
     once = np.concatenate([np.linspace(0.85, 0.3, 300), np.linspace(0.3, 0.85, 300)])

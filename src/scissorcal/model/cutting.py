@@ -222,7 +222,8 @@ def torque_at(
     theta = np.asarray(opening, dtype=np.float64)
     x = np.asarray(contact, dtype=np.float64)
     reached = ~np.isneginf(x)
-    view = edge_height(cutting.edge, np.where(reached, x, 0.0), theta / cutting.moving_blades)
+    x = np.where(reached, x, 0.0)
+    view = edge_height(cutting.edge, x, theta / cutting.moving_blades)
     force = cutting.response.force_at(np.where(reached, cutting.upper_face_m - view.height, -1.0))
     if rate is not None:
         force = damped(cutting, view, force, np.asarray(rate, dtype=np.float64))
