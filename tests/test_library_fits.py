@@ -302,6 +302,15 @@ def test_a_recording_of_another_kind_is_refused() -> None:
         scissorcal.fit_friction([])
 
 
+def test_what_verify_fit_does_not_check_is_refused_with_what_to_do(fit: FitResult) -> None:
+    empty = examples.load("friction")
+    carriage = replace(fit, what="friction-advance")
+    with pytest.raises(InputError, match="verify friction --axis advance"):
+        scissorcal.verify_fit(carriage, empty)
+    with pytest.raises(InputError, match="fits=0 simulates nothing: give 20"):
+        scissorcal.verify_fit(fit, empty, fits=0)
+
+
 def test_progress_and_the_log_are_told_the_stages(caplog: pytest.LogCaptureFixture) -> None:
     told: list[tuple[float, str]] = []
     with caplog.at_level(logging.INFO, logger="scissorcal"):

@@ -220,22 +220,36 @@ def verify_fit(
     simulated data are made (simulation-based calibration), and the checks of 'scissorcal verify';
     look at the result's ``verdicts`` and ``calibration``. Workspaces check theirs in several
     processes (`Workspace.verify`). Raises InputError where a cut comes without recipe or friction,
-    or a fit with a law of your own without that.
+    a fit with a law of your own without that, for a fit of anything else, and without any fit to
+    make.
     """
     from scissorcal.calibration import FitResult
     from scissorcal.calibration.verify.check import StudySettings
     from scissorcal.calibration.verify.of_fit import check_fit, known_cut, known_friction
     from scissorcal.recipe import FitFriction
 
+    if fits < 1:
+        raise InputError(f"fits={fits} simulates nothing: give 20 at least, or 100.")
     checked = fit if isinstance(fit, FitResult) else open_fit(fit)
     if not isinstance(checked, FitResult):
-        raise InputError(f"A fit of {checked.what} has no intervals that simulations check.")
+        raise InputError(
+            f"A fit of {checked.what} has no intervals that simulations check: give a fit of "
+            "friction or of a cut."
+        )
+    if checked.what == "friction-advance":
+        raise InputError(
+            "A fit of the carriage's friction is checked in its workspace: 'scissorcal verify "
+            "friction --axis advance'."
+        )
     used = _recordings(recordings, checked.what)
     chosen = None if recipe is None else _recipe(recipe)
     if checked.what == "friction":
         known = known_friction(used, chosen.fit.friction if chosen else FitFriction(), checked)
     elif chosen is None or friction is None:
-        raise InputError("A fit of a cut is checked with its recipe and its fit of friction.")
+        raise InputError(
+            "A fit of a cut is checked with its recipe and its fit of friction: give both "
+            "(recipe=, friction=)."
+        )
     else:
         known = known_cut(used, chosen, _friction(friction), checked, law=law)
     return check_fit(known, StudySettings(seed=seed), fits, _with_log(progress))
