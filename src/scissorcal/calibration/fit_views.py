@@ -107,9 +107,9 @@ Did you mean "inertia"?
         joint). Of a cut: the material's torque, positive where it resists closing, averaged over
         teeth, where the crack stands ``contact`` metres from the pivot (its place in the sheet less
         the advance) and has run on until it rests. Without ``contact`` the blades cut: the crack
-        stands where it just rests. With friction the blades feel
-        ``cut.predict(opening, rate).torque - friction.predict(opening, rate).torque``, less the
-        sensor's offset; a package's torque() and band() have both.
+        stands where it just rests, and where none can rest there is no torque. With friction the
+        blades feel ``cut.predict(opening, rate).torque - friction.predict(opening, rate).torque``
+        plus the fitted offset, which is the sensor's; a package's torque() and band() have both.
 
         All arguments broadcast. The band is that of the mean, without the sensor's noise and
         without what a new recording may differ by: `scissorcal predict` has a band for new

@@ -52,10 +52,10 @@ def refuse_without_rendering(identity: Identity) -> None:
 def load_image(link: Link, image: bytes, tell: ShowShare) -> int:
     """Have the device hold an image in force, and return the checksum that both have of it.
 
-    A device that holds it already is sent nothing. ``tell`` is called after each piece. Raises
-    DeviceError, with what to do, where the device refuses the image or holds another one
-    afterwards. The motors are switched off: a host that was cut off leaves ENABLE in force, and
-    also after the watchdog's fault the device would refuse.
+    The motors are switched off first: a host that was cut off leaves ENABLE in force, and also
+    after the watchdog's fault the device would refuse. A device that holds the image already is
+    sent no piece of it. ``tell`` is called after each piece. Raises DeviceError, with what to do,
+    where the device refuses the image or holds another one afterwards.
     """
     refuse_without_rendering(link.identity)
     if not isinstance(link, Loading):
