@@ -37,7 +37,7 @@ def fit(path: Path) -> Facts:
     }
 
 
-def trust_check(path: Path) -> Facts:
+def verification(path: Path) -> Facts:
     """Facts of a verification; its inputs are the fit that it checked.
 
     ``lacks`` says what it must have for the fit to count as verified.

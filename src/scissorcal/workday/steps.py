@@ -144,7 +144,7 @@ def _whole(recipe: Recipe) -> object:
     return found
 
 
-def _trust_check(what: str, words: str = "", *, on_request: bool = False) -> Step:
+def _verification(what: str, words: str = "", *, on_request: bool = False) -> Step:
     return Step(
         f"verify {what}",
         "verify",
@@ -152,7 +152,7 @@ def _trust_check(what: str, words: str = "", *, on_request: bool = False) -> Ste
         lambda needs: _fit(what)(needs) and "whether the intervals hold",
         inputs=(f"fit {what}",),
         file=_in_fits(f"{what}.verify.json"),
-        read=facts.trust_check,
+        read=facts.verification,
         holds="scissorcal.calibration.verify.result:VerifyResult",
         optional=True,
         on_request=on_request,
@@ -282,9 +282,9 @@ STEPS: tuple[Step, ...] = (
         run="scissorcal.workday.runs.cut:fit",
         verified_by="verify cut",
     ),
-    _trust_check("friction"),
-    _trust_check("friction-advance", "friction --axis advance", on_request=True),
-    _trust_check("cut"),
+    _verification("friction"),
+    _verification("friction-advance", "friction --axis advance", on_request=True),
+    _verification("cut"),
     Step(
         "report",
         "report",

@@ -70,7 +70,7 @@ def write_workspace_report(
     geometry = _geometry(engine)
     if not fits and not geometry.fits:
         raise MissingError("There is nothing to report yet: run 'scissorcal fit' first.")
-    checks = _trust_checks(engine, fits)
+    checks = _verifications(engine, fits)
     workspace = engine.workspace
     signed = engine.state("report sign").state in ("done", "failed")
     written = anew or not signed or not workspace.report_html.is_file()
@@ -138,7 +138,7 @@ def _choice(engine: Engine) -> SceneChoice | None:
         return None  # 'package build' says why; the report is of the fits all the same
 
 
-def _trust_checks(engine: Engine, fits: dict[str, FitResult]) -> dict[str, VerifyResult]:
+def _verifications(engine: Engine, fits: dict[str, FitResult]) -> dict[str, VerifyResult]:
     """The verifications of these very fits."""
     current = [w for w in fits if engine.state(f"verify {w}").state in ("done", "failed")]
     return {what: load(engine.file(f"verify {what}"), VerifyResult) for what in current}

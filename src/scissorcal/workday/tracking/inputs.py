@@ -135,7 +135,7 @@ def refuse_other_camera(path: Path, track: RecordedTrack, fitted: Any) -> None:
     about, camera = track.about, fitted.camera
     if not about.camera_inputs_hash:
         raise InputError(f"{path.name} was recorded without a camera: there is nothing to locate.")
-    if (about.width, about.height) != (camera.width, camera.height):
+    if not camera.takes(about.width, about.height):
         raise InputError(
             f"{path.name} has pictures of {about.width} x {about.height}, and the camera was "
             f"fitted at {camera.width} x {camera.height}: its poses are of another camera. Restore "
