@@ -309,6 +309,10 @@ def test_what_verify_fit_does_not_check_is_refused_with_what_to_do(fit: FitResul
         scissorcal.verify_fit(carriage, empty)
     with pytest.raises(InputError, match="fits=0 simulates nothing: give 20"):
         scissorcal.verify_fit(fit, empty, fits=0)
+    samples = empty.samples.copy()
+    samples["motor_torque"] *= 1.5
+    with pytest.raises(InputError, match="was not made of these recordings"):
+        scissorcal.verify_fit(fit, replace(empty, samples=samples))
 
 
 def test_progress_and_the_log_are_told_the_stages(caplog: pytest.LogCaptureFixture) -> None:

@@ -220,8 +220,8 @@ def verify_fit(
     simulated data are made (simulation-based calibration), and the checks of 'scissorcal verify';
     look at the result's ``verdicts`` and ``calibration``. Workspaces check theirs in several
     processes (`Workspace.verify`). Raises InputError where a cut comes without recipe or friction,
-    a fit with a law of your own without that, for a fit of anything else, and without any fit to
-    make.
+    a fit with a law of your own without that, for recordings that the fit was not made of, for a
+    fit of anything else, and without any fit to make.
     """
     from scissorcal.calibration import FitResult
     from scissorcal.calibration.verify.check import StudySettings

@@ -1,9 +1,12 @@
 """The study of a finished fit from what it was made of, and its check without a workspace."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+
+import numpy as np
 
 from scissorcal.aliases import Progress
+from scissorcal.calibration.assemble import MOST_POINTS
 from scissorcal.calibration.cut.fit import cut_experiment
 from scissorcal.calibration.cut.own_law import as_law_fit, of_own_law
 from scissorcal.calibration.fit_model import Experiment
@@ -21,7 +24,8 @@ from scissorcal.recording.recording import Recording
 CHECKS: tuple[CheckKind, ...] = ("sbc", "halves", "prior")
 
 
-class Known(NamedTuple):
+@dataclass(frozen=True)
+class Known:
     """A fit in the parameters that it is checked in, its design and its simulator.
 
     ``sheets`` has the sheet of each stroke, where there are several.
@@ -31,6 +35,16 @@ class Known(NamedTuple):
     experiment: Experiment
     simulator: Simulator
     sheets: dict[int, int]
+
+    def __post_init__(self) -> None:
+        """Refuse data that the fit was not made of: their checks would be of something else."""
+        measured, fitted = self.experiment.observed, self.fit.series.measured
+        kept = measured[:: max(1, -(-len(measured) // MOST_POINTS))]
+        if kept.shape != fitted.shape or not np.allclose(kept, fitted, rtol=1e-9, atol=1e-12):
+            raise InputError(
+                f"This fit of {self.fit.what} was not made of these recordings with this recipe: "
+                "give those that it was made of, all of them and unchanged."
+            )
 
     def study(self, settings: StudySettings) -> Study:
         """All that the fits of a check depend on."""
