@@ -129,6 +129,7 @@ class Recording:
 
         The columns are those of ``scissorcal export``: ``opening_rad`` (``opening_m`` for a linear
         joint), ``motor_torque_Nm`` and so on; ``time_s`` is the device clock from the first sample.
+        Which sheet is cut is not among them: add a column ``sheet`` for `from_pandas`.
         Raises InputError where pandas is not installed.
         """
         try:
