@@ -136,7 +136,7 @@ def identify(
     \b
     Example:
       $ scissorcal identify DATA_EMPS.mat -c time=t -c position=qm -c effort=vir \\
-          -u time=s -u position=m -u effort=N -s effort=gtau --to mujoco --export joint.xml
+          -u time=s -u position=m -u effort=V -s effort=gtau --to mujoco --export joint.xml
       Parameters: stribeck + angle + presliding, asymmetric: inertia 95.60 (95.12 to 96.10) kg; ...
       ...
       joint.html
