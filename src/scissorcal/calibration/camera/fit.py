@@ -206,7 +206,7 @@ CANDIDATES: tuple[tuple[str, Array], ...] = (
 )
 """Pixels are square (fx = fy) in all but the last two. The board may bulge in every candidate."""
 
-_BENDING = CANDIDATES[3][1]
+_BENDING = dict(CANDIDATES)["k1, k2, p1, p2"]
 """The distortion that says what a lens bends of the sides of markers, before one is chosen."""
 
 

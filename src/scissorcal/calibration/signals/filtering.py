@@ -217,8 +217,13 @@ def _acceleration(pieces: list[Motion], steps: list[float], knot: int) -> tuple[
         square += float(
             np.sum((sliding_window_view(piece.position, len(twice))[first] @ twice) ** 2)
         )
-        error += len(first) * float(np.sum(twice**2)) * step**2 / 12.0
+        error += len(first) * steps_variance(twice, step)
     return max(square - error, 0.0), error, count
+
+
+def steps_variance(twice: Array, step: float) -> float:
+    """Variance that white steps of an encoder give the second derivative weighed by ``twice``."""
+    return float(np.sum(twice**2)) * step**2 / 12.0
 
 
 def spline(knot: int) -> Array:

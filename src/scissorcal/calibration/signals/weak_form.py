@@ -20,6 +20,7 @@ from scissorcal.calibration.signals.filtering import (
     rate_floor,
     second_derivative,
     spline,
+    steps_variance,
     widened,
 )
 from scissorcal.calibration.signals.segments import bridge, no_piece, sheets_of, usual_tick
@@ -73,7 +74,7 @@ class Windows:
     def encoder_share(self) -> float:
         """Share of the encoder's steps in the acceleration's mean square over these windows."""
         twice = second_derivative(len(self.weights) // 3, 1.0 / self.tick_s)
-        error = float(np.sum(twice**2)) * self.step**2 / 12.0
+        error = steps_variance(twice, self.step)
         square = float(np.mean(self.bins.acceleration**2))
         return error / square if 0.0 < error < square else float(error > 0.0)
 

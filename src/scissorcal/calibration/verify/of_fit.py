@@ -13,15 +13,13 @@ from scissorcal.calibration.fit_model import Experiment
 from scissorcal.calibration.friction.fit import friction_experiment
 from scissorcal.calibration.result import FitResult
 from scissorcal.calibration.verify.check import StudySettings, assess, make_study, tasks_of
-from scissorcal.calibration.verify.result import CheckKind, VerifyResult
+from scissorcal.calibration.verify.result import CHECKS, VerifyResult
 from scissorcal.calibration.verify.simulator import Simulator, cut_simulator, friction_simulator
 from scissorcal.calibration.verify.study import Study, run
 from scissorcal.errors import InputError
 from scissorcal.model import EdgeDistribution, ResponseLaw
 from scissorcal.recipe.schema import FitFriction, Recipe
 from scissorcal.recording.recording import Recording
-
-CHECKS: tuple[CheckKind, ...] = ("sbc", "halves", "prior")
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """What the verification results in: calibration, halves, prior sensitivity, verdicts."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from scissorcal.calibration.result import Effort, Result
 from scissorcal.verdicts import Verdict
@@ -9,6 +9,7 @@ from scissorcal.verdicts import Verdict
 FORMAT: Literal["scissorcal-verify/1"] = "scissorcal-verify/1"
 
 CheckKind = Literal["sbc", "halves", "prior"]
+CHECKS: tuple[CheckKind, ...] = get_args(CheckKind)
 Diagnosis = Literal["fine", "prior-data conflict", "weak likelihood"]
 PriorKind = Literal["local", "recipe"]
 
